@@ -1,0 +1,1 @@
+"""The Aerosonde of Beard and McLain as a JSBSim model."""

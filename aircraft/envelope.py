@@ -1,0 +1,97 @@
+"""What an aircraft can do: steady climb, descent and speed over airspeed and height, with its interpolation."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+GRAVITY = 9.80665
+
+
+@dataclass(frozen=True, slots=True)
+class Envelope:
+    """Steady-flight limits from trims, in still air relative to the air mass.
+
+    airspeed: (v,) m/s, amsl: (h,) m, both increasing.  climb, descent: (v, h) flight-path angles in rad,
+    positive in the direction of their name (a negative climb means the aircraft cannot hold height there);
+    NaN where no trim exists at all.  level_speed_min, level_speed_max: (h,) m/s.
+    max_bank: rad, the aircraft's own limit.  motor_braking: whether descent may drive the motor.
+    """
+
+    aircraft: str
+    model_hash: str
+    motor_braking: bool
+    airspeed: Floats
+    amsl: Floats
+    climb: Floats
+    descent: Floats
+    level_speed_min: Floats
+    level_speed_max: Floats
+    max_bank: float
+
+    def __post_init__(self) -> None:
+        """Lock the tables."""
+        for name in ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max"):
+            table = np.array(getattr(self, name), dtype=np.float64)
+            table.setflags(write=False)
+            object.__setattr__(self, name, table)
+
+    def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
+        """Steepest climb and descent relative to the air, rad, both positive, bilinear in the table.
+
+        Outside the table the nearest edge counts.
+        """
+        return (
+            _bilinear(self.airspeed, self.amsl, self.climb, airspeed, amsl),
+            _bilinear(self.airspeed, self.amsl, self.descent, airspeed, amsl),
+        )
+
+    def slope_limits(self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0) -> tuple[float, float]:
+        """Steepest climb and dive over the ground, rad, both positive, on a leg with this steady wind.
+
+        tailwind, crosswind: m/s along and across the leg's course.  A tailwind flattens the slope over the
+        ground, a headwind steepens it.  Raises ValueError if the aircraft cannot make way along the leg.
+        """
+        climb, descent = self.air_angles(airspeed, amsl)
+        return (
+            ground_slope(climb, airspeed, tailwind, crosswind),
+            ground_slope(descent, airspeed, tailwind, crosswind),
+        )
+
+    def level_speeds(self, amsl: float) -> tuple[float, float]:
+        """Slowest and fastest level flight at this height, m/s."""
+        return (
+            float(np.interp(amsl, self.amsl, self.level_speed_min)),
+            float(np.interp(amsl, self.amsl, self.level_speed_max)),
+        )
+
+
+def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
+    """Path angle over the ground of a steady climb at ``air_angle`` to the air mass, rad."""
+    along = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
+    return math.atan2(airspeed * math.sin(air_angle), along)
+
+
+def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
+    """Speed over the ground along a course that is held against the wind, m/s.
+
+    Raises ValueError where the wind is too strong to hold the course at all.
+    """
+    square = airspeed**2 - crosswind**2
+    along = math.sqrt(square) + tailwind if square > 0.0 else -1.0
+    if along <= 0.0:
+        raise ValueError(f"no way made along the leg: airspeed {airspeed:.1f} m/s in {tailwind:+.1f}/{crosswind:.1f} m/s of wind")
+    return along
+
+
+def turn_radius(speed: float, bank: float) -> float:
+    """Radius of a coordinated level turn, m, from speed (m/s) and bank (rad)."""
+    return speed**2 / (GRAVITY * math.tan(bank))
+
+
+def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
+    rows = np.array([np.interp(y, ys, row) for row in table])
+    return float(np.interp(x, xs, rows))

@@ -1,0 +1,1 @@
+"""Missions and their files, JSBSim, guidance and the simulated flight."""

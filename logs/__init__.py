@@ -1,0 +1,1 @@
+"""After the fact: recorder, reader, replay, check (the verdict), report and figures."""

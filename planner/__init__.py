@@ -1,0 +1,1 @@
+"""The path planner: encodings, criteria, preference, and the estimation of distribution algorithms."""

@@ -1,0 +1,36 @@
+"""The error tree.
+
+    PlanflyError
+    ├── ScenarioError   a scenario file or a planner option
+    ├── TerrainError    an elevation file
+    ├── MissionError    a plan or mission file
+    ├── FlightError     an aircraft model or a flight that cannot start
+    └── LogError        a flight log
+
+Each message is one line: the file, the line or field, the value, and the allowed range.  The command
+line prints it and ends with exit code 2.  "Not flyable" and "no feasible path" are results, not errors.
+"""
+
+
+class PlanflyError(Exception):
+    """Bad input: the message names file, field, value and range in one line."""
+
+
+class ScenarioError(PlanflyError):
+    """A scenario cannot be used as it stands."""
+
+
+class TerrainError(PlanflyError):
+    """An elevation file cannot be read, or does not cover what it should."""
+
+
+class MissionError(PlanflyError):
+    """A plan or mission file cannot be read or flown."""
+
+
+class FlightError(PlanflyError):
+    """An aircraft model or a start condition is unusable."""
+
+
+class LogError(PlanflyError):
+    """A flight log cannot be read."""
