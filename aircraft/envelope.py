@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -53,7 +54,7 @@ class Envelope:
         """Steepest climb and dive over the ground, rad, both positive, on a leg with this steady wind.
 
         tailwind, crosswind: m/s along and across the leg's course.  A tailwind flattens the slope over the
-        ground, a headwind steepens it.  Raises ValueError if the aircraft cannot make way along the leg.
+        ground, a headwind steepens it.  NaN if the aircraft cannot make way along the leg.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -69,25 +70,25 @@ class Envelope:
         )
 
 
-def ground_slope(air_angle: float, airspeed: float, tailwind: float, crosswind: float) -> float:
-    """Path angle over the ground of a steady climb at ``air_angle`` to the air mass, rad."""
+@njit(cache=True)
+def ground_slope(
+    air_angle: float, airspeed: float, tailwind: float, crosswind: float
+) -> float:  # pragma: no cover - compiled
+    """Path angle over the ground of a steady climb at ``air_angle`` to the air mass, rad; NaN if no way is made."""
     along = ground_speed(airspeed * math.cos(air_angle), tailwind, crosswind)
     return math.atan2(airspeed * math.sin(air_angle), along)
 
 
-def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:
-    """Speed over the ground along a course that is held against the wind, m/s.
-
-    Raises ValueError where the wind is too strong to hold the course at all.
-    """
+@njit(cache=True)
+def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  # pragma: no cover - compiled
+    """Speed over the ground along a course that is held against the wind, m/s; NaN where it cannot be held."""
     square = airspeed**2 - crosswind**2
     along = math.sqrt(square) + tailwind if square > 0.0 else -1.0
-    if along <= 0.0:
-        raise ValueError(f"no way made along the leg: airspeed {airspeed:.1f} m/s in {tailwind:+.1f}/{crosswind:.1f} m/s of wind")
-    return along
+    return along if along > 0.0 else math.nan
 
 
-def turn_radius(speed: float, bank: float) -> float:
+@njit(cache=True)
+def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compiled
     """Radius of a coordinated level turn, m, from speed (m/s) and bank (rad)."""
     return speed**2 / (GRAVITY * math.tan(bank))
 

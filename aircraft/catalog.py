@@ -1,0 +1,142 @@
+"""The aircraft we know: metadata read from each model's TOML file, in SI units and radians."""
+
+import hashlib
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+_ROOT = Path(__file__).parent
+_DEGREE = math.pi / 180.0
+
+# TOML key: (field of Aircraft, factor to SI).
+_KEYS = {
+    "mass_kg": ("mass", 1.0),
+    "wing_area_m2": ("wing_area", 1.0),
+    "wing_span_m": ("wing_span", 1.0),
+    "airspeed_mps": ("airspeed", 1.0),
+    "airspeed_min_mps": ("airspeed_min", 1.0),
+    "airspeed_max_mps": ("airspeed_max", 1.0),
+    "stall_speed_mps": ("stall_speed", 1.0),
+    "max_bank_deg": ("max_bank", _DEGREE),
+    "max_pitch_deg": ("max_pitch", _DEGREE),
+    "max_elevator_deg": ("max_elevator", _DEGREE),
+    "max_aileron_deg": ("max_aileron", _DEGREE),
+    "max_rudder_deg": ("max_rudder", _DEGREE),
+    "surface_rate_deg_s": ("surface_rate", _DEGREE),
+    "surface_lag_s": ("surface_lag", 1.0),
+    "motor_lag_s": ("motor_lag", 1.0),
+    "battery_v": ("battery_voltage", 1.0),
+    "battery_wh": ("battery_energy", 3600.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Aircraft:
+    """One aircraft model: where its JSBSim files are, and what its users need to know.
+
+    folder: holds ``<name>.xml`` (JSBSim) and ``<name>.toml``.  mass: kg.  wing_area: m^2.  wing_span: m.
+    airspeed, airspeed_min, airspeed_max, stall_speed: m/s, true airspeed; cruise, the range guidance may use,
+    and the slowest level trim at sea level.  max_bank: rad, for planned turns.  max_pitch: rad, commanded, either way.
+    max_elevator, max_aileron, max_rudder: rad, either way.  surface_rate: rad/s.  surface_lag, motor_lag: s, first order.
+    battery_voltage: V.  battery_energy: J.
+    """
+
+    name: str
+    title: str
+    folder: Path
+    mass: float
+    wing_area: float
+    wing_span: float
+    airspeed: float
+    airspeed_min: float
+    airspeed_max: float
+    stall_speed: float
+    max_bank: float
+    max_pitch: float
+    max_elevator: float
+    max_aileron: float
+    max_rudder: float
+    surface_rate: float
+    surface_lag: float
+    motor_lag: float
+    battery_voltage: float
+    battery_energy: float
+
+    @property
+    def model_file(self) -> Path:
+        """The JSBSim model."""
+        return self.folder / f"{self.name}.xml"
+
+
+def aircraft_names() -> tuple[str, ...]:
+    """Names that `load_aircraft` takes, sorted."""
+    return tuple(sorted(file.stem for file in _ROOT.glob("*/*.toml") if file.stem == file.parent.name))
+
+
+def load_aircraft(name: str) -> Aircraft:
+    """Return the aircraft of this name.
+
+    Raises ValueError, in one line, for an unknown name or a metadata file with a missing, unknown or bad entry.
+    """
+    known = aircraft_names()
+    if name not in known:
+        raise ValueError(f"no aircraft called {name!r}: known are {', '.join(known)}")
+    return read_aircraft(_ROOT / name)
+
+
+def read_aircraft(folder: Path) -> Aircraft:
+    """Return the aircraft described by ``<folder>/<folder's name>.toml``.
+
+    Raises ValueError as `load_aircraft` does.
+    """
+    file = folder / f"{folder.name}.toml"
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ValueError(f"{file}: {error.strerror}") from None
+    except ValueError as error:  # a TOML or a UTF-8 error
+        raise ValueError(f"{file}: {' '.join(str(error).split())}") from None
+    title = table.pop("title", folder.name)
+    if not isinstance(title, str):
+        raise ValueError(f"{file}: title = {title!r} is not a text")
+    if missing := sorted(_KEYS.keys() - table.keys()):
+        raise ValueError(f"{file}: missing {', '.join(missing)}")
+    if unknown := sorted(table.keys() - _KEYS.keys()):
+        raise ValueError(f"{file}: unknown key {', '.join(unknown)}")
+    values = {}
+    for key, (field, factor) in _KEYS.items():
+        value = table[key]
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+            raise ValueError(f"{file}: {key} = {value!r} is not a positive number")
+        values[field] = value * factor
+    if not values["stall_speed"] <= values["airspeed_min"] <= values["airspeed"] <= values["airspeed_max"]:
+        raise ValueError(
+            f"{file}: stall_speed_mps <= airspeed_min_mps <= airspeed_mps <= airspeed_max_mps does not hold:"
+            f" {values['stall_speed']}, {values['airspeed_min']}, {values['airspeed']}, {values['airspeed_max']}"
+        )
+    return Aircraft(name=folder.name, title=title, folder=folder, **values)
+
+
+def model_hash(aircraft: Aircraft) -> str:
+    """SHA-256, as hex, over the names and contents of the model's XML and TOML files.
+
+    Any change of the model changes it, so a cached envelope or an old log can say which model it belongs to.
+    """
+    return _hash_files(aircraft.folder, _stamps(aircraft.folder))
+
+
+def _stamps(folder: Path) -> tuple[tuple[str, int, int], ...]:
+    files = sorted(file for file in folder.iterdir() if file.suffix in {".xml", ".toml"})
+    return tuple((file.name, file.stat().st_mtime_ns, file.stat().st_size) for file in files)
+
+
+@cache
+def _hash_files(folder: Path, stamps: tuple[tuple[str, int, int], ...]) -> str:
+    digest = hashlib.sha256()
+    for name, _, _ in stamps:
+        data = (folder / name).read_bytes()
+        digest.update(f"{name}\n{len(data)}\n".encode())
+        digest.update(data)
+    return digest.hexdigest()

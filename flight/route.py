@@ -1,0 +1,39 @@
+"""A mission as the aircraft flies it: world-frame waypoints with speeds, jumps unrolled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """Waypoints in flying order; leg i goes from waypoint i to i + 1.
+
+    waypoints: (w, 3) world m.  airspeed: (w - 1,) m/s on each leg.  acceptance: (w,) m, 0 where the mission states none
+    (advisory: the verdict has its own rule).  fly_over: (w,) bool.  items: (w,) the mission item's seq, -1 for a point
+    that is no item.  started: a sentence: where and how the flight starts.  notes: what cannot be flown as written, with
+    item numbers.
+    """
+
+    waypoints: Floats
+    airspeed: Floats
+    acceptance: Floats
+    fly_over: NDArray[np.bool_]
+    items: NDArray[np.int64]
+    started: str
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items"):
+            array = np.array(getattr(self, name))
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def legs(self) -> int:
+        """How many legs there are."""
+        return len(self.waypoints) - 1

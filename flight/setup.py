@@ -1,0 +1,57 @@
+"""Everything that decides a flight, fixed before it starts."""
+
+import math
+from dataclasses import dataclass
+
+from aircraft.envelope import Envelope
+from flight.mission import Mission
+from flight.route import Route
+from planner.plan import Plan
+from world.limits import Limits
+from world.scenario import Scenario
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSetup:
+    """What is flown, by what, in which world; the log carries all of it.
+
+    airspeed: m/s.  max_bank: rad.  battery: Wh.  mission_text: the mission as a .waypoints file, as flown.
+    plan: None for a mission that a person brought.  seed: of the run; the turbulence's stream comes from it
+    unless the scenario's wind has its own.
+    """
+
+    scenario: Scenario
+    mission: Mission
+    mission_text: str
+    route: Route
+    envelope: Envelope
+    aircraft: str
+    airspeed: float
+    max_bank: float
+    battery: float
+    seed: int
+    plan: Plan | None = None
+
+
+def limits_of(setup: FlightSetup) -> Limits:
+    """The limits that this flight is judged against."""
+    return make_limits(setup.scenario, setup.envelope, setup.airspeed, setup.max_bank)
+
+
+def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
+    """A scenario's limits, with the aircraft's where the scenario leaves them to it."""
+
+    def number(value: float | str) -> float | None:
+        return None if isinstance(value, str) else math.radians(value)
+
+    table = scenario.limits
+    return Limits(
+        max_turn=number(table.max_turn_deg),
+        max_climb=number(table.max_climb_deg),
+        max_dive=number(table.max_dive_deg),
+        min_clearance=table.min_clearance_m,
+        envelope=envelope,
+        airspeed=airspeed,
+        max_bank=min(max_bank, envelope.max_bank),
+        wind=scenario.wind,
+    )

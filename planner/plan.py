@@ -1,0 +1,240 @@
+"""A plan: waypoints, how they were judged, and the scenario they were made for."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from world.errors import MissionError, ScenarioError
+from world.scenario import Scenario, from_spec
+from world.scenario_file import first_error
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+SCHEMA = "planfly.plan/1"
+
+
+class Violation(IntEnum):
+    """Columns of a path's violation counts (paper eq. 1-7)."""
+
+    TURN = 0
+    SLOPE = 1
+    TERRAIN = 2
+    BOUNDS = 3
+
+
+class Objective(IntEnum):
+    """Columns of a path's objectives (paper eq. 8-11)."""
+
+    LENGTH_RATIO = 0
+    KILL_EXPOSURE = 1
+    DETECTION_EXPOSURE = 2
+    HEIGHT_SUM = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate:
+    """What the continuous check found along the whole path, not at six points a leg.
+
+    margin fields are the smallest limit minus value, negative where the path fails: turn, slope in rad
+    (``turn_room``: m of leg left between its two turns, inf where the flat turn limit alone counts), clearance
+    in m above ground less the required clearance, bounds in m.  kill_distance: m between the path and the
+    nearest missile sphere's surface, negative inside, inf without missiles.
+    problems: one line each of what failed, empty if the path is certified.
+    """
+
+    turn: float
+    turn_room: float
+    slope: float
+    clearance: float
+    bounds: float
+    kill_distance: float
+    problems: tuple[str, ...]
+
+    @property
+    def ok(self) -> bool:
+        """No constraint is violated anywhere on the path."""
+        return not self.problems
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A planned path.
+
+    waypoints: (w, 3) world m.  violations: (4,) counts by `Violation`; objectives: (4,) by `Objective`; both
+    as the search saw them.  feasible: no violations and a clean certificate.  safe: feasible, and outside every missile sphere.
+    history: (g, 3) best length ratio, best kill exposure and smallest number of violations after each generation
+    """
+
+    scenario: Scenario
+    waypoints: Floats
+    violations: Ints
+    objectives: Floats
+    certificate: Certificate
+    seed: int
+    algorithm: str
+    evaluations: int
+    history: Floats
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        for name, kind in (
+            ("waypoints", np.float64),
+            ("violations", np.int64),
+            ("objectives", np.float64),
+            ("history", np.float64),
+        ):
+            array = np.array(getattr(self, name), dtype=kind)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def feasible(self) -> bool:
+        """The path meets all four constraints, counted and continuously."""
+        return self.certificate.ok and not self.violations.any()
+
+    @property
+    def safe(self) -> bool:
+        """Feasible, and no missile reaches the path."""
+        return self.feasible and self.certificate.kill_distance > 0.0
+
+
+class _Model(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+
+
+Coordinate = Annotated[float, Field(ge=-500_000.0, le=500_000.0)]
+
+
+class _CertificateFile(_Model):
+    turn_margin_rad: float
+    turn_room_m: float | None
+    slope_margin_rad: float
+    clearance_margin_m: float | None
+    bounds_margin_m: float
+    kill_distance_m: float | None
+    problems: list[str]
+
+
+class _PlanFile(_Model):
+    file_schema: Literal["planfly.plan/1"] = Field(alias="schema")
+    scenario: dict[str, Any]
+    algorithm: str
+    seed: Annotated[int, Field(ge=0)]
+    evaluations: Annotated[int, Field(ge=0)]
+    feasible: bool
+    safe: bool
+    waypoints_east_north_amsl_m: Annotated[
+        list[Annotated[list[Coordinate], Field(min_length=3, max_length=3)]], Field(min_length=2, max_length=10_000)
+    ]
+    violations: dict[str, Annotated[int, Field(ge=0)]]
+    objectives: dict[str, float]
+    certificate: _CertificateFile
+    history: list[list[float | None]]
+
+
+def _or_none(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None
+
+
+def plan_json(plan: Plan) -> str:
+    """The plan as the text of a ``plan.json``; the same plan always gives the same bytes."""
+    certificate = plan.certificate
+    data = {
+        "schema": SCHEMA,
+        "algorithm": plan.algorithm,
+        "seed": plan.seed,
+        "evaluations": plan.evaluations,
+        "feasible": plan.feasible,
+        "safe": plan.safe,
+        "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
+        "violations": {item.name.lower(): int(plan.violations[item]) for item in Violation},
+        "objectives": {item.name.lower(): float(plan.objectives[item]) for item in Objective},
+        "certificate": {
+            "turn_margin_rad": certificate.turn,
+            "turn_room_m": _or_none(certificate.turn_room),
+            "slope_margin_rad": certificate.slope,
+            "clearance_margin_m": _or_none(certificate.clearance),
+            "bounds_margin_m": certificate.bounds,
+            "kill_distance_m": _or_none(certificate.kill_distance),
+            "problems": list(certificate.problems),
+        },
+        "history": [[_or_none(value) for value in row] for row in plan.history.tolist()],
+        "scenario": plan.scenario.to_json(),
+    }
+    return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def parse_plan(text: str, source: str, *, base: Path | None = None, terrain: str | None = None) -> Plan:
+    """Read the text of a ``plan.json``; ``terrain`` replaces its scenario's terrain by a file.
+
+    Raises MissionError (or the scenario's own errors) with one line: file, field, value, what is allowed.
+    """
+    try:
+        data = json.loads(text, parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise MissionError(f"{source}: not valid JSON: {error}") from error
+    try:
+        file = _PlanFile.model_validate(data)
+    except ValidationError as error:
+        raise MissionError(f"{source}: {first_error(error)}") from error
+    _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
+    _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
+    # The position of a scenario with its own terrain stays as planned, whatever terrain it is flown over.
+    scenario = from_spec(file.scenario, source, base=base, terrain=terrain)
+    saved = file.certificate
+    certificate = Certificate(
+        turn=saved.turn_margin_rad,
+        turn_room=_or_inf(saved.turn_room_m),
+        slope=saved.slope_margin_rad,
+        clearance=np.nan if saved.clearance_margin_m is None else saved.clearance_margin_m,
+        bounds=saved.bounds_margin_m,
+        kill_distance=_or_inf(saved.kill_distance_m),
+        problems=tuple(saved.problems),
+    )
+    history = np.array([[np.nan if v is None else v for v in row] for row in file.history]).reshape(-1, 3)
+    return Plan(
+        scenario=scenario,
+        waypoints=np.array(file.waypoints_east_north_amsl_m),
+        violations=np.array([file.violations[item.name.lower()] for item in Violation]),
+        objectives=np.array([file.objectives[item.name.lower()] for item in Objective]),
+        certificate=certificate,
+        seed=file.seed,
+        algorithm=file.algorithm,
+        evaluations=file.evaluations,
+        history=history,
+    )
+
+
+def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
+    """Read a ``plan.json`` file.  Raises MissionError or the scenario's errors."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
+    try:
+        return parse_plan(text, str(path), base=path.parent, terrain=terrain)
+    except ScenarioError as error:
+        raise ScenarioError(str(error)) from error
+
+
+def _or_inf(value: float | None) -> float:
+    return np.inf if value is None else value
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
+    if sorted(given) != sorted(wanted):
+        raise MissionError(f"{source}: {field}: keys {sorted(given)}: expected {sorted(wanted)}")

@@ -1,0 +1,133 @@
+"""Path geometry that judges plans and flown tracks alike: turning angles, slopes, spheres, exposure.
+
+Scalar kernels are compiled and take bare numbers, so that the planner's evaluation, the certificate and the
+check of a flown track call the same code.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+# Exposure grows as 1/d^4: closer than this, the distance counts as this (m).
+CLOSEST = 1.0
+
+
+def turning_angles(waypoints: ArrayLike) -> Floats:
+    """Course change at each inner waypoint, ignoring height (paper eq. 1).
+
+    waypoints: (..., w, 3) metres.  Returns (..., w - 2) radians in [0, pi].
+    A leg with no horizontal length has no course and counts as straight.
+    """
+    # atan2, not the paper's arccos: rounding takes arccos' argument past 1 on exact U-turns, and the NaN
+    # that follows compares as "within the limit".
+    return np.abs(signed_turns(waypoints))
+
+
+def signed_turns(waypoints: ArrayLike) -> Floats:
+    """Course change at each inner waypoint, (..., w - 2) rad in (-pi, pi], positive to the right."""
+    legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
+    before, after = legs[..., :-1, :], legs[..., 1:, :]
+    cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
+    dot = before[..., 0] * after[..., 0] + before[..., 1] * after[..., 1]
+    return np.asarray(np.arctan2(-cross, dot))
+
+
+def leg_courses(waypoints: ArrayLike) -> Floats:
+    """Course of each leg, (..., w - 1) rad clockwise from north in (-pi, pi]."""
+    legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
+    return np.asarray(np.arctan2(legs[..., 0], legs[..., 1]))
+
+
+def leg_runs(waypoints: ArrayLike) -> Floats:
+    """Horizontal length of each leg, (..., w - 1) m."""
+    legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
+    return np.asarray(np.hypot(legs[..., 0], legs[..., 1]))
+
+
+def leg_slopes(waypoints: ArrayLike) -> Floats:
+    """Slope angle of each leg, (..., w - 1) rad, climbing positive (the angle of paper eq. 3's tangent)."""
+    rise = np.diff(np.asarray(waypoints, dtype=np.float64)[..., 2], axis=-1)
+    return np.asarray(np.arctan2(rise, leg_runs(waypoints)))
+
+
+def path_length(waypoints: ArrayLike) -> Floats:
+    """Length in three dimensions, (...,) m."""
+    legs = np.diff(np.asarray(waypoints, dtype=np.float64), axis=-2)
+    return np.asarray(np.sqrt((legs**2).sum(axis=-1)).sum(axis=-1))
+
+
+@njit(cache=True)
+def turning_angle(
+    ax: float, ay: float, bx: float, by: float, cx: float, cy: float
+) -> float:  # pragma: no cover - compiled
+    """Course change at b on the way a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
+    ux, uy, vx, vy = bx - ax, by - ay, cx - bx, cy - by
+    return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
+
+
+@njit(cache=True)
+def sphere_window(
+    a: Floats, b: Floats, centre: Floats, radius: float
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """How the segment a-b meets a sphere: closest distance (m), and the fractions where it enters and leaves.
+
+    a, b, centre: (3,).  Enter and leave lie in [0, 1]; both are 0 where the segment stays outside.  A point
+    on the surface is inside (paper eq. 9: d <= R).
+    """
+    length2 = 0.0
+    along = 0.0
+    start2 = 0.0
+    for k in range(3):
+        step = b[k] - a[k]
+        out = a[k] - centre[k]
+        length2 += step * step
+        along += step * out
+        start2 += out * out
+    if length2 == 0.0:
+        inside = 1.0 if start2 <= radius * radius else 0.0
+        return math.sqrt(start2), 0.0, inside
+    nearest = min(1.0, max(0.0, -along / length2))
+    closest2 = max(0.0, start2 + 2.0 * nearest * along + nearest * nearest * length2)
+    if closest2 > radius * radius:
+        return math.sqrt(closest2), 0.0, 0.0
+    middle = -along / length2
+    half = math.sqrt(max(0.0, middle * middle - (start2 - radius * radius) / length2))
+    return math.sqrt(closest2), max(0.0, middle - half), min(1.0, middle + half)
+
+
+@njit(cache=True)
+def segment_exposure(
+    a: Floats, b: Floats, centre: Floats, radius: float, scale: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Share of the segment a-b inside a sphere, and the mean over the whole segment of (scale/d)^4 inside it.
+
+    Exact: with perpendicular distance h (at least `CLOSEST`) and path coordinate s from the closest point,
+    the integral of ds/(h^2+s^2)^2 is s/(2h^2(h^2+s^2)) + atan(s/h)/(2h^3).  The law is the paper's eq. 9 and
+    10, as a density along the path instead of a sum over six points.
+    """
+    _, enter, leave = sphere_window(a, b, centre, radius)
+    if leave <= enter:
+        return 0.0, 0.0
+    length2 = 0.0
+    along = 0.0
+    start2 = 0.0
+    for k in range(3):
+        step = b[k] - a[k]
+        out = a[k] - centre[k]
+        length2 += step * step
+        along += step * out
+        start2 += out * out
+    if length2 < 1e-12:
+        return leave - enter, (leave - enter) * scale**4 / max(start2, CLOSEST * CLOSEST) ** 2
+    length = math.sqrt(length2)
+    middle = -along / length2
+    h = math.sqrt(max(CLOSEST * CLOSEST, start2 - middle * middle * length2))
+    total = 0.0
+    for sign, fraction in ((1.0, leave), (-1.0, enter)):
+        s = (fraction - middle) * length
+        total += sign * (s / (2.0 * h * h * (h * h + s * s)) + math.atan(s / h) / (2.0 * h * h * h))
+    return leave - enter, scale**4 * total / length

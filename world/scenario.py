@@ -1,0 +1,283 @@
+"""A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import ScenarioError
+from world.frames import GeoOrigin, to_geo, to_map
+from world.raster import open_raster, read_terrain, tile_bounds
+from world.scenario_file import (
+    AreaTable,
+    FlightTable,
+    LimitsTable,
+    OriginTable,
+    PlannerTable,
+    PointTable,
+    ScenarioFile,
+    TerrainTable,
+    ThreatTable,
+    check_scenario,
+    parse_scenario,
+    read_scenario_text,
+)
+from world.terrain import Terrain, flat_terrain, peaks_terrain
+from world.threats import Threats
+from world.wind import Wind
+
+Floats = NDArray[np.float64]
+
+# Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
+MARGIN = 1000.0
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One mission's world, in map axes (m) and radians.
+
+    bounds: (2, 2) [[east0, east1], [north0, north1]].  floor, ceiling: m AMSL.  start, destination: (3,).
+    start_course, destination_course: rad or None.  terrain: None where none was given (a foreign mission).
+    foreign: made around a mission file that came without a scenario: its bounds are no limit and its empty
+    threats say nothing.  spec: the checked file it came from, with which `from_spec` makes it again.
+    """
+
+    name: str
+    spec: ScenarioFile
+    origin: GeoOrigin
+    bounds: Floats
+    floor: float
+    ceiling: float
+    start: Floats
+    destination: Floats
+    start_course: float | None
+    destination_course: float | None
+    terrain: Terrain | None
+    threats: Threats
+    limits: LimitsTable
+    planner: PlannerTable
+    flight: FlightTable
+    wind: Wind
+    foreign: bool = False
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        for name in ("bounds", "start", "destination"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def to_json(self) -> dict[str, Any]:
+        """The scenario as plain JSON data; `from_spec` reads it back."""
+        return self.spec.model_dump(mode="json", exclude_none=True)
+
+
+@cache
+def embedded_scenarios() -> dict[str, ScenarioFile]:
+    """The scenarios that ship with planfly, by name, in a fixed order."""
+    folder = resources.files("world") / "scenarios"
+    found = {}
+    for entry in sorted(folder.iterdir(), key=lambda item: (item.name != "jacksboro.toml", item.name)):
+        if entry.name.endswith(".toml"):
+            found[entry.name.removesuffix(".toml")] = parse_scenario(entry.read_text(encoding="utf-8"), entry.name)
+    return found
+
+
+def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
+    """Read a scenario: an embedded name or a TOML file.  ``terrain`` replaces its terrain by a file.
+
+    Raises ScenarioError or TerrainError.
+    """
+    known = embedded_names()
+    if name_or_path in known:
+        entry = resources.files("world") / "scenarios" / f"{name_or_path}.toml"
+        return from_spec(parse_scenario(entry.read_text(encoding="utf-8"), name_or_path), name_or_path, terrain=terrain)
+    path = Path(name_or_path)
+    if not path.exists():
+        raise ScenarioError(f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)})")
+    spec = parse_scenario(read_scenario_text(path), str(path))
+    return from_spec(spec, str(path), base=path.parent, terrain=terrain)
+
+
+def embedded_names() -> list[str]:
+    """Names of the scenarios that ship with planfly, the default first."""
+    folder = resources.files("world") / "scenarios"
+    names = sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
+    return sorted(names, key=lambda name: name != "jacksboro")
+
+
+def from_spec(
+    spec: ScenarioFile | dict[str, Any],
+    source: str,
+    *,
+    base: Path | None = None,
+    terrain: str | None = None,
+    ground: Terrain | None = None,
+    foreign: bool = False,
+) -> Scenario:
+    """Make a scenario of a checked file, or of what `Scenario.to_json` gave.
+
+    source: names the file in messages.  base: folder that relative terrain paths count from.  terrain: an
+    elevation file that replaces the scenario's own.  ground: terrain already at hand (from a log).
+    """
+    spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
+    if terrain is not None:
+        spec = spec.model_copy(update={"terrain": TerrainTable(kind="dem", path=terrain)})
+        base = None
+    raster = None
+    if spec.terrain.kind == "dem" and ground is None:
+        raster = open_raster(str(spec.terrain.path), base)
+        if spec.terrain.sha256 not in (None, raster.sha256):
+            raise ScenarioError(f"{source}: terrain.path: {spec.terrain.path}: the file has changed since (its SHA-256 differs)")
+        path = str(spec.terrain.path)
+        if Path(base or "", path).is_file():
+            path = str(Path(base or "", path).resolve())
+        spec = spec.model_copy(update={"terrain": TerrainTable(kind="dem", path=path, sha256=raster.sha256)})
+    if spec.origin is not None:
+        origin = GeoOrigin(spec.origin.lat_deg, spec.origin.lon_deg)
+    else:
+        origin = raster.centre if raster is not None else GeoOrigin(46.0, 8.0)
+    if spec.area is not None:
+        bounds = np.array([spec.area.east_m, spec.area.north_m])
+    elif raster is not None:
+        bounds = tile_bounds(raster, origin)
+    else:
+        raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from")
+    if ground is None:
+        if raster is not None:
+            ground = read_terrain(raster, origin, bounds, MARGIN)
+        else:
+            ground = _made_terrain(spec.terrain, bounds)
+    # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
+    spec = spec.model_copy(
+        update={
+            "origin": OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
+            "area": (spec.area or AreaTable(east_m=list(bounds[0]), north_m=list(bounds[1]))),
+        }
+    )
+    return _assemble(spec, source, origin, bounds, ground, foreign)
+
+
+def _assemble(
+    spec: ScenarioFile, source: str, origin: GeoOrigin, bounds: Floats, ground: Terrain | None, foreign: bool
+) -> Scenario:
+    area = spec.area
+    floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
+    top = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
+    ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else top + 1000.0
+    start = _position(spec.start, "start", source, origin, ground)
+    destination = _position(spec.destination, "destination", source, origin, ground)
+    for name, point in (("start", start), ("destination", destination)):
+        _check_inside(name, point, source, bounds, floor, ceiling, ground)
+    if not foreign and math.dist(start[:2], destination[:2]) < 10.0:
+        raise ScenarioError(f"{source}: destination: less than 10 m from start")
+    wind = Wind(
+        spec.wind.speed_mps,
+        math.radians(spec.wind.from_deg),
+        spec.wind.gradient,
+        spec.wind.turbulence,
+        spec.wind.seed,
+        float(start[2]),
+    )
+    return Scenario(
+        name=spec.name,
+        spec=spec,
+        origin=origin,
+        bounds=bounds,
+        floor=floor,
+        ceiling=ceiling,
+        start=start,
+        destination=destination,
+        start_course=None if spec.start.course_deg is None else math.radians(spec.start.course_deg),
+        destination_course=None if spec.destination.course_deg is None else math.radians(spec.destination.course_deg),
+        terrain=ground,
+        threats=_threats(spec.threats, source, origin, ground),
+        limits=spec.limits,
+        planner=spec.planner,
+        flight=spec.flight,
+        wind=wind,
+        foreign=foreign,
+    )
+
+
+def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
+    """The same scenario in another wind (m/s, rad); None keeps what it has."""
+    table = scenario.spec.wind
+    changes: dict[str, Any] = {}
+    if speed is not None and from_course is not None:
+        changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
+    if turbulence is not None:
+        changes["turbulence"] = turbulence
+    spec = scenario.spec.model_copy(update={"wind": table.model_copy(update=changes)})
+    wind = replace(
+        scenario.wind,
+        speed=spec.wind.speed_mps,
+        from_course=math.radians(spec.wind.from_deg),
+        turbulence=spec.wind.turbulence,
+    )
+    return replace(scenario, spec=spec, wind=wind)
+
+
+def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
+    if table.kind == "flat":
+        return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * MARGIN)
+    if table.kind == "peaks":
+        peaks = np.array([[p.east_m, p.north_m, p.height_m, p.sigma_m] for p in table.peak or []]).reshape(-1, 4)
+        return peaks_terrain(bounds, peaks, MARGIN)
+    return None
+
+
+def _position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
+    if table.east_m is not None and table.north_m is not None:
+        east, north = table.east_m, table.north_m
+    else:
+        point = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
+        east, north = float(point[0]), float(point[1])
+    if table.amsl_m is not None:
+        return np.array([east, north, table.amsl_m])
+    under = float(ground.height(east, north)) if ground is not None else math.nan
+    if math.isnan(under):
+        raise ScenarioError(
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m: no terrain there to count a height from; give amsl_m"
+        )
+    return np.array([east, north, under + (table.height_m or 0.0)])
+
+
+def _check_inside(
+    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
+) -> None:
+    for axis, name in enumerate(("east", "north")):
+        low, high = bounds[axis]
+        if not low <= point[axis] <= high:
+            raise ScenarioError(f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}")
+    if not floor <= point[2] <= ceiling:
+        raise ScenarioError(f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}")
+    if ground is not None:
+        under = float(ground.height(point[0], point[1]))
+        if point[2] <= under:
+            raise ScenarioError(f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m")
+
+
+def _threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
+    positions = np.zeros((len(tables), 3))
+    for k, table in enumerate(tables):
+        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
+        positions[k] = _position(on_ground, f"threats[{k}]", source, origin, ground)
+    return Threats(
+        names=tuple(table.name or f"threat {k + 1}" for k, table in enumerate(tables)),
+        position=positions,
+        kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
+        detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),
+        kill_scale=np.array([table.kill_scale_m or 0.0 for table in tables]),
+        detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
+    )
+
+
+def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
+    """Latitude and longitude in degrees of map positions (..., 3)."""
+    return to_geo(scenario.origin, points[..., 0], points[..., 1])

@@ -1,0 +1,305 @@
+"""The scenario file as pydantic models: unknown keys, NaN and out-of-range values are refused.
+
+The models mirror the TOML key for key.  `world.scenario` turns a checked file into a `Scenario`.
+"""
+
+import json
+import math
+import tomllib
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from world.errors import ScenarioError
+
+MAP_REACH = 500_000.0
+
+
+def _no_line_break(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("control characters are not allowed")
+    return text
+
+
+Metres = Annotated[float, Field(ge=-MAP_REACH, le=MAP_REACH)]
+Amsl = Annotated[float, Field(ge=-500.0, le=9000.0)]
+Height = Annotated[float, Field(ge=0.0, le=9000.0)]
+Latitude = Annotated[float, Field(ge=-89.0, le=89.0)]
+Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
+Course = Annotated[float, Field(ge=-360.0, le=360.0)]
+Radius = Annotated[float, Field(gt=0.0, le=200_000.0)]
+Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_no_line_break)]
+Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
+Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbers_only(cls, values: Any) -> Any:
+        """Refuse booleans and quoted numbers where a number is meant; pydantic would take both."""
+        if isinstance(values, dict):
+            for key, value in values.items():
+                field = cls.model_fields.get(key)
+                if field is None:
+                    continue
+                numeric = any(kind in str(field.annotation) for kind in ("float", "int"))
+                if numeric and "bool" not in str(field.annotation) and isinstance(value, bool):
+                    raise ValueError(f"{key}: true/false where a number is expected")
+                if numeric and "str" not in str(field.annotation) and isinstance(value, str) and "Literal" not in str(field.annotation):
+                    raise ValueError(f"{key}: a text ({value[:40]!r}) where a number is expected")
+        return values
+
+
+class OriginTable(_Table):
+    """[origin]: the point where east_m = north_m = 0."""
+
+    lat_deg: Latitude
+    lon_deg: Longitude
+
+
+class PeakTable(_Table):
+    """[[terrain.peak]]: a Gaussian hill."""
+
+    east_m: Metres
+    north_m: Metres
+    height_m: Annotated[float, Field(gt=0.0, le=9000.0)]
+    sigma_m: Annotated[float, Field(ge=10.0, le=100_000.0)]
+
+
+class TerrainTable(_Table):
+    """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file."""
+
+    kind: Literal["dem", "peaks", "flat", "none"]
+    path: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
+    amsl_m: Amsl | None = None
+    sha256: str | None = None
+
+    @model_validator(mode="after")
+    def _kind_has_its_keys(self) -> "TerrainTable":
+        needs = {"dem": "path", "peaks": "peak", "flat": "amsl_m", "none": ""}[self.kind]
+        for key in ("path", "peak", "amsl_m"):
+            given = getattr(self, key) is not None
+            if key == needs and not given:
+                raise ValueError(f'{key}: missing; kind = "{self.kind}" needs it')
+            if key != needs and given:
+                raise ValueError(f'{key}: not a key of kind = "{self.kind}"')
+        return self
+
+
+class AreaTable(_Table):
+    """[area]: the map box and its ceiling."""
+
+    east_m: Span
+    north_m: Span
+    ceiling_amsl_m: Amsl | None = None
+    floor_amsl_m: Amsl | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "AreaTable":
+        for key in ("east_m", "north_m"):
+            low, high = getattr(self, key)
+            if not high - low >= 100.0:
+                raise ValueError(f"{key}: [{low:g}, {high:g}]: the second must exceed the first by at least 100")
+        if self.ceiling_amsl_m is not None and self.floor_amsl_m is not None and self.ceiling_amsl_m <= self.floor_amsl_m:
+            raise ValueError(f"ceiling_amsl_m: {self.ceiling_amsl_m:g}: must be above floor_amsl_m {self.floor_amsl_m:g}")
+        return self
+
+
+class PointTable(_Table):
+    """A position: east_m, north_m or lat_deg, lon_deg; amsl_m or height_m above ground."""
+
+    east_m: Metres | None = None
+    north_m: Metres | None = None
+    lat_deg: Latitude | None = None
+    lon_deg: Longitude | None = None
+    amsl_m: Amsl | None = None
+    height_m: Height | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> "PointTable":
+        metres = (self.east_m is not None, self.north_m is not None)
+        degrees = (self.lat_deg is not None, self.lon_deg is not None)
+        if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
+            raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+        if self.amsl_m is not None and self.height_m is not None:
+            raise ValueError("height_m: give amsl_m or height_m, not both")
+        return self
+
+
+class EndTable(PointTable):
+    """[start] and [destination]."""
+
+    course_deg: Course | None = None
+
+    @model_validator(mode="after")
+    def _has_height(self) -> "EndTable":
+        if self.amsl_m is None and self.height_m is None:
+            raise ValueError("amsl_m: missing; give amsl_m or height_m")
+        return self
+
+
+class ThreatTable(PointTable):
+    """[[threats]]: missile only, radar only, or both; on the ground unless a height is given."""
+
+    name: Name | None = None
+    kill_radius_m: Radius | None = None
+    kill_scale_m: Radius | None = None
+    detection_radius_m: Radius | None = None
+    detection_scale_m: Radius | None = None
+
+    @model_validator(mode="after")
+    def _pairs(self) -> "ThreatTable":
+        for kind in ("kill", "detection"):
+            radius, scale = getattr(self, f"{kind}_radius_m"), getattr(self, f"{kind}_scale_m")
+            if (radius is None) != (scale is None):
+                raise ValueError(f"{kind}_radius_m and {kind}_scale_m: give both or neither")
+        if self.kill_radius_m is None and self.detection_radius_m is None:
+            raise ValueError("kill_radius_m: missing; a threat has a missile, a radar, or both")
+        return self
+
+
+Angle = Annotated[float, Field(gt=0.0, lt=90.0)] | Literal["aircraft"]
+
+
+class LimitsTable(_Table):
+    """[limits]: a number, or "aircraft" for what the envelope allows."""
+
+    max_turn_deg: Annotated[float, Field(gt=0.0, le=180.0)] | Literal["aircraft"] = "aircraft"
+    max_climb_deg: Angle = "aircraft"
+    max_dive_deg: Angle = "aircraft"
+    min_clearance_m: Annotated[float, Field(ge=0.0, le=5000.0)] = 30.0
+
+
+class GoalsTable(_Table):
+    """[planner] goals of the second level of preference."""
+
+    length_ratio: Annotated[float, Field(ge=1.0, le=100.0)] | None = None
+    kill_exposure: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
+
+
+class PlannerTable(_Table):
+    """[planner]."""
+
+    algorithm: Name | None = None
+    waypoints: Annotated[int, Field(ge=3, le=500)] = 12
+    population: Annotated[int, Field(ge=4, le=100_000)] = 200
+    generations: Annotated[int, Field(ge=0, le=100_000)] = 100
+    across_m: Annotated[float, Field(gt=0.0, le=MAP_REACH)] | None = None
+    goals: GoalsTable = GoalsTable()
+    budget: Annotated[int, Field(ge=4, le=10**10)] | None = None
+    seed: Seed | None = None
+
+
+class FlightTable(_Table):
+    """[flight]."""
+
+    aircraft: Name = "aerosonde"
+    airspeed_mps: Annotated[float, Field(ge=15.0, le=60.0)] | None = None
+    max_bank_deg: Annotated[float, Field(ge=5.0, le=60.0)] = 30.0
+    guidance: Literal["path"] = "path"
+    fly_over: bool = False
+    motor_braking: bool = False
+    battery_wh: Annotated[float, Field(gt=0.0, le=100_000.0)] | None = None
+
+
+class WindTable(_Table):
+    """[wind]: gradient in m/s per metre of height above the start."""
+
+    speed_mps: Annotated[float, Field(ge=0.0, le=40.0)] = 0.0
+    from_deg: Course = 0.0
+    gradient: Annotated[float, Field(ge=-0.05, le=0.05)] = 0.0
+    turbulence: Literal["none", "light", "moderate"] = "none"
+    seed: Seed | None = None
+
+
+class ScenarioFile(_Table):
+    """A whole scenario file."""
+
+    name: Name
+    description: Annotated[str, Field(max_length=500), AfterValidator(_no_line_break)] = ""
+    origin: OriginTable | None = None
+    terrain: TerrainTable
+    area: AreaTable | None = None
+    start: EndTable
+    destination: EndTable
+    threats: Annotated[list[ThreatTable], Field(max_length=20_000)] = []
+    limits: LimitsTable = LimitsTable()
+    planner: PlannerTable = PlannerTable()
+    flight: FlightTable = FlightTable()
+    wind: WindTable = WindTable()
+
+    @model_validator(mode="after")
+    def _area_where_there_is_no_tile(self) -> "ScenarioFile":
+        if self.area is None and self.terrain.kind != "dem":
+            raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" has no tile to take it from')
+        return self
+
+
+def parse_scenario(text: str, source: str) -> ScenarioFile:
+    """Check the text of a TOML scenario file; ``source`` names it in messages.
+
+    Raises ScenarioError with one line: file, key, value and what is allowed.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{source}: not valid TOML: {_line(error)}") from error
+    if data.get("terrain") == {"kind": "none"}:
+        raise ScenarioError(f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"')
+    return check_scenario(data, source)
+
+
+def check_scenario(data: Any, source: str) -> ScenarioFile:
+    """Check a scenario that is already a dictionary (from a plan or a log)."""
+    if not isinstance(data, dict):
+        raise ScenarioError(f"{source}: scenario: a table of keys is expected, got {type(data).__name__}")
+    try:
+        return ScenarioFile.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(f"{source}: {first_error(error)}") from error
+
+
+def read_scenario_text(path: Path) -> str:
+    """The text of a scenario file.  Raises ScenarioError if it is missing, too large or not UTF-8."""
+    try:
+        if path.stat().st_size > 16 * 2**20:
+            raise ScenarioError(f"{path}: {path.stat().st_size:,} bytes: a scenario file has at most 16 MiB")
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
+
+
+def first_error(error: ValidationError) -> str:
+    """The first of a pydantic error's findings as ``key: value: what is allowed``."""
+    found = error.errors(include_url=False)
+    first = found[0]
+    # A union reports every branch; the branch's tag is not a key of the file.
+    keys = [str(part) for part in first["loc"] if not str(part).startswith(("constrained", "literal", "function-", "float", "int"))]
+    message = first["msg"].removeprefix("Value error, ")
+    value = first.get("input")
+    shown = "" if isinstance(value, dict | list) else f": {_shown(value)}"
+    if first["type"] == "extra_forbidden":
+        message = "unknown key"
+        shown = ""
+    if first["type"] == "missing":
+        shown = ""
+    more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
+    return f"{'.'.join(keys) or 'file'}{shown}: {message}{more}"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    text = json.dumps(value, default=str)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _line(error: BaseException) -> str:
+    return str(error).splitlines()[0]

@@ -1,0 +1,204 @@
+"""Terrain heights on a raster, at any point and exactly along a segment.
+
+The raster stays in its own grid at its source resolution; map positions are taken into pixel coordinates by a
+`PolyMap`, and heights are bilinear between pixel centres.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from world.frames import PolyMap, fit_polymap, polymap
+
+Floats = NDArray[np.float64]
+Heights = NDArray[np.float32]
+
+# Segments are cut into pieces no longer than this (m) before they count as straight in the raster's grid: at
+# 60 degrees latitude a 500 m piece bows by 9 mm.
+STRAIGHT_PIECE = 500.0
+
+
+@dataclass(frozen=True, slots=True)
+class Terrain:
+    """Measured or made ground heights above mean sea level.
+
+    heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.  to_pixel: map (east, north)
+    to fractional (col, row).  spacing: the finer pixel pitch, m.  source, sha256: where it came from.
+    datum: the vertical datum as stated.  vertical_error: stated error, m, or None where none is stated.
+    """
+
+    heights: Heights
+    to_pixel: PolyMap
+    spacing: float
+    source: str
+    sha256: str
+    datum: str
+    vertical_error: float | None = None
+
+    def __post_init__(self) -> None:
+        """Lock the raster."""
+        heights = np.ascontiguousarray(self.heights, dtype=np.float32)
+        if heights.flags.writeable:
+            heights = heights if heights is not self.heights else heights.copy()
+            heights.setflags(write=False)
+        object.__setattr__(self, "heights", heights)
+
+    def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
+        """Ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
+        es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
+        return _heights_many(self.heights, self.to_pixel.packed, es.ravel(), ns.ravel()).reshape(es.shape)
+
+    def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
+        """Smallest height above ground on the segment a-b, and the fraction of it where that is.
+
+        a, b: (3,) m.  Exact for the bilinear surface.  NaN where the segment leaves the raster or its data.
+        """
+        start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
+        low, at = segment_clearance(self.heights, self.to_pixel.packed, start, end)
+        return float(low), float(at)
+
+
+@njit(cache=True)
+def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
+    """Bilinear height at fractional pixel coordinates; NaN outside the outermost pixel centres."""
+    rows, cols = heights.shape
+    if not (0.0 <= col <= cols - 1 and 0.0 <= row <= rows - 1):
+        return math.nan
+    i = min(int(row), rows - 2)
+    j = min(int(col), cols - 2)
+    v = row - i
+    u = col - j
+    top = heights[i, j] * (1.0 - u) + heights[i, j + 1] * u
+    low = heights[i + 1, j] * (1.0 - u) + heights[i + 1, j + 1] * u
+    return top * (1.0 - v) + low * v
+
+
+@njit(cache=True)
+def ground_height(heights: Heights, packed: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
+    """Ground height at one map position; NaN outside the raster."""
+    col, row = polymap(packed, east, north)
+    return pixel_height(heights, col, row)
+
+
+@njit(cache=True)
+def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats) -> Floats:  # pragma: no cover
+    out = np.empty(east.size)
+    for k in range(east.size):
+        out[k] = ground_height(heights, packed, east[k], north[k])
+    return out
+
+
+@njit(cache=True)
+def segment_clearance(
+    heights: Heights, packed: Floats, a: Floats, b: Floats
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Smallest height above the bilinear ground on a-b and its fraction; (NaN, fraction) off the raster."""
+    pieces = max(1, int(math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE)))
+    best = math.inf
+    best_at = 0.0
+    col1, row1 = polymap(packed, a[0], a[1])
+    for piece in range(pieces):
+        f0 = piece / pieces
+        f1 = (piece + 1) / pieces
+        col0, row0 = col1, row1
+        col1, row1 = polymap(packed, a[0] + f1 * (b[0] - a[0]), a[1] + f1 * (b[1] - a[1]))
+        low, at = _piece_clearance(
+            heights, col0, row0, a[2] + f0 * (b[2] - a[2]), col1, row1, a[2] + f1 * (b[2] - a[2])
+        )
+        if math.isnan(low):
+            return math.nan, f0 + at * (f1 - f0)
+        if low < best:
+            best = low
+            best_at = f0 + at * (f1 - f0)
+    return best, best_at
+
+
+@njit(cache=True)
+def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
+    """Next fraction after t at which start + t * step is a whole number; inf if it never is."""
+    if step == 0.0:
+        return math.inf
+    here = start + t * step
+    line = math.floor(here + 1e-9) + 1.0 if step > 0.0 else math.ceil(here - 1e-9) - 1.0
+    return (line - start) / step
+
+
+@njit(cache=True)
+def _piece_clearance(
+    heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """The same on a piece that is straight in pixels: within a cell the height difference is a parabola."""
+    dc, dr, du = col1 - col0, row1 - row0, up1 - up0
+    t = 0.0
+    g0 = up0 - pixel_height(heights, col0, row0)
+    best, best_at = g0, 0.0
+    if math.isnan(g0):
+        return math.nan, 0.0
+    while t < 1.0:
+        end = min(1.0, _next_crossing(col0, dc, t), _next_crossing(row0, dr, t))
+        if end <= t:
+            end = min(1.0, t + 1e-6)
+        mid = 0.5 * (t + end)
+        gm = up0 + mid * du - pixel_height(heights, col0 + mid * dc, row0 + mid * dr)
+        g1 = up0 + end * du - pixel_height(heights, col0 + end * dc, row0 + end * dr)
+        if math.isnan(gm) or math.isnan(g1):
+            return math.nan, mid
+        if g1 < best:
+            best, best_at = g1, end
+        # The parabola through the three values; its vertex counts if it lies between them.
+        bend = 2.0 * (g0 - 2.0 * gm + g1)
+        if bend > 0.0:
+            x = (3.0 * g0 - 4.0 * gm + g1) / (2.0 * bend)
+            if 0.0 < x < 1.0:
+                low = g0 - (3.0 * g0 - 4.0 * gm + g1) * x + bend * x * x
+                if low < best:
+                    best, best_at = low, t + x * (end - t)
+        g0 = g1
+        t = end
+    return best, best_at
+
+
+def gridded(
+    function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
+) -> Terrain:
+    """Terrain on a regular map grid: heights (n, e) at north (n,) and east (e,), both increasing and even."""
+    step_e, step_n = east[1] - east[0], north[1] - north[0]
+    to_pixel = fit_polymap(
+        lambda e, n: ((e - east[0]) / step_e, (n - north[0]) / step_n),
+        [[east[0], east[-1]], [north[0], north[-1]]],
+        1e-9,
+    )
+    return Terrain(
+        function_heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum
+    )
+
+
+def flat_terrain(bounds: Floats, amsl: float, margin: float) -> Terrain:
+    """Level ground over bounds [[e0, e1], [n0, n1]] and a margin, m."""
+    east = np.linspace(bounds[0, 0] - margin, bounds[0, 1] + margin, 3)
+    north = np.linspace(bounds[1, 0] - margin, bounds[1, 1] + margin, 3)
+    return gridded(np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level")
+
+
+def peaks_terrain(bounds: Floats, peaks: Floats, margin: float) -> Terrain:
+    """Sum of Gaussian hills on level ground at sea level.
+
+    peaks: (p, 4) east, north, height, sigma in m.  Gridded at a sixteenth of the smallest sigma (at most 1,500
+    pixels a side), which holds each summit to 0.05 % of its height.
+    """
+    width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * margin
+    pitch = max(float(peaks[:, 3].min()) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
+
+    def axis(low: float, high: float) -> Floats:
+        return np.linspace(low - margin, high + margin, 2 + int((high - low + 2 * margin) / pitch))
+
+    east, north = axis(*bounds[0]), axis(*bounds[1])
+    heights = np.zeros((north.size, east.size))
+    for pe, pn, height, sigma in peaks:
+        heights += height * np.outer(
+            np.exp(-((north - pn) ** 2) / (2 * sigma**2)), np.exp(-((east - pe) ** 2) / (2 * sigma**2))
+        )
+    return gridded(heights, east, north, source=f"{len(peaks)} Gaussian peaks", sha256="", datum="mean sea level")

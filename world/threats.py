@@ -1,0 +1,41 @@
+"""Threats: missiles and radars as spheres about a position."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Threats:
+    """m air-defence units; a radius of 0 means that the unit has no missile, or no radar.
+
+    position: (m, 3) east, north, up in m.  kill_radius, detection_radius: (m,) m, the paper's R_PKmax and
+    R_PRDmax.  kill_scale, detection_scale: (m,) m, the paper's gamma and delta (eq. 9 and 10).
+    """
+
+    names: tuple[str, ...]
+    position: Floats
+    kill_radius: Floats
+    detection_radius: Floats
+    kill_scale: Floats
+    detection_scale: Floats
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        for name in ("position", "kill_radius", "detection_radius", "kill_scale", "detection_scale"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    def __len__(self) -> int:
+        """How many units there are."""
+        return len(self.names)
+
+
+def no_threats() -> Threats:
+    """An empty set."""
+    none = np.zeros(0)
+    return Threats((), np.zeros((0, 3)), none, none, none, none)
