@@ -90,7 +90,7 @@ def fit_polymap(
     """
     (x0, x1), (y0, y1) = np.asarray(bounds, dtype=np.float64)
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
-    half = np.array([max((x1 - x0) / 2, 1.0), max((y1 - y0) / 2, 1.0)])
+    half = np.array([max((x1 - x0) / 2, 1e-9), max((y1 - y0) / 2, 1e-9)])
 
     def grid(count: int) -> tuple[Floats, Floats]:
         nodes = np.cos(np.pi * (np.arange(count) + 0.5) / count)

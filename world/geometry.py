@@ -61,6 +61,12 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 
 @njit(cache=True)
+def wrap(angle: float) -> float:  # pragma: no cover - compiled
+    """The same angle in [-pi, pi], rad."""
+    return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
+
+
+@njit(cache=True)
 def turning_angle(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float
 ) -> float:  # pragma: no cover - compiled

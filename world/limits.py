@@ -11,7 +11,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
-from world.wind import Wind
+from world.geometry import wrap
+from world.wind import W20, Wind
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +50,7 @@ class Limits:
         """The aircraft's side as one array, for the compiled functions.
 
         (3, 8 + h): row 0 holds airspeed, tan(max_bank), wind speed, wind direction (towards, rad), gradient,
-        reference height, the number of table heights, 0; from column 8 on, rows 0..2 hold the table's
+        reference height, the number of table heights, the gusts' standard deviation; from column 8 on, rows 0..2 hold the table's
         heights (m), climb and descent angles to the air (rad) at this airspeed.
         """
         speed = self.airspeed if airspeed is None else airspeed
@@ -64,7 +65,8 @@ class Limits:
             wind.gradient,
             wind.reference_amsl,
             heights.size,
-            0.0,
+            # sigma_w of MIL-F-8785C, which sigma_u meets at 300 m.
+            0.1 * W20[wind.turbulence],
         )
         packed[0, 8:] = heights
         for k, amsl in enumerate(heights):
@@ -107,15 +109,20 @@ def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, 
 def turn_radius_between(
     packed: Floats, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
-    """Arc radius at the bank limit for the highest ground speed between two courses; inf where none is held."""
-    turn = math.remainder(course_out - course_in, 2.0 * math.pi)
+    """Arc radius at the bank limit for the highest ground speed between two courses; inf where none is held.
+
+    In turbulence a standard deviation of the gusts comes on top: airspeed, and with it the bank that an arc
+    over the ground takes, swings by that much.
+    """
+    turn = wrap(course_out - course_in)
     fastest = max(ground_speed_on(packed, course_in, amsl), ground_speed_on(packed, course_out, amsl))
     # The highest ground speed is downwind, if the turn passes through that course.
-    down = math.remainder(packed[0, 3] - course_in, 2.0 * math.pi)
+    down = wrap(packed[0, 3] - course_in)
     if (turn > 0.0 and 0.0 < down < turn) or (turn < 0.0 and turn < down < 0.0):
         fastest = max(fastest, ground_speed_on(packed, packed[0, 3], amsl))
     if math.isnan(fastest):
         return math.inf
+    fastest += packed[0, 7]
     return fastest * fastest / (GRAVITY * packed[0, 1])
 
 

@@ -1,0 +1,83 @@
+"""The numbers that fit the guidance to an aircraft, read from ``aircraft/<name>/gains.toml``."""
+
+import math
+import tomllib
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from world.errors import FlightError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Gains:
+    """Gains of the guidance core, in SI and radians, in the order the core reads them (`packed`).
+
+    reference_airspeed: the airspeed at which surface gains hold; they are scaled with dynamic pressure.
+    cross_track_frequency, cross_track_damping, cross_track_integral: of the second-order cross-track law.
+    intercept: steepest course to the path that it flies when far away.  turn_lead, turn_smoothing: how far ahead the
+    path's curvature is fed forward, and over how long it is averaged.  height_*: the same law upwards.  slope_lead: as turn_lead.
+    speed_gain, speed_integral: throttle per m/s.  throttle_per_slope: throttle per rad of climb.  slow_margin:
+    below command less this, height gives way to speed.  roll_gain: roll rate per rad of roll error.
+    roll_rate_gain, aileron_per_roll_rate, roll_integral: aileron per rad/s of roll rate error, per rad/s of
+    steady roll rate, and per rad s of roll error.  alpha_per_g, elevator_per_alpha, elevator_per_pitch_rate: the
+    airframe, from its coefficients.  pitch_rate_gain, yaw_rate_gain: damping.
+    """
+
+    reference_airspeed: float
+    cross_track_frequency: float
+    cross_track_damping: float
+    cross_track_integral: float
+    intercept: float
+    turn_lead: float
+    turn_smoothing: float
+    height_frequency: float
+    height_damping: float
+    height_integral: float
+    slope_lead: float
+    speed_gain: float
+    speed_integral: float
+    throttle_per_slope: float
+    slow_margin: float
+    roll_gain: float
+    roll_rate_gain: float
+    aileron_per_roll_rate: float
+    roll_integral: float
+    alpha_per_g: float
+    elevator_per_alpha: float
+    elevator_per_pitch_rate: float
+    pitch_rate_gain: float
+    yaw_rate_gain: float
+
+    def packed(self) -> Floats:
+        """(g,) the fields in order."""
+        return np.array([getattr(self, item.name) for item in fields(self)])
+
+
+_UNITS = ("_rad_s", "_1_s3", "_1_s2", "_1_s", "_deg", "_mps", "_s")
+
+
+def load_gains(aircraft: Aircraft) -> Gains:
+    """The gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry."""
+    file = aircraft.folder / "gains.toml"
+    try:
+        table = tomllib.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FlightError(f"{file}: {error.strerror}: guidance needs gains for {aircraft.name}") from error
+    except ValueError as error:
+        raise FlightError(f"{file}: {' '.join(str(error).split())}") from error
+    values: dict[str, float] = {}
+    for key, value in table.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise FlightError(f"{file}: {key} = {value!r} is not a finite number")
+        name = next((key.removesuffix(unit) for unit in _UNITS if key.endswith(unit)), key)
+        values[name] = math.radians(value) if key.endswith("_deg") else float(value)
+    wanted = [item.name for item in fields(Gains)]
+    if sorted(values) != sorted(wanted):
+        missing, unknown = sorted(set(wanted) - set(values)), sorted(set(values) - set(wanted))
+        raise FlightError(f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}")
+    return Gains(**values)

@@ -1,0 +1,338 @@
+"""The flight: JSBSim under guidance along a route, over its terrain, until its end or its failure."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from flight.fdm import Fdm
+from flight.gains import load_gains
+from flight.guidance import MEMORY_SIZE, M, guide
+from flight.path import FlyByPath, fly_by_path
+from flight.setup import FlightSetup, limits_of
+from flight.state import COMMAND_SIZE, STATE_SIZE, C, S
+from flight.track import COLUMNS, Track, join_tracks
+from flight.trim import straight
+from flight.turbulence import GUST_STATES, start_gusts, step_gusts
+from world.errors import FlightError
+from world.frames import GeoOrigin, PolyMap, fit_polymap, polymap, to_geo, to_map
+from world.geometry import wrap
+from world.terrain import Heights, Terrain, ground_height
+from world.wind import W20
+
+Floats = NDArray[np.float64]
+Progress = Callable[[float, float], None]
+Sink = Callable[[Track], None]
+
+FDM_HZ = 120.0
+STEPS_A_TICK = 2
+TICK = STEPS_A_TICK / FDM_HZ
+# Rows that are handed on at a time, s of flight.
+BLOCK = 1.0
+# Bank that guidance may add to the planned turns' to correct an error, rad.
+BANK_RESERVE = math.radians(3.0)
+STEEPEST_BANK = math.radians(75.0)
+# A flight may take this much longer than its length over its slowest ground speed, s on top.
+PATIENCE = 1.5
+PATIENCE_SECONDS = 60.0
+ROW = sum(COLUMNS.values())
+
+_ENDS = {
+    1: "completed",
+    2: "departure: the state is not a number",
+    3: "ground contact",
+    4: "departure: bank beyond 75 degrees",
+    5: "departure: airspeed below the stall",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A flight: its track, how it ended ("completed" or why not), and the path it was to follow."""
+
+    track: Track
+    ended: str
+    path: FlyByPath
+
+
+def simulate(
+    setup: FlightSetup, aircraft: Aircraft, *, sink: Sink | None = None, progress: Progress | None = None
+) -> Flown:
+    """Fly a setup from a trimmed start.  The same setup gives the same track, bit for bit.
+
+    sink: is handed each second of the track as it is flown.  progress: is told the distance flown and the whole, m.
+    Raises FlightError for a flight that cannot start.
+    """
+    flight = _Flight(setup, aircraft)
+    blocks: list[Track] = []
+    ended = ""
+    while not ended:
+        rows, ended = flight.block(round(BLOCK / TICK))
+        if len(rows):
+            block = _as_track(rows)
+            blocks.append(block)
+            if sink is not None:
+                sink(block)
+        if progress is not None:
+            progress(min(flight.memory[M.DISTANCE], flight.path.length), flight.path.length)
+    return Flown(join_tracks(blocks), ended, flight.path)
+
+
+class _Flight:
+    """One flight in progress."""
+
+    def __init__(self, setup: FlightSetup, aircraft: Aircraft) -> None:
+        scenario, limits = setup.scenario, limits_of(setup)
+        self.path = fly_by_path(setup.route, limits)
+        self.speeds = setup.route.airspeed
+        gains = load_gains(aircraft)
+        self.gains = gains.packed()
+        self.terrain = _Ground(scenario.terrain)
+        self.chart = Chart.around(setup)
+        wind = scenario.wind
+        self.wind = np.array([wind.speed, wind.from_course + math.pi, wind.gradient, wind.reference_amsl, W20[wind.turbulence]])
+        self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=scenario.flight.motor_braking)
+        self.state, self.commands, self.row = np.zeros(STATE_SIZE), np.zeros(COMMAND_SIZE), np.zeros(ROW)
+        self.memory = np.zeros(MEMORY_SIZE)
+        self.memory[M.MAX_BANK] = limits.max_bank + BANK_RESERVE
+        self._start(setup, gains.reference_airspeed)
+        seed = wind.seed if wind.seed is not None else setup.seed
+        # Stream 1 of the run's seed; the planner has stream 0.
+        self.random = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
+        self.gusts = np.zeros(GUST_STATES)
+        start_gusts(self.random.standard_normal(GUST_STATES), self.gusts)
+        self.slowest = 0.94 * aircraft.stall_speed
+        self.ticks = 0
+        self.energy = 0.0
+        slow = max(5.0, float(self.speeds.min()) - wind.speed)
+        self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / TICK)
+
+    def _start(self, setup: FlightSetup, reference: float) -> None:
+        points = setup.route.waypoints
+        east, north, up = (float(value) for value in points[0])
+        under = self.terrain.height(east, north)
+        if not math.isnan(under) and up <= under:
+            raise FlightError(
+                f"{setup.mission.source}: start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+            )
+        lat, lon = to_geo(setup.scenario.origin, east, north)
+        wind_east, wind_north = setup.scenario.wind.at(up)
+        level = straight(self.fdm, reference, up)
+        if level is None:
+            raise FlightError(f"{setup.aircraft}: no level flight at {reference:.1f} m/s and {up:.0f} m AMSL")
+        # Guidance tracks the path; the flight starts level, as a parabola from level leads into the first slope.
+        step = points[1] - points[0]
+        course = math.atan2(step[0], step[1]) - self.chart.convergence(float(lat), float(lon))
+        slope = math.atan2(step[2], math.hypot(step[0], step[1]))
+        try:
+            trimmed = self.fdm.start(
+                float(lat), float(lon), up, course, float(self.speeds[0]), slope,
+                (wind_north, wind_east, 0.0), 0.0 if math.isnan(under) else under,
+            )  # fmt: skip
+        except FlightError:
+            # A first leg steeper than the aircraft can is the verdict's business: start it level.
+            trimmed = self.fdm.start(
+                float(lat), float(lon), up, course, float(self.speeds[0]), 0.0,
+                (wind_north, wind_east, 0.0), 0.0 if math.isnan(under) else under,
+            )  # fmt: skip
+        self.commands[:] = trimmed.commands()
+        memory = self.memory
+        memory[M.TRIM_ELEVATOR], memory[M.TRIM_ALPHA] = level.elevator, level.alpha
+        cruise = straight(self.fdm_for_trim(setup), float(self.speeds[0]), up)
+        memory[M.TRIM_THROTTLE] = (cruise or level).throttle
+        memory[M.LAST_AIRSPEED] = -1.0
+
+    def fdm_for_trim(self, setup: FlightSetup) -> Fdm:
+        """A second instance: a trim ends the flight of the instance it is made with."""
+        return Fdm(self.fdm.aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking)
+
+    def block(self, count: int) -> tuple[Floats, str]:
+        """Fly up to ``count`` ticks: their rows, and how the flight ended ("" while it goes on)."""
+        rows = np.zeros((count, ROW))
+        noise = self.random.standard_normal((count, 3))
+        fdm, state, commands, memory = self.fdm, self.state, self.commands, self.memory
+        chart, ground = self.chart, self.terrain
+        pieces, nodes = self.path.pieces, self.path.nodes
+        air = np.zeros(7)
+        for k in range(count):
+            fdm.read(state)
+            status = _tick(
+                state, chart.position.packed, chart.angle.packed, ground.heights, ground.packed, pieces, nodes,
+                self.speeds, self.gains, memory, commands, self.wind, self.gusts, noise[k], self.slowest,
+                self.energy, self.ticks * TICK, rows[k], air,
+            )  # fmt: skip
+            if status == 2:
+                return rows[:k], _ENDS[2]
+            self.energy = air[6]
+            if status:
+                return rows[: k + 1], _ENDS[status]
+            self.ticks += 1
+            if self.ticks >= self.most_ticks:
+                return rows[: k + 1], f"time limit: not finished after {self.ticks * TICK:.0f} s"
+            fdm.write(commands)
+            fdm.set_wind(air[0], air[1], 0.0)
+            fdm.set_gust(air[2], air[3], air[4])
+            if ground.known:
+                fdm.set_terrain(air[5])
+            fdm.step(STEPS_A_TICK)
+        return rows, ""
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """From geodetic radians to the map, fitted around one flight.
+
+    position: (latitude, longitude) to (east, north).  angle: to the map course of true north (rad), and 0.
+    """
+
+    position: PolyMap
+    angle: PolyMap
+
+    @staticmethod
+    def around(setup: FlightSetup) -> "Chart":
+        """Fit the area and the route with 5 km to spare; 0.1 mm and 1e-9 rad."""
+        origin: GeoOrigin = setup.scenario.origin
+        points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
+        low, high = points.min(axis=0) - 5000.0, points.max(axis=0) + 5000.0
+        outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
+        lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+        bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
+
+        def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            return to_map(origin, np.degrees(phi), np.degrees(lam))
+
+        def angle(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            step = 1e-5
+            east0, north0 = position(phi - step, lam)
+            east1, north1 = position(phi + step, lam)
+            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(phi)
+
+        return Chart(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9))
+
+    def convergence(self, lat_deg: float, lon_deg: float) -> float:
+        """Map course of true north at a place, rad."""
+        return float(self.angle(math.radians(lat_deg), math.radians(lon_deg))[0])
+
+
+class _Ground:
+    """Terrain for the compiled tick; unknown ground is a raster without data."""
+
+    def __init__(self, terrain: Terrain | None) -> None:
+        self.known = terrain is not None
+        self.terrain = terrain
+        self.heights: Heights = terrain.heights if terrain is not None else np.full((2, 2), np.nan, dtype=np.float32)
+        if not self.heights.flags.writeable and terrain is None:
+            raise FlightError("internal: terrain")
+        self.heights.setflags(write=False)
+        self.packed = terrain.to_pixel.packed if terrain is not None else _nowhere()
+
+    def height(self, east: float, north: float) -> float:
+        return math.nan if self.terrain is None else float(self.terrain.height(east, north))
+
+
+def _nowhere() -> Floats:
+    packed = np.zeros((6, 2))
+    packed[1, :] = 1.0
+    packed[2, 0] = packed[4, 0] = -9.0
+    packed.setflags(write=False)
+    return packed
+
+
+def _as_track(rows: Floats) -> Track:
+    values, at = [], 0
+    for columns in COLUMNS.values():
+        values.append(rows[:, at] if columns == 1 else rows[:, at : at + columns])
+        at += columns
+    return Track(*values)  # type: ignore[arg-type]  # Track gives each array its own type
+
+
+@njit(cache=True)
+def _tick(
+    state: Floats, position: Floats, angle: Floats, heights: Heights, to_pixel: Floats, pieces: Floats, nodes: Floats,
+    speeds: Floats, gains: Floats, memory: Floats, commands: Floats, wind: Floats, gusts: Floats, noise: Floats,
+    slowest: float, energy: float, time: float, row: Floats, air: Floats,
+) -> int:  # pragma: no cover - compiled  # fmt: skip
+    """Judge the state, guide, make the wind for the next tick, and fill a row of the track.
+
+    air: (7,) wind north and east, gust north, east and down (m/s), ground below (m), energy used (Wh).
+    Returns a key of `_ENDS`, or 0 to fly on.
+    """
+    for value in state:
+        if not math.isfinite(value):
+            return 2
+    east, north = polymap(position, state[S.LATITUDE], state[S.LONGITUDE])
+    turn, _ = polymap(angle, state[S.LATITUDE], state[S.LONGITUDE])
+    cos, sin = math.cos(turn), math.sin(turn)
+    up = state[S.AMSL]
+    place = np.array([
+        east, north, up,
+        state[S.V_EAST] * cos + state[S.V_NORTH] * sin,
+        state[S.V_NORTH] * cos - state[S.V_EAST] * sin,
+    ])  # fmt: skip
+    state[S.YAW] = wrap(state[S.YAW] + turn)
+    ground = ground_height(heights, to_pixel, east, north)
+    clearance = up - ground
+    guide(state, place, pieces, nodes, speeds, gains, memory, commands, TICK)
+    energy += state[S.POWER] * TICK / 3600.0
+    _wind(state, wind, gusts, noise, clearance, up, air)
+    air[5] = ground if not math.isnan(ground) else air[5]
+    air[6] = energy
+    _fill(row, state, place, commands, memory, time, energy, clearance, cos, sin)
+    if clearance <= 0.0:
+        return 3
+    if abs(state[S.ROLL]) > STEEPEST_BANK:
+        return 4
+    if state[S.AIRSPEED] < slowest:
+        return 5
+    return 1 if memory[M.DONE] > 0.0 else 0
+
+
+@njit(cache=True)
+def _wind(
+    state: Floats, wind: Floats, gusts: Floats, noise: Floats, clearance: float, up: float, air: Floats
+) -> None:  # pragma: no cover - compiled
+    """Mean wind at this height and the next gust, north, east and down, into ``air``."""
+    speed = max(0.0, wind[0] + wind[2] * (up - wind[3]))
+    cos, sin = math.cos(wind[1]), math.sin(wind[1])
+    air[0], air[1] = speed * cos, speed * sin
+    air[2] = air[3] = air[4] = 0.0
+    if wind[4] > 0.0:
+        # Over unknown ground the scales of 300 m and above hold.
+        height = clearance if not math.isnan(clearance) else 1000.0
+        along, across, down = step_gusts(gusts, noise, wind[4], height, state[S.AIRSPEED], TICK)
+        air[2] = along * cos - across * sin
+        air[3] = along * sin + across * cos
+        air[4] = down
+
+
+@njit(cache=True)
+def _fill(
+    row: Floats, state: Floats, place: Floats, commands: Floats, memory: Floats, time: float, energy: float,
+    clearance: float, cos: float, sin: float,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """One row of the track, in the order of `flight.track.COLUMNS`."""
+    row[0] = time
+    row[1:4] = place[:3]
+    row[4:6] = place[3:5]
+    row[6] = -state[S.V_DOWN]
+    row[7:10] = state[S.ROLL : S.YAW + 1]
+    row[10:13] = state[S.P : S.R + 1]
+    row[13] = state[S.AIRSPEED]
+    row[14:16] = state[S.ALPHA : S.BETA + 1]
+    row[16:20] = state[S.ELEVATOR : S.THROTTLE + 1]
+    row[20:24] = commands[C.ELEVATOR : C.THROTTLE + 1]
+    row[24] = state[S.WIND_EAST] * cos + state[S.WIND_NORTH] * sin
+    row[25] = state[S.WIND_NORTH] * cos - state[S.WIND_EAST] * sin
+    row[26] = -state[S.WIND_DOWN]
+    row[27] = state[S.ACCEL_N]
+    row[28] = state[S.CURRENT]
+    row[29] = energy
+    row[30] = memory[M.LEG]
+    row[31] = memory[M.CROSS_TRACK]
+    row[32] = memory[M.HEIGHT_ERROR]
+    row[33] = memory[M.SPEED_COMMAND]
+    row[34] = clearance

@@ -1,0 +1,7 @@
+"""``python -m planfly``."""
+
+import sys
+
+from planfly.cli import main
+
+sys.exit(main())

@@ -1,0 +1,59 @@
+"""Targets on disk: refused where they exist, written whole or not at all."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from world.errors import PlanflyError
+
+RUN_FILES = (
+    "plan.json",
+    "mission.waypoints",
+    "mission.plan",
+    "flight.mcap",
+    "verdict.json",
+    "map.png",
+    "profile.png",
+    "report.html",
+)
+
+
+def refuse_existing(path: Path, overwrite: bool) -> None:
+    """Refuse a named target file that exists, is a folder, or cannot be made.  Raises PlanflyError."""
+    if path.is_dir():
+        raise PlanflyError(f"{path}: is a folder; a file name is expected")
+    if path.exists() and not overwrite:
+        raise PlanflyError(f"{path}: exists; --overwrite replaces it")
+    if not path.parent.exists():
+        raise PlanflyError(f"{path}: its folder {path.parent} does not exist")
+
+
+def prepare_folder(folder: Path, *, named: bool, overwrite: bool) -> None:
+    """Make a run's folder ready: refuse a named one that holds anything, and clear old results of ours.
+
+    Only files that a run writes are removed, never anything else that lies there.  Raises PlanflyError.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise PlanflyError(f"{folder}: is a file; a folder is expected")
+    if named and not overwrite and folder.is_dir() and any(folder.iterdir()):
+        raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name in RUN_FILES:
+        (folder / name).unlink(missing_ok=True)
+
+
+def write_whole(path: Path, data: str | bytes) -> None:
+    """Write a file under a temporary name beside its target and rename it."""
+    content = data.encode("utf-8") if isinstance(data, str) else data
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        # mkstemp keeps files private; a result has the permissions that any new file has.
+        mask = os.umask(0)
+        os.umask(mask)
+        Path(temporary).chmod(0o666 & ~mask)
+        Path(temporary).replace(path)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
