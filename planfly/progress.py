@@ -11,18 +11,8 @@ Advance = Callable[[float, float, str], None]
 @contextmanager
 def progress(title: str) -> Iterator[Advance]:
     """Report a stage of work; the caller tells how much of how much is done, and a remark."""
-    started = time.monotonic()
     if not sys.stderr.isatty():
-        print(f"{title} ...", file=sys.stderr, flush=True)
-        last = ""
-
-        def remember(_done: float, _whole: float, remark: str = "") -> None:
-            nonlocal last
-            last = remark
-
-        yield remember
-        end = f": {last}" if last else ""
-        print(f"{title}: done in {time.monotonic() - started:.1f} s{end}", file=sys.stderr, flush=True)
+        yield from _lines(title)
         return
     from tqdm import tqdm
 
@@ -36,3 +26,19 @@ def progress(title: str) -> Iterator[Advance]:
 
         yield advance
         bar.update(100 - bar.n)
+
+
+def _lines(title: str) -> Iterator[Advance]:
+    """A line when work begins and one when it is done; none for input that is refused before it begins."""
+    started = time.monotonic()
+    last: str | None = None
+
+    def remember(_done: float, _whole: float, remark: str = "") -> None:
+        nonlocal last
+        if last is None:
+            print(f"{title} ...", file=sys.stderr, flush=True)
+        last = remark
+
+    yield remember
+    end = f": {last}" if last else ""
+    print(f"{title}: done in {time.monotonic() - started:.1f} s{end}", file=sys.stderr, flush=True)

@@ -1,0 +1,148 @@
+"""Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from aircraft.catalog import Aircraft, load_aircraft
+from aircraft.envelope import Envelope
+from flight.envelope import load_envelope
+from flight.export import plan_mission
+from flight.mission import Mission
+from flight.mission_files import mission_text
+from flight.routing import make_route
+from flight.setup import FlightSetup, make_limits
+from flight.simulate import simulate
+from flight.track import Track
+from logs.check import judge_flight, judge_plan_only
+from logs.recorder import Recorder
+from logs.verdict import Verdict
+from planner.plan import Plan
+from planner.search import plan_path
+from world.errors import ScenarioError
+from world.scenario import Scenario, load_scenario
+
+Advance = Callable[[float, float, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class PlanThenFly:
+    """What `plan_then_fly` returns; track is None where there was no feasible plan to fly."""
+
+    plan: Plan
+    mission: Mission
+    track: Track | None
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """The aircraft of a scenario and what it can do.
+
+    airspeed: m/s.  max_bank: rad.  battery: Wh.
+    """
+
+    aircraft: Aircraft
+    envelope: Envelope
+    airspeed: float
+    max_bank: float
+    battery: float
+
+
+def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
+    """Plan a path, fly it in JSBSim and judge the flight.
+
+    scenario: an embedded name, a TOML file's path, or a `Scenario`.  seed: of planner and turbulence; None takes
+    the scenario's, or 1.  log: where to write the flight as MCAP, replaced if it exists; None writes none.
+    Raises a `world.errors.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
+    """
+    world = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    number = choose_seed(world, seed)
+    vehicle = load_vehicle(world)
+    plan = make_plan(world, vehicle, number)
+    mission = plan_mission(plan, vehicle.airspeed, vehicle.max_bank)
+    if not plan.feasible:
+        return PlanThenFly(plan, mission, None, judge_plan_only(plan))
+    setup = make_setup(world, vehicle, mission, number, plan=plan)
+    track, _, verdict = fly(setup, vehicle, None if log is None else Path(log))
+    return PlanThenFly(plan, mission, track, verdict)
+
+
+def choose_seed(scenario: Scenario, seed: int | None) -> int:
+    """The seed asked for, else the scenario's, else 1."""
+    if seed is not None:
+        return seed
+    return scenario.planner.seed if scenario.planner.seed is not None else 1
+
+
+def load_vehicle(scenario: Scenario) -> Vehicle:
+    """The scenario's aircraft.  Raises ScenarioError for an unknown one or a speed it cannot fly."""
+    table = scenario.flight
+    try:
+        aircraft = load_aircraft(table.aircraft)
+    except ValueError as error:
+        raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
+    airspeed = aircraft.airspeed if table.airspeed_mps is None else table.airspeed_mps
+    if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
+        raise ScenarioError(
+            f"{scenario.name}: flight.airspeed_mps: {airspeed:g}: {aircraft.name} flies "
+            f"{aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
+        )
+    if scenario.wind.speed > 0.8 * airspeed:
+        raise ScenarioError(
+            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: at most 80 % of the airspeed {airspeed:g}, "
+            "to make way on every course"
+        )
+    envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
+    battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
+    return Vehicle(aircraft, envelope, airspeed, min(math.radians(table.max_bank_deg), envelope.max_bank), battery)
+
+
+def make_plan(
+    scenario: Scenario, vehicle: Vehicle, seed: int, algorithm: str | None = None, advance: Advance | None = None
+) -> Plan:
+    """Plan within the scenario's and the aircraft's limits."""
+    limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+    return plan_path(scenario, limits, seed=seed, algorithm=algorithm, progress=advance)
+
+
+def make_setup(
+    scenario: Scenario, vehicle: Vehicle, mission: Mission, seed: int, *, plan: Plan | None = None
+) -> FlightSetup:
+    """Everything that decides the flight of a mission in a scenario."""
+    route = make_route(mission, scenario.origin, scenario.terrain, vehicle.airspeed, scenario.flight.fly_over)
+    return FlightSetup(
+        scenario=scenario,
+        mission=mission,
+        mission_text=mission_text(mission, "waypoints"),
+        route=route,
+        envelope=vehicle.envelope,
+        aircraft=vehicle.aircraft.name,
+        airspeed=vehicle.airspeed,
+        max_bank=vehicle.max_bank,
+        battery=vehicle.battery,
+        seed=seed,
+        plan=plan,
+    )
+
+
+def fly(
+    setup: FlightSetup, vehicle: Vehicle, log: Path | None, advance: Advance | None = None
+) -> tuple[Track, str, Verdict]:
+    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict."""
+
+    def tell(done: float, whole: float) -> None:
+        if advance is not None:
+            advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
+
+    if log is None:
+        flown = simulate(setup, vehicle.aircraft, progress=tell)
+        return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
+    with Recorder(log, setup) as recorder:
+        flown = simulate(setup, vehicle.aircraft, sink=recorder.write, progress=tell)
+        verdict = judge_flight(setup, flown.track, flown.ended)
+        end = float(flown.track.time[-1]) if len(flown.track) else 0.0
+        recorder.event(end, f"flight ended: {flown.ended}", "info" if flown.ended == "completed" else "error")
+        recorder.finish(flown.ended, verdict)
+    return flown.track, flown.ended, verdict

@@ -1,0 +1,103 @@
+"""What a command leaves: lines on the terminal, and files."""
+
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from flight.mission import Mission
+from flight.mission_files import mission_kind, mission_text
+from flight.setup import FlightSetup
+from flight.track import Track
+from logs.verdict import Finding, Verdict, verdict_json
+from planfly.files import write_whole
+from planner.plan import Objective, Plan
+
+# Findings of a passing rule are many; the terminal shows the closest one of each.
+_RULE_TITLES = {
+    "turn": "turns",
+    "slope": "slopes",
+    "clearance": "clearance",
+    "threat": "threats",
+    "bounds": "bounds",
+    "waypoint": "waypoints",
+    "speed": "airspeed",
+    "energy": "energy",
+    "departure": "departure",
+    "completion": "completion",
+}
+
+
+def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
+    """The verdict on the terminal: the sentence first, then what fails, then the tightest of each rule."""
+    print(verdict.summary)
+    failed = [finding for finding in verdict.findings if finding.ok is False]
+    for finding in failed[:12]:
+        print(f"  failed  {finding.rule} at {finding.where}: {finding.reason}")
+    if len(failed) > 12:
+        print(f"  failed  and {len(failed) - 12} more")
+    for rule, title in _RULE_TITLES.items():
+        mine = [finding for finding in verdict.findings if finding.rule == rule]
+        if mine:
+            print(f"  {title:<11}{_state(mine)}")
+    for note in notes:
+        print(f"  note    {note}")
+
+
+def _state(findings: list[Finding]) -> str:
+    failed = sum(finding.ok is False for finding in findings)
+    unknown = [finding for finding in findings if finding.ok is None]
+    judged = len(findings) - len(unknown)
+    if not judged:
+        return f"not judged: {unknown[0].reason}"
+    text = f"{judged - failed} of {judged} ok"
+    with_margin = [finding for finding in findings if finding.margin is not None and finding.ok is not None]
+    if with_margin:
+        tightest = min(with_margin, key=lambda finding: finding.margin if finding.margin is not None else 0.0)
+        value = tightest.flown if tightest.flown is not None else tightest.planned
+        if value is not None and tightest.limit is not None:
+            text += (
+                f"; tightest at {tightest.where}: {value:.4g} {tightest.unit}"
+                f" against {tightest.limit:.4g} ({tightest.limit_source})"
+            )
+    return text
+
+
+def print_plan(plan: Plan) -> None:
+    """A plan on the terminal."""
+    state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
+    length = float(plan.objectives[Objective.LENGTH_RATIO])
+    print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
+    for problem in plan.certificate.problems:
+        print(f"  failed  {problem}")
+
+
+def print_warnings(warnings: Iterable[str]) -> None:
+    """Warnings, on standard error."""
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+
+
+def write_missions(mission: Mission, targets: Iterable[Path]) -> None:
+    """A mission in the form that each target's suffix names."""
+    for target in targets:
+        write_whole(target, mission_text(mission, mission_kind(target)))
+
+
+def write_verdict(path: Path, verdict: Verdict) -> None:
+    """``verdict.json``."""
+    write_whole(path, verdict_json(verdict))
+
+
+def write_pictures(
+    folder: Path,
+    setup: FlightSetup,
+    track: Track,
+    verdict: Verdict,
+    ended: str | None,
+    command: str,
+    versions: Mapping[str, str] | None = None,
+) -> list[Path]:
+    """map.png, profile.png and report.html."""
+    from logs.report import write_report
+
+    return write_report(folder, setup, track, verdict, ended=ended, versions=versions, command=command)

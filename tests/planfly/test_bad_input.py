@@ -1,0 +1,195 @@
+"""Bad input: one line on standard error, exit code 2, nothing left behind."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from planfly.cli import main
+
+SCENARIO = """\
+name = "small"
+[terrain]
+kind = "flat"
+amsl_m = 100
+[area]
+east_m = [0, 6000]
+north_m = [0, 6000]
+ceiling_amsl_m = 900
+[start]
+east_m = 500
+north_m = 500
+amsl_m = 300
+[destination]
+east_m = 5500
+north_m = 5500
+amsl_m = 320
+"""
+
+WPL_HEAD = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t36.59\t-84.25\t300\t1\n"
+WPL_ROW = "{}\t0\t0\t16\t0\t0\t0\t0\t{}\t{}\t500\t1\n"
+
+
+def edited(old: str, new: str) -> str:
+    assert old in SCENARIO
+    return SCENARIO.replace(old, new)
+
+
+SCENARIOS = {
+    "empty": "",
+    "not TOML": "name = ",
+    "unknown key": SCENARIO + "colour = 3\n",
+    "unknown table": SCENARIO + "[engine]\npower = 3\n",
+    "unknown nested key": edited("amsl_m = 100", "amsl_m = 100\nslope = 2"),
+    "missing start": SCENARIO.replace("[start]", "[begin]"),
+    "wrong type": edited("amsl_m = 100", 'amsl_m = "high"'),
+    "quoted number": edited("amsl_m = 100", 'amsl_m = "100"'),
+    "truth for a number": edited("amsl_m = 100", "amsl_m = true"),
+    "NaN": edited("amsl_m = 300", "amsl_m = nan"),
+    "infinity": edited("amsl_m = 300", "amsl_m = inf"),
+    "out of range": edited("amsl_m = 300", "amsl_m = 90000"),
+    "start outside the area": edited("east_m = 500", "east_m = 7000"),
+    "start under the ground": edited("amsl_m = 300", "amsl_m = 50"),
+    "start above the ceiling": edited("amsl_m = 300", "amsl_m = 1000"),
+    "area turned round": edited("east_m = [0, 6000]", "east_m = [6000, 0]"),
+    "both forms of a position": edited("north_m = 500", "north_m = 500\nlat_deg = 46"),
+    "kind of terrain": edited('kind = "flat"', 'kind = "moon"'),
+    "terrain file missing": edited('kind = "flat"\namsl_m = 100', 'kind = "dem"\npath = "nowhere.tif"'),
+    "terrain by URL": edited('kind = "flat"\namsl_m = 100', 'kind = "dem"\npath = "http://example.org/a.tif"'),
+    "threat without a weapon": SCENARIO + "[[threats]]\neast_m = 3000\nnorth_m = 3000\n",
+    "threat with half a missile": SCENARIO + "[[threats]]\neast_m = 3000\nnorth_m = 3000\nkill_radius_m = 300\n",
+    "planner algorithm": SCENARIO + '[planner]\nalgorithm = "magic"\n',
+    "population of one": SCENARIO + "[planner]\npopulation = 1\n",
+    "two waypoints": SCENARIO + "[planner]\nwaypoints = 2\n",
+    "negative generations": SCENARIO + "[planner]\ngenerations = -1\n",
+    "aircraft": SCENARIO + '[flight]\naircraft = "zeppelin"\n',
+    "airspeed": SCENARIO + "[flight]\nairspeed_mps = 58\n",
+    "wind too strong": SCENARIO + "[wind]\nspeed_mps = 24\n",
+    "turbulence": SCENARIO + '[wind]\nturbulence = "severe"\n',
+    "control character in a name": edited('name = "small"', 'name = "sm\\u0007all"'),
+    "start inside a kill radius": SCENARIO
+    + "[[threats]]\neast_m = 600\nnorth_m = 600\nkill_radius_m = 400\nkill_scale_m = 100\n",
+}
+
+MISSIONS = {
+    "empty.waypoints": "",
+    "header.waypoints": "QGC WPL 120\n",
+    "latitude.waypoints": WPL_HEAD + WPL_ROW.format(1, "91.0", "-84.2") + WPL_ROW.format(2, "36.6", "-84.2"),
+    "nan.waypoints": WPL_HEAD + WPL_ROW.format(1, "nan", "-84.2") + WPL_ROW.format(2, "36.6", "-84.2"),
+    "comma.waypoints": WPL_HEAD + WPL_ROW.format(1, "36,61", "-84.2") + WPL_ROW.format(2, "36.6", "-84.2"),
+    "columns.waypoints": WPL_HEAD + "1\t0\t0\t16\t0\n",
+    "one.waypoints": WPL_HEAD + WPL_ROW.format(1, "36.6", "-84.2"),
+    "binary.waypoints": "\x00\x01\x02\x03" * 50,
+    "truncated.plan": '{"fileType": "Plan", "version": 1, "mission": {"items": [',
+    "other.plan": '{"fileType": "GeoFence"}',
+    "mission.kml": "<kml/>",
+    "truncated.json": '{"schema": "planfly.plan/1", ',
+    "other.json": '{"schema": "planfly.plan/9"}',
+    "list.json": "[1, 2, 3]",
+    "nan.json": '{"schema": NaN}',
+    "deep.json": "[" * 100_000,
+}
+
+LOGS = {
+    "empty.mcap": b"",
+    "text.mcap": b"this is not a log\n" * 20,
+    "magic.mcap": b"\x89MCAP0\r\n",
+    "binary.mcap": bytes(range(256)) * 64,
+}
+
+
+def refused(argv: list[str], folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
+    """Run a command that must be refused; its line on standard error."""
+    before = sorted(path.name for path in folder.rglob("*"))
+    code = main(argv)
+    captured = capsys.readouterr()
+    assert code == 2, captured.err
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1, captured.err
+    assert "Traceback" not in captured.err
+    assert sorted(path.name for path in folder.rglob("*")) == before
+    return captured.err
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("command", [["run"], ["plan"]])
+def test_a_malformed_scenario(name: str, command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.toml").write_text(SCENARIOS[name], encoding="utf-8")
+    line = refused([*command, "bad.toml"], tmp_path, capsys)
+    assert "bad.toml" in line or "small" in line
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+@pytest.mark.parametrize("command", ["fly", "check"])
+def test_a_malformed_mission(name: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_text(MISSIONS[name], encoding="utf-8")
+    assert name in refused([command, name], tmp_path, capsys)
+
+
+@pytest.mark.parametrize("name", LOGS)
+@pytest.mark.parametrize("command", ["check", "replay", "report"])
+def test_a_malformed_log(name: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_bytes(LOGS[name])
+    assert name in refused([command, name], tmp_path, capsys)
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["run", "missing.toml"],
+        ["plan", "missing.toml"],
+        ["export", "missing.json", "out.plan"],
+        ["fly", "missing.waypoints"],
+        ["check", "missing.mcap"],
+        ["replay", "missing.mcap"],
+        ["report", "missing.mcap"],
+    ],
+)
+def test_a_missing_file(argv: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "missing" in refused(argv, tmp_path, capsys)
+
+
+def test_binary_scenario(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.toml").write_bytes(b"\xff\xfe\x00\x01" * 40)
+    assert "UTF-8" in refused(["run", "bad.toml"], tmp_path, capsys)
+
+
+def test_the_message_names_file_key_value_and_range(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "bad.toml").write_text(SCENARIOS["out of range"], encoding="utf-8")
+    line = refused(["run", "bad.toml"], tmp_path, capsys)
+    for part in ("bad.toml", "start.amsl_m", "90000", "9000"):
+        assert part in line
+
+
+@pytest.mark.parametrize("target", ["there.plan", "nowhere/out.plan", "out.gpx", "folder"])
+def test_targets_are_checked_first(target: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "there.plan").write_text("mine", encoding="utf-8")
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "plan.json").write_text(json.dumps({"schema": "planfly.plan/1"}), encoding="utf-8")
+    refused(["export", "plan.json", target], tmp_path, capsys)
+    assert (tmp_path / "there.plan").read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        [],
+        ["land"],
+        ["run", "--seed", "-1"],
+        ["run", "--seed", "one"],
+        ["fly", "m.plan", "--wind", "5"],
+        ["fly", "m.plan", "--wind", "nan,3"],
+        ["fly", "m.plan", "--turbulence", "severe"],
+        ["replay", "a.mcap", "--speed", "0"],
+    ],
+)
+def test_bad_usage_is_one_line(argv: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(argv)
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err.count("\n") == 1
