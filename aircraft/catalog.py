@@ -39,8 +39,8 @@ class Aircraft:
     folder: holds ``<name>.xml`` (JSBSim) and ``<name>.toml``.  mass: kg.  wing_area: m^2.  wing_span: m.
     airspeed, airspeed_min, airspeed_max, stall_speed: m/s, true airspeed; cruise, the range guidance may use,
     and the slowest level trim at sea level.  max_bank: rad, for planned turns.  max_pitch: rad, commanded, either way.
-    max_elevator, max_aileron, max_rudder: rad, either way.  surface_rate: rad/s.  surface_lag, motor_lag: s, first order.
-    battery_voltage: V.  battery_energy: J.
+    max_elevator, max_aileron, max_rudder: rad, either way.  surface_rate: rad/s.  surface_lag, motor_lag: s, first
+    order.  battery_voltage: V.  battery_energy: J.
     """
 
     name: str
@@ -123,20 +123,18 @@ def model_hash(aircraft: Aircraft) -> str:
     """SHA-256, as hex, over the names and contents of the model's XML and TOML files.
 
     Any change of the model changes it, so a cached envelope or an old log can say which model it belongs to.
+    Other files in the folder, such as guidance gains, do not count.
     """
-    return _hash_files(aircraft.folder, _stamps(aircraft.folder))
-
-
-def _stamps(folder: Path) -> tuple[tuple[str, int, int], ...]:
-    files = sorted(file for file in folder.iterdir() if file.suffix in {".xml", ".toml"})
-    return tuple((file.name, file.stat().st_mtime_ns, file.stat().st_size) for file in files)
+    files = tuple(aircraft.folder / f"{aircraft.name}.{suffix}" for suffix in ("toml", "xml"))
+    return _hash_files(files, tuple((file.stat().st_mtime_ns, file.stat().st_size) for file in files))
 
 
 @cache
-def _hash_files(folder: Path, stamps: tuple[tuple[str, int, int], ...]) -> str:
+def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) -> str:
+    # The stamps only tell the cache when a file has changed.
     digest = hashlib.sha256()
-    for name, _, _ in stamps:
-        data = (folder / name).read_bytes()
-        digest.update(f"{name}\n{len(data)}\n".encode())
+    for file in files:
+        data = file.read_bytes()
+        digest.update(f"{file.name}\n{len(data)}\n".encode())
         digest.update(data)
     return digest.hexdigest()

@@ -43,18 +43,21 @@ class Envelope:
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
         """Steepest climb and descent relative to the air, rad, both positive, bilinear in the table.
 
-        Outside the table the nearest edge counts.
+        NaN at an airspeed outside the table, and beside an entry without a trim.  Above and below the table's
+        heights its nearest edge counts.
         """
         return (
             _bilinear(self.airspeed, self.amsl, self.climb, airspeed, amsl),
             _bilinear(self.airspeed, self.amsl, self.descent, airspeed, amsl),
         )
 
-    def slope_limits(self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0) -> tuple[float, float]:
+    def slope_limits(
+        self, airspeed: float, amsl: float, tailwind: float = 0.0, crosswind: float = 0.0
+    ) -> tuple[float, float]:
         """Steepest climb and dive over the ground, rad, both positive, on a leg with this steady wind.
 
         tailwind, crosswind: m/s along and across the leg's course.  A tailwind flattens the slope over the
-        ground, a headwind steepens it.  NaN if the aircraft cannot make way along the leg.
+        ground, a headwind steepens it.  NaN if the aircraft cannot make way along the leg, or as `air_angles`.
         """
         climb, descent = self.air_angles(airspeed, amsl)
         return (
@@ -95,4 +98,4 @@ def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compi
 
 def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
     rows = np.array([np.interp(y, ys, row) for row in table])
-    return float(np.interp(x, xs, rows))
+    return float(np.interp(x, xs, rows, left=np.nan, right=np.nan))

@@ -1,0 +1,345 @@
+"""The flight-dynamics model: one JSBSim instance behind packed arrays in SI units.
+
+The only file that knows JSBSim, and the only one with feet and slugs.  JSBSim never says that anything is wrong: after
+a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state it reads.
+"""
+
+import contextlib
+import io
+import math
+import os
+import struct
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import jsbsim
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from flight.model_check import check_model
+from flight.state import STATE_SIZE, C, S
+from flight.trim import Floats, T, Trim, air_velocity, body_axes, euler, from_vector, solve
+from world.errors import FlightError
+
+JSBSIM_VERSION: str = jsbsim.__version__
+
+_FOOT = 0.3048
+_SLUG_FT3 = 515.3788183931961  # kg/m^3 in one slug/ft^3
+_POUND = 0.45359237
+
+# The property behind each row of the state, and its factor to SI.
+_STATE = {
+    S.TIME: ("simulation/sim-time-sec", 1.0),
+    S.LATITUDE: ("position/lat-geod-rad", 1.0),
+    S.LONGITUDE: ("position/long-gc-rad", 1.0),
+    # Above the ellipsoid along its radius: within 3 cm of the geodetic height up to 4000 m.
+    S.AMSL: ("position/h-sl-ft", _FOOT),
+    S.V_NORTH: ("velocities/v-north-fps", _FOOT),
+    S.V_EAST: ("velocities/v-east-fps", _FOOT),
+    S.V_DOWN: ("velocities/v-down-fps", _FOOT),
+    S.ROLL: ("attitude/phi-rad", 1.0),
+    S.PITCH: ("attitude/theta-rad", 1.0),
+    S.YAW: ("attitude/psi-rad", 1.0),
+    S.P: ("velocities/p-rad_sec", 1.0),
+    S.Q: ("velocities/q-rad_sec", 1.0),
+    S.R: ("velocities/r-rad_sec", 1.0),
+    S.AIRSPEED: ("velocities/vt-fps", _FOOT),
+    S.ALPHA: ("aero/alpha-rad", 1.0),
+    S.BETA: ("aero/beta-rad", 1.0),
+    S.ELEVATOR: ("surface/elevator-rad", 1.0),
+    S.AILERON: ("surface/aileron-rad", 1.0),
+    S.RUDDER: ("surface/rudder-rad", 1.0),
+    S.THROTTLE: ("motor/throttle-norm", 1.0),
+    S.CURRENT: ("motor/battery-current-a", 1.0),
+    S.POWER: ("motor/battery-power-w", 1.0),
+    S.ACCEL_N: ("accelerations/Nz", 1.0),
+    S.WIND_NORTH: ("atmosphere/total-wind-north-fps", _FOOT),
+    S.WIND_EAST: ("atmosphere/total-wind-east-fps", _FOOT),
+    S.WIND_DOWN: ("atmosphere/total-wind-down-fps", _FOOT),
+}
+_COMMAND = {
+    C.ELEVATOR: "command/elevator-rad",
+    C.AILERON: "command/aileron-rad",
+    C.RUDDER: "command/rudder-rad",
+    C.THROTTLE: "command/throttle-norm",
+}
+_WIND = tuple(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down"))
+_GUST = tuple(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down"))
+_IC_PLACE = ("ic/lat-geod-deg", "ic/long-gc-deg", "ic/terrain-elevation-ft", "ic/h-sl-ft")
+_IC_MOTION = (
+    *("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"),
+    *("ic/vn-fps", "ic/ve-fps", "ic/vd-fps"),
+    *("ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec"),
+)
+_RATES = (
+    *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
+    *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),
+    *("velocities/phidot-rad_sec", "velocities/thetadot-rad_sec"),
+)
+_PACK: Callable[..., None] = struct.Struct(f"{STATE_SIZE}d").pack_into
+_RATE_FACTORS = np.array([_FOOT] * 3 + [1.0] * 5)
+_TERRAIN = "position/terrain-elevation-asl-ft"
+_HEIGHT = "position/h-agl-ft"
+# A sphere so large that it is flat, and does not turn: the book's world, for validation.
+_FLAT_PLANET = """<planet name="flat">
+  <semimajor_axis unit="M">1e9</semimajor_axis>
+  <semiminor_axis unit="M">1e9</semiminor_axis>
+  <rotation_rate unit="RAD/SEC">0</rotation_rate>
+  <GM unit="M3/SEC2">9.81e18</GM>
+  <J2>0</J2>
+</planet>
+"""
+_FLAT_DENSITY = 1.2682
+
+
+@dataclass(frozen=True, slots=True)
+class Variation:
+    """What differs from the model as published, for validation and robustness: factors, and the parasite drag itself.
+
+    parasite_drag: None keeps the model's own.  control: on the moments of the surfaces.
+    """
+
+    mass: float = 1.0
+    drag: float = 1.0
+    control: float = 1.0
+    parasite_drag: float | None = None
+
+
+class Fdm:
+    """One aircraft in one JSBSim instance, from a trimmed start; make a new one for each flight.
+
+    rate_hz: steps a second.  motor_braking: whether the motor may brake the propeller (current below zero).
+    flat_earth: the book's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane that does not
+    turn, for validation; degrees of latitude are then 157 times longer.  Otherwise WGS84 and the standard atmosphere.
+
+    Raises FlightError for a model that is missing, refused by `flight.model_check`, or not loadable, and for a property
+    that the model reads or we need and nobody defines.
+    """
+
+    def __init__(
+        self,
+        aircraft: Aircraft,
+        *,
+        rate_hz: float = 120.0,
+        motor_braking: bool = False,
+        flat_earth: bool = False,
+        variation: Variation | None = None,
+    ) -> None:
+        if not 0.0 < rate_hz < math.inf:
+            raise FlightError(f"rate_hz = {rate_hz} is not a positive number")
+        self.aircraft = aircraft
+        self.dt = 1.0 / rate_hz
+        self._exec = _load(aircraft, self.dt, flat_earth)
+        self._manager = self._exec.get_property_manager()
+        if flat_earth:
+            # The atmosphere looks for this name at every step, so here a new property is meant.
+            self._exec.set_property_value("atmosphere/override/density", _FLAT_DENSITY / _SLUG_FT3)
+        self._set("simulation/gravity-model", 0.0 if flat_earth else 1.0)
+        self._set("motor/braking", float(motor_braking))
+        self._vary(variation or Variation())
+        self._readers = [self._getter(_STATE[row][0]) for row in S]
+        self._factors = np.array([_STATE[row][1] for row in S])
+        self._writers = [self._setter(_COMMAND[row]) for row in C]
+        self._winds = [self._setter(name) for name in _WIND]
+        self._gusts = [self._setter(name) for name in _GUST]
+        self._ic_place = [self._setter(name) for name in _IC_PLACE]
+        self._ic_motion = [self._setter(name) for name in _IC_MOTION]
+        self._rates = [self._getter(name) for name in _RATES]
+        self._terrain = self._setter(_TERRAIN)
+        self._height = self._getter(_HEIGHT)
+        self._run = self._exec.run
+        self._wind = np.zeros(3)
+        self._heading = 0.0
+        self._at = (45.0, 0.0, 0.0)  # lat_deg, lon_deg, terrain amsl
+
+    def _node(self, name: str) -> jsbsim.FGPropertyNode:
+        node = self._manager.get_node(name) if self._manager.hasNode(name) else None
+        if node is None:
+            raise FlightError(f"{self.aircraft.model_file}: property {name} is needed and not defined")
+        return node
+
+    def _getter(self, name: str) -> Callable[[], float]:
+        getter: Callable[[], float] = self._node(name).get_double_value
+        return getter
+
+    def _setter(self, name: str) -> Callable[[float], object]:
+        setter: Callable[[float], object] = self._node(name).set_double_value
+        return setter
+
+    def _set(self, name: str, value: float) -> None:
+        self._setter(name)(value)
+
+    def _vary(self, variation: Variation) -> None:
+        if variation.mass != 1.0:
+            extra = (variation.mass - 1.0) * self.aircraft.mass
+            self._set("inertia/pointmass-weight-lbs", extra / _POUND)
+        self._set("aero/drag-factor", variation.drag)
+        self._set("aero/control-factor", variation.control)
+        if variation.parasite_drag is not None:
+            self._set("aero/parasite-drag", variation.parasite_drag)
+
+    def start(
+        self,
+        lat_deg: float,
+        lon_deg: float,
+        amsl: float,
+        course: float,
+        airspeed: float,
+        climb_angle: float = 0.0,
+        wind_ned: Sequence[float] = (0.0, 0.0, 0.0),
+        terrain_amsl: float = 0.0,
+    ) -> Trim:
+        """Begin a flight in steady flight along this path over the ground, and return its trim.
+
+        lat_deg: geodetic.  amsl, terrain_amsl: m.  course, climb_angle: rad, of the path over the ground.
+        airspeed: m/s, true.  wind_ned: (3,) m/s, the way the air moves; it stays on as the steady wind.
+        Surfaces and motor stand at their trimmed values, so holding the trim's commands starts no transient.
+        Raises FlightError for values out of range, a wind that the airspeed cannot make way against, and a flight
+        that the aircraft cannot hold.
+        """
+        wind = np.array(wind_ned, dtype=np.float64)
+        numbers = (lat_deg, lon_deg, amsl, course, airspeed, climb_angle, *wind.tolist(), terrain_amsl)
+        if len(numbers) != 10 or not all(math.isfinite(number) for number in numbers):
+            raise FlightError(f"the start takes ten finite numbers, three of them the wind, and has {numbers}")
+        if abs(lat_deg) >= 90.0 or abs(lon_deg) > 180.0:
+            raise FlightError(f"start at latitude {lat_deg}, longitude {lon_deg}: not within +-90 and +-180 degrees")
+        if not terrain_amsl < amsl < 11000.0:
+            raise FlightError(f"start at {amsl} m above sea level: not between ground ({terrain_amsl} m) and 11000 m")
+        velocity = air_velocity(course, climb_angle, airspeed, wind)
+        climb = math.asin(-velocity[2] / airspeed)
+        self._at = (lat_deg, lon_deg, terrain_amsl)
+        self._wind = wind
+        self._heading = math.atan2(velocity[1], velocity[0])
+        self.place(amsl)
+        values = solve(self.balance, {T.AIRSPEED: airspeed, T.CLIMB: climb}, self.surface_limits())
+        if values is None:
+            raise FlightError(
+                f"{self.aircraft.name} holds no steady flight at {airspeed:.1f} m/s,"
+                f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level"
+            )
+        self.balance(values)
+        self._exec.set_trim_status(False)
+        self._exec.set_sim_time(0.0)
+        # While the initial conditions ran, the wind stood in the gusts, because they overwrite the wind.
+        self.set_wind(*wind)
+        self.set_gust(0.0, 0.0, 0.0)
+        return from_vector(values, amsl)
+
+    def step(self, n: int = 1) -> None:
+        """Advance by n steps of ``dt`` seconds."""
+        run = self._run
+        for _ in range(n):
+            run()
+
+    def read(self, out: Floats) -> None:
+        """Fill the state, a contiguous float64 array (STATE_SIZE,), in the order of `flight.state.S`."""
+        # struct writes 26 floats in half the time of a slice assignment.
+        _PACK(out, 0, *[reader() for reader in self._readers])
+        np.multiply(out, self._factors, out)
+
+    def write(self, commands: Floats) -> None:
+        """Set the commands (COMMAND_SIZE,), in the order of `flight.state.C`; they act in the next step."""
+        for writer, value in zip(self._writers, commands.tolist(), strict=True):
+            writer(value)
+
+    def set_wind(self, north: float, east: float, down: float) -> None:
+        """Set the steady wind, m/s, the way the air moves."""
+        for setter, value in zip(self._winds, (north, east, down), strict=True):
+            setter(value / _FOOT)
+
+    def set_gust(self, north: float, east: float, down: float) -> None:
+        """Set what adds to the steady wind, m/s, the way the air moves."""
+        for setter, value in zip(self._gusts, (north, east, down), strict=True):
+            setter(value / _FOOT)
+
+    def set_terrain(self, amsl: float) -> None:
+        """Set the ground's height below the aircraft, m above sea level."""
+        self._terrain(amsl / _FOOT)
+
+    def height(self) -> float:
+        """Height above the ground last set, m; negative under ground, where JSBSim flies on."""
+        return self._height() * _FOOT
+
+    # What trims and linearisation need.
+
+    def surface_limits(self) -> tuple[float, float, float]:
+        """Elevator, aileron and rudder limits, rad, either way."""
+        return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
+
+    def place(self, amsl: float) -> None:
+        """Move the point of evaluation for `balance` and `derivatives` to this height; ends any flight."""
+        lat_deg, lon_deg, terrain = self._at
+        for setter, value in zip(self._ic_place, (lat_deg, lon_deg, terrain / _FOOT, amsl / _FOOT), strict=True):
+            setter(value)
+        self.set_gust(*self._wind)
+        self._exec.set_trim_status(True)
+
+    def balance(self, values: Floats) -> Floats:
+        """(6,) body accelerations, m/s^2 and rad/s^2, of the steady flight with this trim vector (8,)."""
+        axes = body_axes(self._heading, values[T.CLIMB], values[T.BANK], values[T.ALPHA])
+        alpha = values[T.ALPHA]
+        air = axes @ np.array([math.cos(alpha), 0.0, math.sin(alpha)]) * values[T.AIRSPEED]
+        commands = values[[T.ELEVATOR, T.AILERON, T.RUDDER, T.THROTTLE]]
+        return self._evaluate(euler(axes), air + self._wind, (0.0, 0.0, 0.0), commands)[:6]
+
+    def derivatives(self, states: Floats, commands: Floats) -> Floats:
+        """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands (4,)."""
+        roll, pitch = states[6], states[7]
+        axes = body_axes(self._heading, pitch, roll, 0.0)
+        return self._evaluate(
+            (roll, pitch, self._heading), axes @ states[:3] + self._wind, tuple(states[3:6]), commands
+        )
+
+    def _evaluate(self, angles: Sequence[float], velocity: Floats, pqr: Sequence[float], commands: Floats) -> Floats:
+        # Trim status lets the actuators through unlagged.
+        self.write(commands)
+        for setter, value in zip(self._ic_motion, (*angles, *(velocity / _FOOT), *pqr), strict=True):
+            setter(value)
+        self._exec.run_ic()
+        rates: Floats = np.array([rate() for rate in self._rates]) * _RATE_FACTORS
+        return rates
+
+
+def _load(aircraft: Aircraft, dt: float, flat_earth: bool) -> jsbsim.FGFDMExec:
+    with _silence():
+        fdm = jsbsim.FGFDMExec(str(aircraft.folder.parent))
+        fdm.set_debug_level(0)
+        for kind in ("aircraft", "engine", "systems"):
+            getattr(fdm, f"set_{kind}_path")(str(aircraft.folder.parent))
+        fdm.set_dt(dt)
+        check_model(aircraft.model_file, fdm.get_property_manager().hasNode)
+        if flat_earth:
+            with tempfile.TemporaryDirectory() as folder:
+                planet = Path(folder) / "flat.xml"
+                planet.write_text(_FLAT_PLANET, encoding="utf-8")
+                fdm.load_planet(str(planet), False)
+        try:
+            loaded = fdm.load_model(aircraft.name)
+        except (jsbsim.BaseError, RuntimeError, ValueError, OSError) as error:
+            raise FlightError(f"{aircraft.model_file}: JSBSim: {' '.join(str(error).split())}") from None
+    if not loaded:
+        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model")
+    return fdm
+
+
+@contextmanager
+def _silence() -> Iterator[None]:
+    """Send standard output nowhere: JSBSim prints its banner whatever its debug level, by either way out.
+
+    Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
+    """
+    sys.stdout.flush()
+    saved = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(nowhere)
+        os.close(saved)

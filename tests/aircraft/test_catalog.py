@@ -1,0 +1,114 @@
+"""The catalogue: units, and bad metadata."""
+
+import math
+import shutil
+from dataclasses import FrozenInstanceError
+from pathlib import Path
+
+import pytest
+
+from aircraft.catalog import Aircraft, aircraft_names, load_aircraft, model_hash, read_aircraft
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    return Path(shutil.copytree(load_aircraft("aerosonde").folder, tmp_path / "aerosonde"))
+
+
+def _edit(folder: Path, old: str, new: str) -> None:
+    file = folder / "aerosonde.toml"
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def test_aerosonde_comes_in_si_and_radians() -> None:
+    aircraft = load_aircraft("aerosonde")
+    assert aircraft.mass == 11.0
+    assert aircraft.airspeed == 25.0
+    assert aircraft.max_bank == pytest.approx(math.radians(30.0))
+    assert aircraft.surface_rate == pytest.approx(math.radians(200.0))
+    assert aircraft.battery_energy == pytest.approx(888.0 * 3600.0)
+    assert aircraft.model_file.is_file()
+
+
+def test_aircraft_is_frozen() -> None:
+    with pytest.raises(FrozenInstanceError):
+        load_aircraft("aerosonde").mass = 1.0  # type: ignore[misc]
+
+
+def test_limits_of_the_metadata_are_those_of_the_model() -> None:
+    aircraft = load_aircraft("aerosonde")
+    text = aircraft.model_file.read_text()
+    assert text.count(f"<max> {aircraft.max_elevator!r} </max>") == 3
+    assert text.count(f"<rate_limit> {aircraft.surface_rate!r} </rate_limit>") == 3
+    assert text.count(f"<lag> {1.0 / aircraft.surface_lag:.0f} </lag>") == 3
+    assert text.count(f"<lag> {1.0 / aircraft.motor_lag:.0f} </lag>") == 1
+    assert f'<property value="{aircraft.battery_voltage}"> motor/battery-v' in text
+
+
+@pytest.mark.parametrize("name", ["", "zeppelin", "../aircraft/aerosonde", "aerosonde.xml"])
+def test_unknown_name_lists_the_known_ones(name: str) -> None:
+    with pytest.raises(ValueError, match=r"no aircraft called .*known are aerosonde"):
+        load_aircraft(name)
+
+
+def test_names() -> None:
+    assert aircraft_names() == ("aerosonde",)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass_kg = 11.0", "", r"missing mass_kg$"),
+        ("mass_kg = 11.0", "mass_kg = 11.0\nmass_lb = 24", r"unknown key mass_lb$"),
+        ("mass_kg = 11.0", "mass_kg = -1", r"mass_kg = -1 is not a positive number$"),
+        ("mass_kg = 11.0", "mass_kg = nan", r"mass_kg = nan is not a positive number$"),
+        ("mass_kg = 11.0", "mass_kg = true", r"mass_kg = True is not a positive number$"),
+        ("mass_kg = 11.0", 'mass_kg = "11"', r"mass_kg = '11' is not a positive number$"),
+        ("mass_kg = 11.0", "mass_kg = ", r"Invalid value"),
+        ("airspeed_mps = 25.0", "airspeed_mps = 50.0", r"<= airspeed_max_mps does not hold"),
+        ("title = ", "title = 1 #", r"title = 1 is not a text$"),
+    ],
+)
+def test_bad_metadata_is_one_line_with_the_file(folder: Path, old: str, new: str, message: str) -> None:
+    _edit(folder, old, new)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_aircraft(folder)
+    assert "\n" not in str(caught.value)
+    assert str(folder / "aerosonde.toml") in str(caught.value)
+
+
+def test_missing_and_undecodable_metadata(folder: Path) -> None:
+    (folder / "aerosonde.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ValueError, match=r"aerosonde\.toml: .*decode"):
+        read_aircraft(folder)
+    (folder / "aerosonde.toml").unlink()
+    with pytest.raises(ValueError, match=r"aerosonde\.toml: No such file"):
+        read_aircraft(folder)
+
+
+@pytest.mark.parametrize("file", ["aerosonde.xml", "aerosonde.toml"])
+def test_hash_follows_the_models_files(folder: Path, file: str) -> None:
+    aircraft = read_aircraft(folder)
+    before = model_hash(aircraft)
+    assert before == model_hash(load_aircraft("aerosonde"))
+    (folder / "README.md").write_text("prose does not count")
+    (folder / "gains.toml").write_text("# nor do the gains\n")
+    assert model_hash(aircraft) == before
+    with (folder / file).open("a") as stream:
+        stream.write("\n")
+    assert model_hash(aircraft) != before
+
+
+def test_metadata_agrees_with_the_trims() -> None:
+    from flight.fdm import Fdm
+    from flight.trim import fastest, slowest
+
+    aircraft: Aircraft = load_aircraft("aerosonde")
+    fdm = Fdm(aircraft)
+    slow, fast = slowest(fdm, 0.0), fastest(fdm, 0.0)
+    assert slow is not None
+    assert fast is not None
+    assert slow.airspeed == pytest.approx(aircraft.stall_speed, abs=0.05)
+    assert aircraft.airspeed_max < fast.airspeed < aircraft.airspeed_max + 2.0
