@@ -1,12 +1,22 @@
 """A MAVLink mission as data: items, home, fences and rally points."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
+
+# Most items that a mission file may hold, and the largest file (bytes): far beyond what any autopilot stores.
+MOST_ITEMS = 20_000
+MOST_BYTES = 16 * 2**20
+
+# The largest number that MAVLink can carry in a parameter, a float32.
+_FLOAT32 = 3.4028234663852886e38
+_INT32 = 2**31 - 1
+# Above any aircraft of ours, below any dry land.
+_LOWEST, _HIGHEST = -1000.0, 20_000.0
 
 
 class Command(IntEnum):
-    """The MAV_CMD numbers that planfly knows by name."""
+    """The MAV_CMD numbers that planfly knows by name (MAVLink common.xml)."""
 
     NAV_WAYPOINT = 16
     NAV_LOITER_UNLIM = 17
@@ -15,18 +25,60 @@ class Command(IntEnum):
     NAV_RETURN_TO_LAUNCH = 20
     NAV_LAND = 21
     NAV_TAKEOFF = 22
+    NAV_CONTINUE_AND_CHANGE_ALT = 30
     NAV_LOITER_TO_ALT = 31
+    NAV_ROI = 80
     NAV_SPLINE_WAYPOINT = 82
     NAV_VTOL_TAKEOFF = 84
     NAV_VTOL_LAND = 85
+    NAV_GUIDED_ENABLE = 92
+    NAV_DELAY = 93
+    NAV_PAYLOAD_PLACE = 94
+    CONDITION_DELAY = 112
+    CONDITION_DISTANCE = 114
+    CONDITION_YAW = 115
+    DO_SET_MODE = 176
     DO_JUMP = 177
     DO_CHANGE_SPEED = 178
+    DO_SET_HOME = 179
+    DO_SET_RELAY = 181
+    DO_SET_SERVO = 183
+    DO_CHANGE_ALTITUDE = 186
     DO_LAND_START = 189
+    DO_SET_ROI_LOCATION = 195
+    DO_SET_ROI_NONE = 197
+    DO_SET_ROI = 201
+    DO_DIGICAM_CONTROL = 203
+    DO_MOUNT_CONTROL = 205
+    DO_SET_CAM_TRIGG_DIST = 206
+    DO_FENCE_ENABLE = 207
+    SET_CAMERA_MODE = 530
+    JUMP_TAG = 600
+    DO_JUMP_TAG = 601
+    IMAGE_START_CAPTURE = 2000
+    IMAGE_STOP_CAPTURE = 2001
+    VIDEO_START_CAPTURE = 2500
+    VIDEO_STOP_CAPTURE = 2501
+    DO_VTOL_TRANSITION = 3000
     NAV_FENCE_POLYGON_INCLUSION = 5001
     NAV_FENCE_POLYGON_EXCLUSION = 5002
     NAV_FENCE_CIRCLE_INCLUSION = 5003
     NAV_FENCE_CIRCLE_EXCLUSION = 5004
     NAV_RALLY_POINT = 5100
+
+
+C = Command
+# Commands that send the aircraft to a place.
+PLACES = frozenset(
+    {C.NAV_WAYPOINT, C.NAV_LOITER_UNLIM, C.NAV_LOITER_TURNS, C.NAV_LOITER_TIME, C.NAV_LOITER_TO_ALT}
+    | {C.NAV_SPLINE_WAYPOINT, C.NAV_PAYLOAD_PLACE}
+)
+TAKEOFFS = frozenset({C.NAV_TAKEOFF, C.NAV_VTOL_TAKEOFF})
+LANDINGS = frozenset({C.NAV_LAND, C.NAV_VTOL_LAND})
+FENCES = frozenset(range(5001, 5005))
+# Other commands whose fifth to seventh numbers are latitude, longitude and height.
+_LOCATED_DO = frozenset({C.DO_SET_HOME, C.DO_LAND_START, C.DO_SET_ROI_LOCATION, C.DO_SET_ROI, C.NAV_RALLY_POINT})
+_LAST_NAV = 95
 
 
 class Frame(IntEnum):
@@ -41,12 +93,37 @@ class Frame(IntEnum):
     GLOBAL_TERRAIN_ALT_INT = 11
 
 
+_FRAMES = tuple(int(frame) for frame in Frame)
+AMSL = frozenset({Frame.GLOBAL, Frame.GLOBAL_INT})
+OVER_HOME = frozenset({Frame.GLOBAL_RELATIVE_ALT, Frame.GLOBAL_RELATIVE_ALT_INT})
+OVER_TERRAIN = frozenset({Frame.GLOBAL_TERRAIN_ALT, Frame.GLOBAL_TERRAIN_ALT_INT})
+
+
+def is_located(command: int, frame: int) -> bool:
+    """Whether the fifth to seventh numbers of such an item are a latitude, a longitude and a height."""
+    return frame != Frame.MISSION and (command <= _LAST_NAV or command in FENCES or command in _LOCATED_DO)
+
+
+def command_name(command: int) -> str:
+    """MAVLink name of a command without "MAV_CMD_", or its number where planfly does not know it."""
+    try:
+        return Command(command).name
+    except ValueError:
+        return f"command {command}"
+
+
+def on_grid(degrees: float) -> float:
+    """Double nearest to whole 1e-7 degrees, rounded, never truncated; NaN stays NaN."""
+    return round(degrees * 1e7) / 1e7 if math.isfinite(degrees) else degrees
+
+
 @dataclass(frozen=True, slots=True)
 class MissionItem:
     """One mission item.
 
     seq: its number in the file it came from (home is not an item).  params: p1..p4, NaN where unset.
-    lat_deg, lon_deg: degrees on the 1e-7 grid of MISSION_ITEM_INT.  alt: m in the item's frame.
+    lat_deg, lon_deg: degrees on the 1e-7 grid of MISSION_ITEM_INT, NaN where unset; for a command without a place, its
+    fifth and sixth parameters as written.  alt: m in the item's frame, NaN where unset.
     """
 
     seq: int
@@ -60,18 +137,28 @@ class MissionItem:
 
     @property
     def x(self) -> int:
-        """Latitude as MISSION_ITEM_INT carries it, 1e-7 degrees, rounded, never truncated."""
-        return round(self.lat_deg * 1e7)
+        """Latitude as MISSION_ITEM_INT carries it: 1e-7 degrees, rounded; INT32_MAX where unset (MAVLink).
+
+        A command without a place has its fifth parameter there, unscaled.
+        """
+        return self._scaled(self.lat_deg)
 
     @property
     def y(self) -> int:
-        """Longitude as MISSION_ITEM_INT carries it."""
-        return round(self.lon_deg * 1e7)
+        """Longitude (or the sixth parameter) as MISSION_ITEM_INT carries it."""
+        return self._scaled(self.lon_deg)
+
+    def _scaled(self, value: float) -> int:
+        if not math.isfinite(value):
+            return _INT32
+        return round(value * 1e7) if is_located(self.command, self.frame) else round(value)
 
     @property
     def has_position(self) -> bool:
-        """Whether its latitude and longitude say anything (0, 0 means that they do not)."""
-        return not (self.x == 0 and self.y == 0) and math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)
+        """Whether its latitude and longitude name a place (0, 0 and NaN mean that they do not)."""
+        if not (math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)):
+            return False
+        return is_located(self.command, self.frame) and (self.x, self.y) != (0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,14 +174,84 @@ class Home:
 class Mission:
     """A mission: what a .waypoints file, a .plan file or an upload holds.
 
-    home: None where the file has none, or 0,0.  fences: items 5001..5004, one per vertex or circle.
-    rally: items 5100.  warnings: what was odd about the file but could be read.  source: names it in messages.
+    home: None where the file has none, or 0,0.  items: seq strictly increasing.  fences: items 5001..5004, one per
+    vertex or circle.  rally: items 5100.  Those four decide whether two missions are equal.
+
+    cruise_speed: m/s, what a .plan file's author had the ground station assume; it is never sent to an aircraft.
+    warnings: what was odd about the file but could be read.  source: names it in messages.
     """
 
     home: Home | None
     items: tuple[MissionItem, ...]
     fences: tuple[MissionItem, ...] = ()
     rally: tuple[MissionItem, ...] = ()
-    cruise_speed: float | None = None
-    warnings: tuple[str, ...] = field(default=())
-    source: str = "mission"
+    cruise_speed: float | None = field(default=None, compare=False)
+    warnings: tuple[str, ...] = field(default=(), compare=False)
+    source: str = field(default="mission", compare=False)
+
+
+def renumbered(mission: Mission) -> Mission:
+    """Mission with its first item after seq 0, which both file forms keep for home.
+
+    All numbers move up together, and the targets of jumps with them.
+    """
+    if not mission.items or mission.items[0].seq > 0:
+        return mission
+    shift = 1 - mission.items[0].seq
+    items = []
+    for item in mission.items:
+        params = item.params
+        if item.command == Command.DO_JUMP:
+            params = (params[0] + shift, *params[1:])
+        items.append(replace(item, seq=item.seq + shift, params=params))
+    return replace(mission, items=tuple(items))
+
+
+def position_problem(lat_deg: float, lon_deg: float) -> str | None:
+    """Fault of a latitude and longitude in degrees, as "field value: allowed range"; None if nothing is."""
+    if abs(lat_deg) > 90.0:
+        swapped = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
+        return f"latitude {lat_deg:.10g}: allowed -90..90 degrees{swapped}"
+    if abs(lon_deg) > 180.0:
+        return f"longitude {lon_deg:.10g}: allowed -180..180 degrees"
+    return None
+
+
+def item_problem(item: MissionItem) -> str | None:
+    """Fault of an item that no autopilot could make sense of, as "field value: allowed"; None if nothing is."""
+    if item.frame not in _FRAMES:
+        return f"frame {item.frame}: allowed {', '.join(map(str, _FRAMES))}"
+    for k, value in enumerate(item.params, 1):
+        if abs(value) > _FLOAT32:
+            return f"p{k} {value:g}: beyond what MAVLink carries (3.4e38)"
+    if is_located(item.command, item.frame):
+        wrong = position_problem(item.lat_deg, item.lon_deg)
+        if wrong is None and not (_LOWEST <= item.alt <= _HIGHEST or math.isnan(item.alt)):
+            wrong = f"altitude {item.alt:.10g}: allowed {_LOWEST:.0f}..{_HIGHEST:.0f} m"
+        return wrong or _count_problem(item)
+    for name, value in (("latitude", item.lat_deg), ("longitude", item.lon_deg)):
+        if abs(value) > _INT32:
+            return f"{name} {value:g}: beyond what MISSION_ITEM_INT carries (2147483647)"
+    if abs(item.alt) > _FLOAT32:
+        return f"altitude {item.alt:g}: beyond what MAVLink carries (3.4e38)"
+    if item.command in PLACES | TAKEOFFS | LANDINGS and (item.lat_deg or item.lon_deg):
+        return f"frame {item.frame}: has no coordinates, and {command_name(item.command)} gives some; 2 is for the rest"
+    return _count_problem(item)
+
+
+def _count_problem(item: MissionItem) -> str | None:
+    """Fault of the parameters that count something."""
+    p1, p2 = item.params[:2]
+    if item.command == Command.DO_JUMP:
+        if not (p1 >= 0 and p1 == int(p1)):
+            return f"p1 {p1:g}: a jump's target is an item's number"
+        if not (p2 >= -1 and p2 == int(p2)):
+            return f"p2 {p2:g}: a jump's count is a whole number, or -1 for without end"
+    if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:
+        return f"p1 {p1:g}: turns and seconds to loiter cannot be negative"
+    if item.command in (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_POLYGON_EXCLUSION):
+        if not (p1 >= 3 and p1 == int(p1)):
+            return f"p1 {p1:g}: a fence polygon has a whole number of corners, at least 3"
+    elif item.command in FENCES and not p1 > 0:
+        return f"p1 {p1:g}: a fence circle's radius is above 0 m"
+    return None
