@@ -1,0 +1,168 @@
+"""The MCAP container, read front to back without trusting it.
+
+mcap's own `StreamReader` does not check an attachment's CRC and decompresses a chunk to whatever size its frame
+declares, so the framing is read here; records are then parsed by mcap's classes, from bytes that are already bounded
+and CRC-checked.  Reading stops at the first damage: what is given is whole, in order and without a hole.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from typing import BinaryIO
+
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Chunk, DataEnd, Footer
+
+MAGIC = b"\x89MCAP0\r\n"
+RECORD_LIMIT = 64 * 2**20
+# All chunks together may grow to this many times the bytes read so far: honest logs stay under 20.
+_GROWTH = 256
+FRAME = struct.Struct("<BQ")
+# What mcap's record classes raise on bytes that do not hold what they should.
+PARSE_ERRORS = (McapError, struct.error, ValueError, OverflowError, MemoryError)
+
+
+class _Damage(Exception):
+    """What is wrong with the file, in words."""
+
+
+@dataclass(slots=True)
+class Container:
+    """What was found in a file up to its end, or up to its first damage.
+
+    attachments: by name.  problem: empty if the file is whole.
+    """
+
+    attachments: dict[str, bytes] = field(default_factory=dict)
+    problem: str = ""
+
+
+def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
+    """Give the records inside each whole chunk as bytes, filling ``found`` on the way.
+
+    file: stands behind the magic at the start.  Never raises for damage; `Container.problem` says what it was.
+    """
+    try:
+        yield from _read(file, found)
+    except _Damage as damage:
+        found.problem = str(damage)
+
+
+def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
+    crc = zlib.crc32(MAGIC)
+    total = 0
+    ended = False
+    while True:
+        at = file.tell()
+        head, content = _record(file, at)
+        opcode = head[0]
+        if opcode == Opcode.CHUNK:
+            data = _chunk(content, at)
+            total += len(data)
+            if total > RECORD_LIMIT + _GROWTH * file.tell():
+                raise _Damage(f"chunks grow to {total:,} bytes at byte {at:,} of the file: more than {_GROWTH}-fold")
+            yield data
+        elif opcode == Opcode.ATTACHMENT:
+            _attachment(content, at, found)
+        elif opcode == Opcode.DATA_END:
+            _data_end(content, at, crc)
+            ended = True
+            break
+        elif opcode == Opcode.FOOTER:
+            break
+        crc = zlib.crc32(content, zlib.crc32(head, crc))
+    if not ended:
+        raise _Damage("the data section has no end record")
+    _summary(file)
+
+
+def _record(file: BinaryIO, at: int) -> tuple[bytes, bytes]:
+    head = file.read(FRAME.size)
+    if len(head) < FRAME.size:
+        raise _Damage(f"the file ends at byte {at + len(head):,}, before its end record")
+    _, length = FRAME.unpack(head)
+    if length > RECORD_LIMIT:
+        raise _Damage(f"the record at byte {at:,} declares {length:,} bytes: at most {RECORD_LIMIT:,} are read")
+    content = file.read(length)
+    if len(content) < length:
+        raise _Damage(f"the file ends at byte {at + len(head) + len(content):,}, inside a record")
+    return head, content
+
+
+def stream(content: bytes) -> ReadDataStream:
+    """Wrap one record's content as what mcap's record classes read from."""
+    return ReadDataStream(BytesIO(content))
+
+
+def _chunk(content: bytes, at: int) -> bytes:
+    try:
+        chunk = Chunk.read(stream(content))
+    except PARSE_ERRORS as error:
+        raise _Damage(f"the chunk at byte {at:,} cannot be read") from error
+    size = chunk.uncompressed_size
+    if size > RECORD_LIMIT:
+        raise _Damage(f"the chunk at byte {at:,} declares {size:,} bytes: at most {RECORD_LIMIT:,} are read")
+    if chunk.compression == "zstd":
+        try:
+            # Bounded by the reader: one call of decompress() would believe the size inside the frame.
+            reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data)
+            data = reader.read(size + 1)
+        except zstandard.ZstdError as error:
+            raise _Damage(f"the chunk at byte {at:,} cannot be decompressed") from error
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise _Damage(
+            f"the chunk at byte {at:,} is compressed with {chunk.compression[:20]!r}: zstd or none is expected"
+        )
+    if len(data) != size:
+        raise _Damage(f"the chunk at byte {at:,} does not decompress to the {size:,} bytes that it declares")
+    if zlib.crc32(data) != chunk.uncompressed_crc:
+        raise _Damage(f"the chunk at byte {at:,} is damaged (its CRC differs)")
+    return data
+
+
+def _attachment(content: bytes, at: int, found: Container) -> None:
+    try:
+        attachment = Attachment.read(stream(content))
+    except PARSE_ERRORS as error:
+        raise _Damage(f"the attachment at byte {at:,} cannot be read") from error
+    if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
+        raise _Damage(f"the attachment at byte {at:,} is damaged (its CRC differs)")
+    if attachment.name in found.attachments:
+        raise _Damage(f"the attachment at byte {at:,} has the name of an earlier one")
+    found.attachments[attachment.name] = attachment.data
+
+
+def _data_end(content: bytes, at: int, crc: int) -> None:
+    try:
+        stated = DataEnd.read(stream(content)).data_section_crc
+    except PARSE_ERRORS as error:
+        raise _Damage(f"the end record at byte {at:,} cannot be read") from error
+    # A writer may leave the CRC out, as 0; chunks and attachments have their own.
+    if stated not in (0, crc):
+        raise _Damage("the data section is damaged (its CRC differs)")
+
+
+def _summary(file: BinaryIO) -> None:
+    """Check what follows the data, which is only an index: its CRC, and the magic at the end."""
+    crc = 0
+    while True:
+        at = file.tell()
+        head, content = _record(file, at)
+        if head[0] == Opcode.FOOTER:
+            break
+        crc = zlib.crc32(content, zlib.crc32(head, crc))
+    try:
+        footer = Footer.read(stream(content))
+    except PARSE_ERRORS as error:
+        raise _Damage(f"the footer at byte {at:,} cannot be read") from error
+    if footer.summary_crc not in (0, zlib.crc32(content[:-4], zlib.crc32(head, crc))):
+        raise _Damage("the summary is damaged (its CRC differs)")
+    if file.read(len(MAGIC) + 1) != MAGIC:
+        raise _Damage("the file does not end as an MCAP file does")
