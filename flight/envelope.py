@@ -1,9 +1,8 @@
 """Fills an aircraft's envelope from JSBSim trims, and keeps it in the user's cache folder."""
 
+import contextlib
 import json
 import math
-import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import Envelope
 from flight.fdm import JSBSIM_VERSION, Fdm
 from flight.trim import Floats, Trim, fastest, full_throttle, idle, slowest
+from world.files import write_whole
 
 # Any change of what the file holds or of how it is computed counts this up.
 _SCHEMA = 1
@@ -122,13 +122,6 @@ def _write(file: Path, key: dict[str, Any], tables: dict[str, Floats]) -> None:
         entries[np.isnan(table)] = None
         values[name] = entries.tolist()
     text = json.dumps(key | {"tables": values}, allow_nan=False)
-    temporary = ""
-    try:
+    with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.stem, suffix=".tmp")
-        with os.fdopen(handle, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        Path(temporary).replace(file)
-    except OSError:
-        if temporary:
-            Path(temporary).unlink(missing_ok=True)
+        write_whole(file, text)

@@ -1,6 +1,7 @@
 """The verdict as data: findings, and the two questions they answer."""
 
 import json
+import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -13,10 +14,10 @@ RULES = ("turn", "slope", "clearance", "threat", "bounds", "waypoint", "speed", 
 class Finding:
     """One rule at one place: what was planned, what was flown, what is allowed.
 
-    where: "waypoint 3 (item 4)", "leg 2", "flight".  planned, flown, limit, tolerance, margin: in `unit`, None
-    where there is no such number.  margin: how far inside the limit (negative: beyond), tolerance not
-    counted.  limit_source: "scenario", "aircraft", or what set it.  method: how the number was got.
-    ok: None where it was not judged, with the reason.
+    where: "waypoint 3 (item 4)", "leg 2", "flight"; waypoints and legs count from 0, as `Track.leg` does.
+    planned, flown, limit, tolerance, margin: in `unit`, None where there is no such number.  margin: how far inside
+    the limit (negative: beyond), tolerance not counted.  limit_source: "scenario", "aircraft", or what set it.
+    method: how the number was got.  ok: None where it was not judged, with the reason.
     """
 
     rule: str
@@ -38,7 +39,9 @@ class Verdict:
     """Whether a plan really flies.
 
     flyable: complete, and no finding failed.  complete: the plan was feasible, flown to its end, and recorded
-    whole.  level: "flown" or "geometric" (from the envelope, without a flight).
+    whole (at the geometric level: feasible, or a mission that a person brought).  summary: lines, of which the first
+    answers the question.  level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible
+    plan, so nothing was flown).
     """
 
     findings: tuple[Finding, ...]
@@ -48,8 +51,46 @@ class Verdict:
     level: str
 
 
+def make_finding(
+    rule: str,
+    where: str,
+    *,
+    ok: bool | None,
+    reason: str,
+    planned: float | None = None,
+    flown: float | None = None,
+    limit: float | None = None,
+    source: str = "none",
+    tolerance: float | None = None,
+    margin: float | None = None,
+    unit: str = "",
+    method: str = "",
+) -> Finding:
+    """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite."""
+    return Finding(
+        rule=rule,
+        where=where,
+        planned=_plain(planned),
+        flown=_plain(flown),
+        limit=_plain(limit),
+        limit_source=source,
+        tolerance=_plain(tolerance),
+        margin=_plain(margin),
+        unit=unit,
+        method=method,
+        ok=None if ok is None else bool(ok),
+        reason=reason,
+    )
+
+
+def _plain(value: float | None) -> float | None:
+    if value is None or not math.isfinite(value):
+        return None
+    return round(float(value), 6) + 0.0  # no -0.0
+
+
 def verdict_json(verdict: Verdict) -> str:
-    """The verdict as the text of a ``verdict.json``."""
+    """Write the verdict as the text of a ``verdict.json``."""
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "level": verdict.level,

@@ -94,14 +94,26 @@ def _world(parser: argparse.ArgumentParser) -> None:
 
 def _add_run_and_plan(command: _Command) -> None:
     run = command("run", "plan, export, fly, log, judge and report", "planfly run jacksboro --seed 3 --out my-run")
-    run.add_argument("scenario", metavar="SCENARIO", nargs="?", default="jacksboro", help="TOML file or embedded name (default: jacksboro)")
+    run.add_argument(
+        "scenario",
+        metavar="SCENARIO",
+        nargs="?",
+        default="jacksboro",
+        help="TOML file or embedded name (default: jacksboro)",
+    )
     run.add_argument("--out", metavar="DIR", help="where the files go (default: runs/<name>-seed<N>, replaced)")
-    run.add_argument("--seed", metavar="N", type=_seed, help="of planner and turbulence (default: the scenario's, or 1)")
+    run.add_argument(
+        "--seed", metavar="N", type=_seed, help="of planner and turbulence (default: the scenario's, or 1)"
+    )
     _overwrite(run)
     plan = command("plan", "plan only", "planfly plan jacksboro --seed 3 --out plan.json")
     plan.add_argument("scenario", metavar="SCENARIO", help="TOML file or embedded name")
     plan.add_argument("--seed", metavar="N", type=_seed, help="of the planner (default: the scenario's, or 1)")
-    plan.add_argument("--algorithm", metavar="A", help="the planner's algorithm, in place of the scenario's (an unknown name lists them)")
+    plan.add_argument(
+        "--algorithm",
+        metavar="A",
+        help="the planner's algorithm, in place of the scenario's (an unknown name lists them)",
+    )
     plan.add_argument("--out", metavar="FILE", help="the plan file (default: runs/<name>-seed<N>/plan.json, replaced)")
     _overwrite(plan)
 
@@ -120,7 +132,9 @@ def _add_export_and_fly(command: _Command) -> None:
     )  # fmt: skip
     fly.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan")
     _world(fly)
-    fly.add_argument("--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)")
+    fly.add_argument(
+        "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
+    )
     fly.add_argument("--wind", metavar="SPEED,FROM", type=_wind, help="steady wind, m/s and degrees it blows from")
     fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=_seed, help="of the turbulence (default: the plan's, or 1)")
@@ -136,12 +150,20 @@ def _add_log_commands(command: _Command) -> None:
     _world(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     _overwrite(check)
-    replay = command("replay", "tell a flight again from its log alone: legs, turns, clearances, events", "planfly replay flight.mcap --speed 20")
+    replay = command(
+        "replay",
+        "tell a flight again from its log alone: legs, turns, clearances, events",
+        "planfly replay flight.mcap --speed 20",
+    )
     replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
     replay.add_argument("--speed", metavar="X", type=_positive, help="at X times real time (default: at once)")
-    report = command("report", "draw the figures and write report.html from a log alone", "planfly report flight.mcap --out report")
+    report = command(
+        "report", "draw the figures and write report.html from a log alone", "planfly report flight.mcap --out report"
+    )
     report.add_argument("log", metavar="LOG.mcap", help="a flight log")
-    report.add_argument("--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)")
+    report.add_argument(
+        "--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)"
+    )
     _overwrite(report)
 
 

@@ -7,9 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.files import prepare_folder, refuse_existing, write_whole
+from planfly.files import prepare_folder, refuse_existing
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
+from world.files import write_whole
 from world.scenario import Scenario, embedded_scenarios, load_scenario, with_wind
 
 RUNS = Path("runs")
@@ -144,7 +145,9 @@ def _check_log(source: Path, args: argparse.Namespace, target: Path | None) -> i
     from planfly.results import print_verdict, print_warnings, write_verdict
 
     if args.scenario:
-        raise ScenarioError(f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces it")
+        raise ScenarioError(
+            f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces it"
+        )
     log = read_log(source)
     setup = log.setup
     if args.terrain:
@@ -169,7 +172,7 @@ def replay(args: argparse.Namespace) -> int:
     import time
 
     from logs.reader import read_log
-    from logs.replay import timeline
+    from logs.replay import entry_lines, timeline
     from planfly.results import print_warnings
 
     log = read_log(Path(args.log))
@@ -177,7 +180,7 @@ def replay(args: argparse.Namespace) -> int:
     for entry in timeline(log):
         if args.speed:
             time.sleep(max(0.0, entry.time / args.speed - (time.monotonic() - started)))
-        print(f"{_clock(entry.time)}  {entry.kind:<10} {entry.text}", flush=bool(args.speed))
+        print("\n".join(entry_lines(entry)), flush=bool(args.speed))
     if not log.complete:
         print_warnings([f"{args.log}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
         return LOSS
@@ -196,7 +199,9 @@ def report(args: argparse.Namespace) -> int:
     verdict = judge_flight(log.setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
     prepare_folder(folder, named=bool(args.out), overwrite=args.overwrite)
     with progress("drawing"):
-        files = write_pictures(folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions)
+        files = write_pictures(
+            folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions, log.events
+        )
     for file in files:
         print(f"report    {file}")
     if not log.complete:
@@ -234,10 +239,6 @@ def _wind(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
         return with_wind(scenario, speed, None if source is None else math.radians(source), args.turbulence)
 
     return change
-
-
-def _clock(seconds: float) -> str:
-    return f"{int(seconds) // 60:3d}:{seconds % 60:04.1f}"
 
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {

@@ -1,7 +1,5 @@
-"""Targets on disk: refused where they exist, written whole or not at all."""
+"""Targets on disk: refused where they exist, cleared where they are ours."""
 
-import os
-import tempfile
 from pathlib import Path
 
 from world.errors import PlanflyError
@@ -40,20 +38,3 @@ def prepare_folder(folder: Path, *, named: bool, overwrite: bool) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name in RUN_FILES:
         (folder / name).unlink(missing_ok=True)
-
-
-def write_whole(path: Path, data: str | bytes) -> None:
-    """Write a file under a temporary name beside its target and rename it."""
-    content = data.encode("utf-8") if isinstance(data, str) else data
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        # mkstemp keeps files private; a result has the permissions that any new file has.
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise

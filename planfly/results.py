@@ -1,16 +1,17 @@
 """What a command leaves: lines on the terminal, and files."""
 
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from flight.mission import Mission
 from flight.mission_files import mission_kind, mission_text
 from flight.setup import FlightSetup
 from flight.track import Track
+from logs.reader import LogEvent
 from logs.verdict import Finding, Verdict, verdict_json
-from planfly.files import write_whole
 from planner.plan import Objective, Plan
+from world.files import write_whole
 
 # Findings of a passing rule are many; the terminal shows the closest one of each.
 _RULE_TITLES = {
@@ -96,8 +97,11 @@ def write_pictures(
     ended: str | None,
     command: str,
     versions: Mapping[str, str] | None = None,
+    events: Sequence[LogEvent] = (),
 ) -> list[Path]:
     """map.png, profile.png and report.html."""
     from logs.report import write_report
+    from logs.setup_file import package_versions
 
-    return write_report(folder, setup, track, verdict, ended=ended, versions=versions, command=command)
+    flown_with = package_versions() if versions is None else versions
+    return write_report(folder, setup, track, verdict, ended=ended, versions=flown_with, command=command, events=events)

@@ -118,7 +118,9 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("name", SCENARIOS)
 @pytest.mark.parametrize("command", [["run"], ["plan"]])
-def test_a_malformed_scenario(name: str, command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_malformed_scenario(
+    name: str, command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "bad.toml").write_text(SCENARIOS[name], encoding="utf-8")
     line = refused([*command, "bad.toml"], tmp_path, capsys)
     assert "bad.toml" in line or "small" in line

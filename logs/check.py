@@ -1,0 +1,51 @@
+"""Check: is this flight evidence that its plan is flyable?  Every number is worked out again from the track.
+
+What guidance noted about itself (leg, cross-track, height error, clearance) and any verdict that was recorded are
+not read.
+"""
+
+from flight.setup import FlightSetup
+from flight.track import Track
+from logs.flown import lay_track
+from logs.geometric import judge_geometry, judge_plan_only
+from logs.route_shape import route_shape
+from logs.rules_flight import (
+    completion_findings,
+    departure_findings,
+    energy_findings,
+    speed_findings,
+    waypoint_findings,
+)
+from logs.rules_slope import slope_findings
+from logs.rules_turn import turn_findings
+from logs.rules_world import bounds_findings, clearance_findings, threat_findings
+from logs.summary import summary_text
+from logs.verdict import Verdict
+
+__all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
+
+
+def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = True, envelope: bool = True) -> Verdict:
+    """Judge a flown track: level "flown".
+
+    ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.  envelope: whether
+    the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and the scenario's
+    numbers alone.  Any track is judged, however short or damaged: what cannot be known makes it incomplete.
+    """
+    shape = route_shape(setup, envelope=envelope)
+    flown = lay_track(shape, track)
+    findings = (
+        *turn_findings(shape, flown),
+        *slope_findings(shape, flown),
+        *clearance_findings(shape, flown),
+        *threat_findings(shape, flown),
+        *bounds_findings(shape, flown),
+        *waypoint_findings(shape, flown),
+        *speed_findings(shape, flown),
+        *energy_findings(shape, flown),
+        *departure_findings(shape, flown),
+        *completion_findings(shape, flown, ended, whole),
+    )
+    complete = all(item.ok is True for item in findings if item.rule == "completion")
+    flyable = complete and not any(item.ok is False for item in findings)
+    return Verdict(findings, flyable, complete, summary_text(findings, flyable, setup, "flown"), "flown")

@@ -1,0 +1,123 @@
+"""What all figures share: colours, sizes, the clean matplotlib settings they are drawn under, and their bytes.
+
+Colours are those of Okabe and Ito, "Color Universal Design" (2008), which people with any of the common colour
+vision deficiencies tell apart; line style, marker or fill tell the same things a second time.
+"""
+
+import io
+import itertools
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+# 10 in at 150 dots an inch: every picture is 1500 px wide.
+DPI = 150
+WIDTH = 10.0
+
+PLAN = "#56B4E9"
+FLOWN = "#000000"
+MISSILE = "#D55E00"
+RADAR = "#007A5A"  # Okabe-Ito's bluish green, darkened for thin dashes on pale ground
+FAIL = "#B0408A"  # reddish purple, darkened for text
+LIMIT = "#E69F00"
+BLUE = "#0072B2"
+INK = "#222222"
+QUIET = "#6b6b6b"
+
+# Rises in lightness from valley to summit, so that height reads without colour.
+GROUND = ("#9fbfa5", "#cfd8b0", "#efe7c8", "#f6efe2", "#ffffff")
+
+_SETTINGS: Any = {
+    "font.family": ["DejaVu Sans"],
+    "font.size": 8.5,
+    "axes.edgecolor": "#555555",
+    "axes.labelcolor": INK,
+    "axes.linewidth": 0.7,
+    "axes.titlesize": 11.0,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 8.0,
+    "text.color": INK,
+    # A scenario's or a threat's name may hold a dollar sign; it is never a formula.
+    "text.parse_math": False,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "xtick.major.width": 0.7,
+    "ytick.major.width": 0.7,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "path.simplify": True,
+}
+
+
+@contextmanager
+def clean_style() -> Iterator[None]:
+    """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc says.
+
+    The settings in force before come back at the end.
+    """
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_SETTINGS)
+        yield
+
+
+def new_figure(height: float) -> Figure:
+    """Make an empty figure of the common width, `height` inches tall, with its own canvas (no pyplot state)."""
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """Render the figure as a PNG; the same figure gives the same bytes (no date, no version inside)."""
+    buffer = io.BytesIO()
+    with clean_style(), warnings.catch_warnings():
+        # A name in a script that the font lacks shows as boxes; that is no reason to stop or to talk.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
+        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def shorten(text: str, length: int) -> str:
+    """Cut the text with an ellipsis to at most `length` characters."""
+    return text if len(text) <= length else text[: length - 1].rstrip() + "…"
+
+
+def nice_step(span: float, parts: int) -> float:
+    """Find the step of 1, 2 or 5 times a power of ten that cuts `span` into at most `parts` pieces."""
+    raw = max(span, 1e-9) / parts
+    power = 10.0 ** np.floor(np.log10(raw))
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        if factor * power >= raw * (1 - 1e-9):
+            return float(factor * power)
+    return float(10.0 * power)
+
+
+def outline_rows(values: ArrayLike, count: int) -> Indices:
+    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal runs, in order.
+
+    values: (t,); not-a-number rows are kept out unless a run has nothing else.  Short series come back whole.
+    """
+    series = np.asarray(values, dtype=np.float64)
+    if series.size <= 2 * count:
+        return np.arange(series.size)
+    edges = np.linspace(0, series.size, count + 1).astype(int)
+    kept = {0, series.size - 1}
+    for low, high in itertools.pairwise(edges):
+        run = series[low:high]
+        good = np.flatnonzero(np.isfinite(run))
+        if good.size == 0:
+            kept.add(int(low))
+            continue
+        kept.update((int(low + good[np.argmin(run[good])]), int(low + good[np.argmax(run[good])])))
+    return np.array(sorted(kept), dtype=np.intp)

@@ -1,0 +1,86 @@
+"""Verdicts without a flight: of a route's geometry, and of a plan that was not feasible."""
+
+import math
+
+from flight.setup import FlightSetup
+from logs.route_shape import route_shape
+from logs.rules_flight import energy_findings, speed_findings
+from logs.rules_slope import slope_findings
+from logs.rules_turn import turn_findings
+from logs.rules_world import bounds_findings, clearance_findings, threat_findings
+from logs.summary import headline, summary_text
+from logs.verdict import Finding, Verdict, make_finding
+from planner.plan import Plan, Violation
+
+
+def judge_geometry(setup: FlightSetup) -> Verdict:
+    """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
+    shape = route_shape(setup)
+    findings = (
+        *turn_findings(shape, None, geometric=True),
+        *slope_findings(shape, None, geometric=True),
+        *clearance_findings(shape, None, geometric=True),
+        *threat_findings(shape, None, geometric=True),
+        *bounds_findings(shape, None, geometric=True),
+        *speed_findings(shape, None, geometric=True),
+        *energy_findings(shape, None, geometric=True),
+        *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
+    )
+    complete = setup.plan is None or setup.plan.feasible
+    flyable = complete and not any(item.ok is False for item in findings)
+    return Verdict(findings, flyable, complete, summary_text(findings, flyable, setup, "geometric"), "geometric")
+
+
+def judge_plan_only(plan: Plan) -> Verdict:
+    """Judge a run that found no feasible plan, so that nothing was flown: never complete."""
+    margins = (
+        ("turn", plan.certificate.turn, Violation.TURN, "deg", 180.0 / math.pi),
+        ("slope", plan.certificate.slope, Violation.SLOPE, "deg", 180.0 / math.pi),
+        ("clearance", plan.certificate.clearance, Violation.TERRAIN, "m", 1.0),
+        ("bounds", plan.certificate.bounds, Violation.BOUNDS, "m", 1.0),
+    )
+    findings = []
+    for rule, margin, violation, unit, factor in margins:
+        count = int(plan.violations[violation])
+        bad = bool(count) or margin < 0.0
+        if rule == "turn":
+            bad = bad or plan.certificate.turn_room < 0.0
+        known = math.isfinite(margin)
+        reason = f"least margin {margin * factor:.2f} {unit}" if known else "no margin is known"
+        if bad:
+            reason = f"the plan's {rule} limit is exceeded, {reason}" + (f", {count} violations" if count else "")
+        findings.append(
+            make_finding(
+                rule,
+                "plan",
+                ok=False if bad else (True if known else None),
+                reason=reason,
+                source="plan",
+                margin=margin * factor,
+                unit=unit,
+                method="certificate",
+            )
+        )
+    findings.append(_not_feasible(plan))
+    return Verdict(tuple(findings), False, False, _plan_summary(findings, plan), "plan")
+
+
+def _not_feasible(plan: Plan) -> Finding:
+    problems = "; ".join(plan.certificate.problems) or "the search still counts violations"
+    return make_finding(
+        "completion",
+        "plan",
+        ok=False,
+        reason=f"no feasible plan was found: {problems}",
+        source="plan",
+        method="certificate",
+    )
+
+
+def _plan_summary(findings: list[Finding], plan: Plan) -> str:
+    failed = [item for item in findings if item.ok is False and item.rule != "completion"]
+    if not failed:
+        return headline(findings, False)
+    text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
+    lines = [f"not flyable: no feasible plan was found: {text}", "Nothing was flown"]
+    return "\n".join(lines + [f"Problem: {problem}" for problem in plan.certificate.problems])

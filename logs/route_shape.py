@@ -1,0 +1,203 @@
+"""What a route asks of the aircraft and what the aircraft can: the planned side of every finding."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.setup import FlightSetup, limits_of
+from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
+from world.limits import Limits, aircraft_slopes, ground_speed_on, turn_radius_between
+
+Floats = NDArray[np.float64]
+
+# A turn sharper than this has no useful tangent length; a U-turn's is infinite.
+_U_TURN = math.pi - 1e-6
+# The distance by which a fly-by passes its waypoint is capped at this many radii (a turn of about 141 degrees).
+_LARGEST_CUT = 2.0
+# A change of slope is flown with this vertical acceleration or more, m/s^2.
+_BLEND_ACCELERATION = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class RouteShape:
+    """A route's turns and legs in numbers, and the aircraft's limits at each.
+
+    For w waypoints: points (w, 3) m; runs (w - 1,) horizontal m; courses, slopes (w - 1,) rad; turns (w,) rad,
+    positive to the right, 0 at the ends; radius (w,) m of the arc at the bank limit; before, after (w,) m of leg that
+    the turn uses on either side, inf for a U-turn; blend (w,) m of leg beyond them on which the slope still changes;
+    sag (w,) m by which such a blend may pass above or below its corner; cut (w,) m by which the fly-by passes the
+    waypoint; turn_limit (w,) rad, the sharpest turn there that fits both legs
+    beside the neighbouring turns, inf where the envelope is left out;
+    climb, dive (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out;
+    ground_speed (w - 1,) m/s, NaN where the wind leaves no way.
+    """
+
+    setup: FlightSetup
+    limits: Limits
+    points: Floats
+    runs: Floats
+    courses: Floats
+    slopes: Floats
+    turns: Floats
+    radius: Floats
+    before: Floats
+    after: Floats
+    blend: Floats
+    sag: Floats
+    cut: Floats
+    turn_limit: Floats
+    climb: Floats
+    dive: Floats
+    ground_speed: Floats
+
+    @property
+    def legs(self) -> int:
+        """How many legs there are."""
+        return len(self.runs)
+
+    def waypoint(self, index: int) -> str:
+        """Name of a waypoint in findings."""
+        item = int(self.setup.route.items[index])
+        return f"waypoint {index}" if item < 0 else f"waypoint {index} (item {item})"
+
+    def leg_unit(self, leg: int) -> Floats:
+        """East and north components of a leg's course, (2,)."""
+        return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
+
+    def apexes(self) -> Floats:
+        """Where the fly-by path passes each waypoint: the middles of the arcs, (w, 3) m."""
+        out = self.points.copy()
+        for i in range(1, len(out) - 1):
+            if self.cut[i] > 0.0:
+                inward = self.leg_unit(i) - self.leg_unit(i - 1)
+                out[i, :2] += self.cut[i] * inward / max(1e-9, math.hypot(inward[0], inward[1]))
+                # Halfway between the heights at the arc's ends.
+                reach = min(self.before[i], self.runs[i - 1], self.runs[i])
+                out[i, 2] += 0.5 * reach * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
+        return out
+
+
+def route_shape(setup: FlightSetup, *, envelope: bool = True) -> RouteShape:
+    """Work out a route's shape.  ``envelope=False`` leaves the aircraft's limits out, for flown evidence alone."""
+    route, limits = setup.route, limits_of(setup)
+    points = np.asarray(route.waypoints, dtype=np.float64)
+    count, legs = len(points), len(points) - 1
+    packed = {float(v): limits.packed(float(v)) for v in route.airspeed}
+    courses, runs = leg_courses(points), leg_runs(points)
+    turns = np.zeros(count)
+    if count > 2:
+        turns[1:-1] = signed_turns(points)
+    radius, before, after = np.zeros(count), np.zeros(count), np.zeros(count)
+    for i in range(1, count - 1):
+        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
+        radius[i] = turn_radius_between(packed[speed], courses[i - 1], courses[i], points[i, 2])
+        before[i], after[i] = turn_room(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
+    climb, dive, speeds = np.full(legs, math.inf), np.full(legs, math.inf), np.zeros(legs)
+    for leg in range(legs):
+        table, course = packed[float(route.airspeed[leg])], float(courses[leg])
+        heights = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
+        speeds[leg] = min(ground_speed_on(table, course, up) for up in heights)
+        if any(math.isnan(ground_speed_on(table, course, up)) for up in heights):
+            speeds[leg] = math.nan
+        if envelope:
+            climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
+    blend, sag = _blends(setup, points, runs, turns, radius, after)
+    cut = np.zeros(count)
+    finite = np.isfinite(radius) & ~route.fly_over
+    cut[finite] = radius[finite] * np.minimum(1.0 / np.maximum(np.cos(0.5 * turns[finite]), 1e-6) - 1.0, _LARGEST_CUT)
+    return RouteShape(
+        setup=setup,
+        limits=limits,
+        points=points,
+        runs=runs,
+        courses=courses,
+        slopes=leg_slopes(points),
+        turns=turns,
+        radius=radius,
+        before=before,
+        after=after,
+        blend=blend,
+        sag=sag,
+        cut=cut,
+        turn_limit=_turn_limits(setup, runs, radius, before, after) if envelope else np.full(count, math.inf),
+        climb=climb,
+        dive=dive,
+        ground_speed=speeds,
+    )
+
+
+def _blends(
+    setup: FlightSetup, points: Floats, runs: Floats, turns: Floats, radius: Floats, after: Floats
+) -> tuple[Floats, Floats]:
+    """Length of leg beside each turn on which the slope still changes, and its distance from the corner, (w,) m.
+
+    A parabola about each end of the arc, or about the waypoint where there is none.
+    """
+    rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
+    blend, sag = np.zeros(len(points)), np.zeros(len(points))
+    speed = float(setup.route.airspeed.max()) + setup.scenario.wind.speed
+    for i in range(1, len(points) - 1):
+        steps = [abs(rise[i] - rise[i - 1])]
+        arc = radius[i] * abs(turns[i])
+        if 0.0 < arc < math.inf and math.isfinite(after[i]) and not setup.route.fly_over[i]:
+            # The arc is shorter than its two tangents, so that its slope is steeper than the legs'.
+            on_arc = (rise[i - 1] + rise[i]) * after[i] / arc
+            steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
+        blend[i] = max(steps) * speed**2 / (2.0 * _BLEND_ACCELERATION)
+        sag[i] = 0.25 * max(steps) * blend[i]
+    return blend, sag
+
+
+def turn_room(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
+    """Length of leg (m) that a turn (rad) uses before and after its waypoint.
+
+    A fly-by uses R tan(turn/2) on either side.  A fly-over turns past the course and back again: with overshoot angle
+    phi, cos phi = (1 + cos turn)/2, it is back on the leg after R (sin turn + 2 sin phi).
+    """
+    if turn < 1e-9:
+        return 0.0, 0.0
+    if fly_over:
+        return 0.0, radius * _fly_over_run(turn)
+    if turn > _U_TURN:
+        return math.inf, math.inf
+    reach = radius * math.tan(0.5 * turn)
+    return reach, reach
+
+
+def _fly_over_run(turn: float) -> float:
+    """Run after a fly-over turn, in radii; its greatest up to this angle, so that it never falls with the angle."""
+    sharpest = min(turn, math.acos(-1.0 / 3.0))  # where sin turn + 2 sin phi is greatest, 2 sqrt 2
+    back = 0.5 * (1.0 + math.cos(sharpest))
+    return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
+
+
+def _turn_limits(setup: FlightSetup, runs: Floats, radius: Floats, before: Floats, after: Floats) -> Floats:
+    """Sharpest turn at each waypoint that fits its legs beside the neighbouring turns, (w,) rad.
+
+    Of a leg too short for its two turns the one that takes more than half of it is at fault, or both are.
+    """
+    out = np.full(len(radius), math.pi)
+    for i in range(1, len(radius) - 1):
+        if not math.isfinite(radius[i]):
+            out[i] = 0.0
+            continue
+        behind = max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1])
+        ahead = max(runs[i] - before[i + 1], 0.5 * runs[i])
+        if setup.route.fly_over[i]:
+            out[i] = _sharpest_fly_over(ahead / radius[i])
+        else:
+            out[i] = 2.0 * math.atan(min(behind, ahead) / radius[i])
+    return out
+
+
+def _sharpest_fly_over(room: float) -> float:
+    """Sharpest fly-over turn (rad) whose run fits ``room`` radii, by bisection."""
+    low, high = 0.0, math.pi
+    if _fly_over_run(high) <= room:
+        return high
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if _fly_over_run(middle) <= room else (low, middle)
+    return low

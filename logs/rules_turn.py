@@ -1,0 +1,128 @@
+"""The turn rule: can each corner be turned, and was it."""
+
+import math
+
+from logs.flown import Flown
+from logs.measure_turn import TurnMeasure, measure_turn
+from logs.route_shape import RouteShape
+from logs.verdict import Finding, make_finding
+
+# A turn passes if the bank stays within the limit and this, the aircraft within this of its arc on the outside, and the
+# cross-track settles under this before the next turn; the design document's figures.
+BANK_TOLERANCE = math.radians(5.0)
+OVERSHOOT = 5.0
+SETTLED = 1.0
+# What gusts may add to the settled cross-track, m.
+GUST_OFFSET = {"none": 0.0, "light": 0.5, "moderate": 1.0}
+# A planned angle is known to this, rad: 1e-7 degrees of latitude on a 130 m leg, and rounding.
+PLAN_TOLERANCE = math.radians(0.01)
+
+
+def turn_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge each inner waypoint; ``geometric`` judges the route alone, without a flight."""
+    out = []
+    for i in range(1, shape.legs):
+        measure = None if geometric else TurnMeasure()
+        if flown is not None:
+            measure = measure_turn(shape, flown, i)
+        out.append(_judge(shape, i, measure))
+    return out
+
+
+def turn_limit(shape: RouteShape, i: int) -> tuple[float, str]:
+    """Tighter of the scenario's and the aircraft's limit at a waypoint, rad, and whose it is."""
+    fixed = shape.limits.max_turn
+    aircraft = float(shape.turn_limit[i])
+    if fixed is not None and fixed <= aircraft:
+        return fixed, "scenario"
+    return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
+
+
+def _judge(shape: RouteShape, i: int, measure: TurnMeasure | None) -> Finding:
+    planned = abs(float(shape.turns[i]))
+    limit, source = turn_limit(shape, i)
+    wrong = [_too_sharp(shape, i, planned, limit, source)] if planned > limit + PLAN_TOLERANCE else []
+    facts = [
+        f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")
+    ]
+    method, angle, tolerance = "route", None, PLAN_TOLERANCE
+    if measure is not None:
+        angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
+        said, faults = _evidence(shape, i, measure, limit)
+        wrong += faults
+        facts += said
+        method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"
+        if angle is None:
+            method = "not flown"
+    ok: bool | None = not wrong
+    if measure is not None and not measure.over:
+        facts.append("the flight did not get past it")
+        ok = None if ok else False
+    facts_text = "; ".join(facts)
+    reason = facts_text
+    if wrong:
+        reason = "; ".join(wrong) + (f" ({facts_text})" if measure is not None else "")
+    return make_finding(
+        "turn",
+        shape.waypoint(i),
+        ok=ok,
+        reason=reason,
+        planned=math.degrees(planned),
+        flown=None if angle is None else math.degrees(angle),
+        limit=math.degrees(limit),
+        source=source,
+        tolerance=math.degrees(tolerance),
+        margin=math.degrees(limit - (planned if angle is None else angle)),
+        unit="deg",
+        method=method,
+    )
+
+
+def _too_sharp(shape: RouteShape, i: int, planned: float, limit: float, source: str) -> str:
+    sharp = f"turns {math.degrees(planned):.1f}°"
+    if source == "scenario":
+        return f"{sharp}, beyond the scenario's {math.degrees(limit):.1f}°"
+    speed = float(max(shape.setup.route.airspeed[i - 1 : i + 1]))
+    if not math.isfinite(shape.radius[i]):
+        return f"{sharp} where the wind leaves no way along a leg at {speed:.0f} m/s"
+    takes = "no length of leg is enough"
+    if math.isfinite(shape.after[i]):
+        takes = f"that takes {shape.after[i]:.0f} m of each leg"
+        if shape.setup.route.fly_over[i]:
+            takes = f"flying over it takes {shape.after[i]:.0f} m of the next leg"
+    return (
+        f"{sharp} between legs of {shape.runs[i - 1]:.0f} m and {shape.runs[i]:.0f} m: at {speed:.0f} m/s and"
+        f" {math.degrees(shape.limits.max_bank):.0f}° bank (radius {shape.radius[i]:.0f} m) {takes}, and beside its"
+        f" neighbours there is room for {math.degrees(limit):.1f}°"
+    )
+
+
+def _evidence(shape: RouteShape, i: int, measure: TurnMeasure, limit: float) -> tuple[list[str], list[str]]:
+    """Flown evidence in words, and what of it is not good enough."""
+    said, wrong = [], []
+    turbulence = shape.setup.scenario.wind.turbulence
+    if measure.angle is not None and measure.tolerance is not None:
+        said.append(f"flown {math.degrees(measure.angle):.2f}°")
+        if measure.angle > limit + measure.tolerance:
+            wrong.append(f"flown course change {math.degrees(measure.angle):.1f}° beyond {math.degrees(limit):.1f}°")
+    if measure.peak_bank is not None and measure.held_bank is not None:
+        most = shape.limits.max_bank + BANK_TOLERANCE
+        # A gust's roll is not the turn's: in turbulence the mean over a second counts.
+        bank = measure.peak_bank if turbulence == "none" else measure.held_bank
+        said.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
+        if bank > most:
+            wrong.append(f"bank {math.degrees(bank):.1f}° beyond {math.degrees(most):.1f}°")
+    if measure.radius is not None and measure.radius < 10.0 * shape.radius[i]:
+        said.append(f"radius {measure.radius:.0f} m")
+    if measure.overshoot is not None:
+        said.append(f"overshoot {measure.overshoot:.1f} m")
+        if measure.overshoot > OVERSHOOT:
+            wrong.append(f"overshoots its arc by {measure.overshoot:.0f} m (at most {OVERSHOOT:.0f} m)")
+    if measure.settled is not None and measure.over:
+        said.append(f"settled to {measure.settled:.2f} m")
+        most = SETTLED + GUST_OFFSET[turbulence]
+        if measure.settled > most:
+            wrong.append(f"still {measure.settled:.1f} m off the next leg at its end (at most {most:.1f} m)")
+    if measure.full_circles:
+        wrong.append(f"{measure.full_circles} full circle(s) flown at the corner")
+    return said, wrong

@@ -1,0 +1,1 @@
+"""Benchmarks: each measures and records, none fails on an absolute time."""
