@@ -20,7 +20,8 @@ class Gains:
     reference_airspeed: the airspeed at which surface gains hold; they are scaled with dynamic pressure.
     cross_track_frequency, cross_track_damping, cross_track_integral: of the second-order cross-track law.
     intercept: steepest course to the path that it flies when far away.  turn_lead, turn_smoothing: how far ahead the
-    path's curvature is fed forward, and over how long it is averaged.  height_*: the same law upwards.  slope_lead: as turn_lead.
+    path's curvature is fed forward, and over how long it is averaged.  height_*: the same law upwards.  slope_lead: as
+    turn_lead.
     speed_gain, speed_integral: throttle per m/s.  throttle_per_slope: throttle per rad of climb.  slow_margin:
     below command less this, height gives way to speed.  roll_gain: roll rate per rad of roll error.
     roll_rate_gain, aileron_per_roll_rate, roll_integral: aileron per rad/s of roll rate error, per rad/s of
@@ -62,7 +63,7 @@ _UNITS = ("_rad_s", "_1_s3", "_1_s2", "_1_s", "_deg", "_mps", "_s")
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
-    """The gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry."""
+    """Read the gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry."""
     file = aircraft.folder / "gains.toml"
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
@@ -79,5 +80,7 @@ def load_gains(aircraft: Aircraft) -> Gains:
     wanted = [item.name for item in fields(Gains)]
     if sorted(values) != sorted(wanted):
         missing, unknown = sorted(set(wanted) - set(values)), sorted(set(values) - set(wanted))
-        raise FlightError(f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}")
+        raise FlightError(
+            f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
+        )
     return Gains(**values)

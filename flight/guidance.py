@@ -180,10 +180,9 @@ def _lateral(
     rate_gain = 2.0 * gains[G.CROSS_TRACK_DAMPING] * frequency
     most = speed * math.sin(gains[G.INTERCEPT])
     wanted_rate = min(most, max(-most, -cross * frequency * frequency / rate_gain))
-    if abs(off_course) > 0.5 * math.pi:
-        rate = math.copysign(speed, off_course)
-    else:
-        rate = speed * math.sin(off_course)
+    # Flying away from the course counts as flying square to it: the sine would fall again.
+    away = abs(off_course) > 0.5 * math.pi
+    rate = math.copysign(speed, off_course) if away else speed * math.sin(off_course)
     s = memory[M.DISTANCE]
     start = s + speed * gains[G.TURN_LEAD]
     curvature = mean_curvature(pieces, int(memory[M.PIECE]), start, start + speed * gains[G.TURN_SMOOTHING])
@@ -191,7 +190,7 @@ def _lateral(
     # The lift's horizontal part is square to the heading, the acceleration wanted is square to the course.
     crab = math.cos(wrap(ground_course - state[S.YAW]))
     wanted = math.atan((speed * speed * curvature + push) / (GRAVITY * max(0.5, crab)))
-    bank = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
+    bank: float = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
     if bank == wanted and abs(cross) < 20.0:
         memory[M.CROSS_TRACK_SUM] = min(40.0, max(-40.0, memory[M.CROSS_TRACK_SUM] + cross * dt))
     return bank

@@ -2,7 +2,7 @@
 
 A fly-by arc has the bank-limited radius for the highest ground speed on its way.  Where the legs are too short for
 their turns, arcs are drawn tighter than the bank limit so that the path stays whole: the flight will then leave it, and
-the verdict says so.  A fly-over waypoint is passed through: its corner stays sharp.
+the verdict says so.  A fly-over waypoint is passed through: its corner stays sharp, as do U-turns.
 """
 
 import math
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.guidance import profile
 from flight.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns
 from world.limits import Limits
@@ -19,8 +20,9 @@ Floats = NDArray[np.float64]
 
 # Vertical acceleration on a slope blend, m/s^2.
 BLEND_ACCELERATION = 1.0
-# A turn sharper than this is drawn as if it were this sharp: a U-turn has no tangent points.
-SHARPEST = math.radians(170.0)
+# Where the legs have no room for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
+# by most of the legs, and a U-turn has no arc at all.
+SHARPEST = math.radians(150.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,24 +74,25 @@ def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
         after = float(courses[leg + 1])
         place = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
         nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
-    return FlyByPath(np.array(pieces), _profile(nodes, limits, route), at)
+    return FlyByPath(np.array(pieces), _profile(nodes, limits, route), float(at))
 
 
-def _arcs(
-    route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats
-) -> tuple[Floats, Floats]:
+def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats]:
     """Tangent lengths and radii at each waypoint, (w,) m, shrunk where a leg has no room for them."""
     count = len(route.waypoints)
     tangents, radii = np.zeros(count), np.zeros(count)
     for i in range(1, count - 1):
-        if route.fly_over[i] or abs(turns[i - 1]) < 1e-6:
+        turn = abs(float(turns[i - 1]))
+        if route.fly_over[i] or turn < 1e-6:
             continue
         speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
         radius = limits.turn_radius(float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed)
-        half = math.tan(min(abs(float(turns[i - 1])), SHARPEST) / 2)
-        # Where the wind leaves no way along a leg there is no radius; the longest that fits is drawn.
-        tangents[i] = min(radius * half, float(min(runs[i - 1], runs[i])))
-        radii[i] = half
+        tangents[i] = radius * math.tan(turn / 2)
+    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST, [False]])
+    short = tangents[:-1] + tangents[1:] > runs
+    tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
+    # Where the wind leaves no way along a leg there is no radius; the longest that fits is drawn.
+    tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
     wanted = tangents.copy()
     for leg in range(len(runs)):
         both = wanted[leg] + wanted[leg + 1]
@@ -97,12 +100,8 @@ def _arcs(
             share = runs[leg] / both
             tangents[leg] = min(tangents[leg], wanted[leg] * share)
             tangents[leg + 1] = min(tangents[leg + 1], wanted[leg + 1] * share)
-    for i in range(1, count - 1):
-        if tangents[i] > 0.0:
-            # An arc closes only with the turn's own tangent, however sharp.
-            radii[i] = tangents[i] / math.tan(abs(float(turns[i - 1])) / 2)
-            if radii[i] < 1.0:
-                tangents[i] = radii[i] = 0.0
+    drawn = np.flatnonzero(tangents)
+    radii[drawn] = tangents[drawn] / np.tan(np.abs(turns[drawn - 1]) / 2)
     return tangents, radii
 
 
@@ -131,7 +130,7 @@ def sample_path(path: FlyByPath, step: float) -> Floats:
         row = path.pieces[max(0, int(np.searchsorted(path.pieces[:, 0], s, side="right")) - 1)]
         along = s - row[0]
         east, north = arc_point(row, along)
-        out[k] = east, north, profile_height(path.nodes, s)[0]
+        out[k] = east, north, profile(path.nodes, float(s))[0]
     return out
 
 
@@ -145,18 +144,3 @@ def arc_point(piece: Floats, along: float) -> tuple[float, float]:
         piece[2] + (math.cos(course) - math.cos(turned)) / curvature,
         piece[3] + (math.sin(turned) - math.sin(course)) / curvature,
     )
-
-
-def profile_height(nodes: Floats, s: float) -> tuple[float, float, float]:
-    """Height (m), slope (tangent) and its change per metre at distance ``s``."""
-    k = max(0, int(np.searchsorted(nodes[:, 0], s, side="right")) - 1)
-    before = nodes[k - 1, 2] if k else nodes[0, 2]
-    for i in (k, k + 1):
-        if i < len(nodes) and nodes[i, 3] > 0.0 and abs(s - nodes[i, 0]) < nodes[i, 3]:
-            before = nodes[i - 1, 2] if i else nodes[0, 2]
-            bend = (nodes[i, 2] - before) / (2.0 * nodes[i, 3])
-            x = s - nodes[i, 0] + nodes[i, 3]
-            slope = before + bend * x
-            height = nodes[i, 1] - before * nodes[i, 3] + before * x + 0.5 * bend * x * x
-            return height, slope, bend
-    return nodes[k, 1] + nodes[k, 2] * (s - nodes[k, 0]), nodes[k, 2], 0.0

@@ -34,12 +34,12 @@ class FlightSetup:
 
 
 def limits_of(setup: FlightSetup) -> Limits:
-    """The limits that this flight is judged against."""
+    """Make the limits that this flight is judged against."""
     return make_limits(setup.scenario, setup.envelope, setup.airspeed, setup.max_bank)
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """A scenario's limits, with the aircraft's where the scenario leaves them to it."""
+    """Make a scenario's limits, with the aircraft's where the scenario leaves them to it."""
 
     def number(value: float | str) -> float | None:
         return None if isinstance(value, str) else math.radians(value)

@@ -9,7 +9,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
-from flight.fdm import Fdm
+from flight.chart import Chart, Ground
+from flight.fdm import Fdm, Variation
 from flight.gains import load_gains
 from flight.guidance import MEMORY_SIZE, M, guide
 from flight.path import FlyByPath, fly_by_path
@@ -19,9 +20,9 @@ from flight.track import COLUMNS, Track, join_tracks
 from flight.trim import straight
 from flight.turbulence import GUST_STATES, start_gusts, step_gusts
 from world.errors import FlightError
-from world.frames import GeoOrigin, PolyMap, fit_polymap, polymap, to_geo, to_map
+from world.frames import polymap, to_geo
 from world.geometry import wrap
-from world.terrain import Heights, Terrain, ground_height
+from world.terrain import Heights, ground_height
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -60,14 +61,20 @@ class Flown:
 
 
 def simulate(
-    setup: FlightSetup, aircraft: Aircraft, *, sink: Sink | None = None, progress: Progress | None = None
+    setup: FlightSetup,
+    aircraft: Aircraft,
+    *,
+    sink: Sink | None = None,
+    progress: Progress | None = None,
+    variation: Variation | None = None,
 ) -> Flown:
     """Fly a setup from a trimmed start.  The same setup gives the same track, bit for bit.
 
     sink: is handed each second of the track as it is flown.  progress: is told the distance flown and the whole, m.
+    variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
     Raises FlightError for a flight that cannot start.
     """
-    flight = _Flight(setup, aircraft)
+    flight = _Flight(setup, aircraft, variation)
     blocks: list[Track] = []
     ended = ""
     while not ended:
@@ -85,21 +92,27 @@ def simulate(
 class _Flight:
     """One flight in progress."""
 
-    def __init__(self, setup: FlightSetup, aircraft: Aircraft) -> None:
+    def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None) -> None:
         scenario, limits = setup.scenario, limits_of(setup)
         self.path = fly_by_path(setup.route, limits)
         self.speeds = setup.route.airspeed
         gains = load_gains(aircraft)
         self.gains = gains.packed()
-        self.terrain = _Ground(scenario.terrain)
+        self.terrain = Ground(scenario.terrain)
         self.chart = Chart.around(setup)
         wind = scenario.wind
-        self.wind = np.array([wind.speed, wind.from_course + math.pi, wind.gradient, wind.reference_amsl, W20[wind.turbulence]])
-        self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=scenario.flight.motor_braking)
-        self.state, self.commands, self.row = np.zeros(STATE_SIZE), np.zeros(COMMAND_SIZE), np.zeros(ROW)
+        self.wind = np.array(
+            [wind.speed, wind.from_course + math.pi, wind.gradient, wind.reference_amsl, W20[wind.turbulence]]
+        )
+        braking = scenario.flight.motor_braking
+        self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking, variation=variation)
+        self.state, self.commands = np.zeros(STATE_SIZE), np.zeros(COMMAND_SIZE)
+        # What one tick leaves for the next: wind, gusts, ground and energy, see `_tick`.
+        self.air = np.zeros(7)
         self.memory = np.zeros(MEMORY_SIZE)
         self.memory[M.MAX_BANK] = limits.max_bank + BANK_RESERVE
-        self._start(setup, gains.reference_airspeed)
+        # Guidance knows the model; it is not told how the aircraft differs from it.
+        self._start(setup, gains.reference_airspeed, Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking))
         seed = wind.seed if wind.seed is not None else setup.seed
         # Stream 1 of the run's seed; the planner has stream 0.
         self.random = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
@@ -107,11 +120,10 @@ class _Flight:
         start_gusts(self.random.standard_normal(GUST_STATES), self.gusts)
         self.slowest = 0.94 * aircraft.stall_speed
         self.ticks = 0
-        self.energy = 0.0
         slow = max(5.0, float(self.speeds.min()) - wind.speed)
         self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / TICK)
 
-    def _start(self, setup: FlightSetup, reference: float) -> None:
+    def _start(self, setup: FlightSetup, reference: float, model: Fdm) -> None:
         points = setup.route.waypoints
         east, north, up = (float(value) for value in points[0])
         under = self.terrain.height(east, north)
@@ -120,35 +132,36 @@ class _Flight:
                 f"{setup.mission.source}: start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
             )
         lat, lon = to_geo(setup.scenario.origin, east, north)
-        wind_east, wind_north = setup.scenario.wind.at(up)
-        level = straight(self.fdm, reference, up)
+        level = straight(model, reference, up)
         if level is None:
             raise FlightError(f"{setup.aircraft}: no level flight at {reference:.1f} m/s and {up:.0f} m AMSL")
-        # Guidance tracks the path; the flight starts level, as a parabola from level leads into the first slope.
         step = points[1] - points[0]
-        course = math.atan2(step[0], step[1]) - self.chart.convergence(float(lat), float(lon))
+        # A map course is the true course and this.
+        turn = self.chart.convergence(float(lat), float(lon))
+        course = math.atan2(step[0], step[1]) - turn
         slope = math.atan2(step[2], math.hypot(step[0], step[1]))
-        try:
-            trimmed = self.fdm.start(
-                float(lat), float(lon), up, course, float(self.speeds[0]), slope,
-                (wind_north, wind_east, 0.0), 0.0 if math.isnan(under) else under,
-            )  # fmt: skip
-        except FlightError:
-            # A first leg steeper than the aircraft can is the verdict's business: start it level.
-            trimmed = self.fdm.start(
-                float(lat), float(lon), up, course, float(self.speeds[0]), 0.0,
-                (wind_north, wind_east, 0.0), 0.0 if math.isnan(under) else under,
-            )  # fmt: skip
+        # A speed or a first slope that the aircraft cannot hold is the verdict's business, not the start's: it starts
+        # at the nearest speed it can, and level.
+        aircraft = self.fdm.aircraft
+        speed = min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(self.speeds[0])))
+        east_wind, north_wind = setup.scenario.wind.at(up)
+        cos, sin = math.cos(turn), math.sin(turn)
+        wind = (north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0)
+        ground = 0.0 if math.isnan(under) else under
+        trimmed = None
+        for climb in (slope, 0.0):
+            try:
+                trimmed = self.fdm.start(float(lat), float(lon), up, course, speed, climb, wind, ground)
+                break
+            except FlightError as error:
+                problem = error
+        if trimmed is None:
+            raise FlightError(f"{setup.mission.source}: {problem}") from problem
         self.commands[:] = trimmed.commands()
         memory = self.memory
         memory[M.TRIM_ELEVATOR], memory[M.TRIM_ALPHA] = level.elevator, level.alpha
-        cruise = straight(self.fdm_for_trim(setup), float(self.speeds[0]), up)
-        memory[M.TRIM_THROTTLE] = (cruise or level).throttle
+        memory[M.TRIM_THROTTLE] = (straight(model, speed, up) or level).throttle
         memory[M.LAST_AIRSPEED] = -1.0
-
-    def fdm_for_trim(self, setup: FlightSetup) -> Fdm:
-        """A second instance: a trim ends the flight of the instance it is made with."""
-        return Fdm(self.fdm.aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking)
 
     def block(self, count: int) -> tuple[Floats, str]:
         """Fly up to ``count`` ticks: their rows, and how the flight ended ("" while it goes on)."""
@@ -157,17 +170,16 @@ class _Flight:
         fdm, state, commands, memory = self.fdm, self.state, self.commands, self.memory
         chart, ground = self.chart, self.terrain
         pieces, nodes = self.path.pieces, self.path.nodes
-        air = np.zeros(7)
+        air = self.air
         for k in range(count):
             fdm.read(state)
             status = _tick(
                 state, chart.position.packed, chart.angle.packed, ground.heights, ground.packed, pieces, nodes,
                 self.speeds, self.gains, memory, commands, self.wind, self.gusts, noise[k], self.slowest,
-                self.energy, self.ticks * TICK, rows[k], air,
+                self.ticks * TICK, rows[k], air,
             )  # fmt: skip
             if status == 2:
                 return rows[:k], _ENDS[2]
-            self.energy = air[6]
             if status:
                 return rows[: k + 1], _ENDS[status]
             self.ticks += 1
@@ -182,66 +194,6 @@ class _Flight:
         return rows, ""
 
 
-@dataclass(frozen=True, slots=True)
-class Chart:
-    """From geodetic radians to the map, fitted around one flight.
-
-    position: (latitude, longitude) to (east, north).  angle: to the map course of true north (rad), and 0.
-    """
-
-    position: PolyMap
-    angle: PolyMap
-
-    @staticmethod
-    def around(setup: FlightSetup) -> "Chart":
-        """Fit the area and the route with 5 km to spare; 0.1 mm and 1e-9 rad."""
-        origin: GeoOrigin = setup.scenario.origin
-        points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
-        low, high = points.min(axis=0) - 5000.0, points.max(axis=0) + 5000.0
-        outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
-        lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
-        bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
-
-        def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
-            return to_map(origin, np.degrees(phi), np.degrees(lam))
-
-        def angle(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
-            step = 1e-5
-            east0, north0 = position(phi - step, lam)
-            east1, north1 = position(phi + step, lam)
-            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(phi)
-
-        return Chart(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9))
-
-    def convergence(self, lat_deg: float, lon_deg: float) -> float:
-        """Map course of true north at a place, rad."""
-        return float(self.angle(math.radians(lat_deg), math.radians(lon_deg))[0])
-
-
-class _Ground:
-    """Terrain for the compiled tick; unknown ground is a raster without data."""
-
-    def __init__(self, terrain: Terrain | None) -> None:
-        self.known = terrain is not None
-        self.terrain = terrain
-        self.heights: Heights = terrain.heights if terrain is not None else np.full((2, 2), np.nan, dtype=np.float32)
-        if not self.heights.flags.writeable and terrain is None:
-            raise FlightError("internal: terrain")
-        self.heights.setflags(write=False)
-        self.packed = terrain.to_pixel.packed if terrain is not None else _nowhere()
-
-    def height(self, east: float, north: float) -> float:
-        return math.nan if self.terrain is None else float(self.terrain.height(east, north))
-
-
-def _nowhere() -> Floats:
-    packed = np.zeros((6, 2))
-    packed[1, :] = 1.0
-    packed[2, 0] = packed[4, 0] = -9.0
-    packed.setflags(write=False)
-    return packed
-
-
 def _as_track(rows: Floats) -> Track:
     values, at = [], 0
     for columns in COLUMNS.values():
@@ -254,11 +206,12 @@ def _as_track(rows: Floats) -> Track:
 def _tick(
     state: Floats, position: Floats, angle: Floats, heights: Heights, to_pixel: Floats, pieces: Floats, nodes: Floats,
     speeds: Floats, gains: Floats, memory: Floats, commands: Floats, wind: Floats, gusts: Floats, noise: Floats,
-    slowest: float, energy: float, time: float, row: Floats, air: Floats,
+    slowest: float, time: float, row: Floats, air: Floats,
 ) -> int:  # pragma: no cover - compiled  # fmt: skip
     """Judge the state, guide, make the wind for the next tick, and fill a row of the track.
 
-    air: (7,) wind north and east, gust north, east and down (m/s), ground below (m), energy used (Wh).
+    air: (7,) wind north and east, gust north, east and down (m/s), ground below (m, the last that was known), energy
+    used (Wh).
     Returns a key of `_ENDS`, or 0 to fly on.
     """
     for value in state:
@@ -277,11 +230,10 @@ def _tick(
     ground = ground_height(heights, to_pixel, east, north)
     clearance = up - ground
     guide(state, place, pieces, nodes, speeds, gains, memory, commands, TICK)
-    energy += state[S.POWER] * TICK / 3600.0
-    _wind(state, wind, gusts, noise, clearance, up, air)
+    _wind(state, wind, gusts, noise, clearance, up, turn, air)
     air[5] = ground if not math.isnan(ground) else air[5]
-    air[6] = energy
-    _fill(row, state, place, commands, memory, time, energy, clearance, cos, sin)
+    air[6] += state[S.POWER] * TICK / 3600.0
+    _fill(row, state, place, commands, memory, time, air[6], clearance, cos, sin)
     if clearance <= 0.0:
         return 3
     if abs(state[S.ROLL]) > STEEPEST_BANK:
@@ -293,11 +245,14 @@ def _tick(
 
 @njit(cache=True)
 def _wind(
-    state: Floats, wind: Floats, gusts: Floats, noise: Floats, clearance: float, up: float, air: Floats
+    state: Floats, wind: Floats, gusts: Floats, noise: Floats, clearance: float, up: float, turn: float, air: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Mean wind at this height and the next gust, north, east and down, into ``air``."""
+    """Mean wind at this height and the next gust, true north, east and down, into ``air``.
+
+    wind: speed, map course it blows to, gradient, reference height, w20.  turn: map course of true north, rad.
+    """
     speed = max(0.0, wind[0] + wind[2] * (up - wind[3]))
-    cos, sin = math.cos(wind[1]), math.sin(wind[1])
+    cos, sin = math.cos(wind[1] - turn), math.sin(wind[1] - turn)
     air[0], air[1] = speed * cos, speed * sin
     air[2] = air[3] = air[4] = 0.0
     if wind[4] > 0.0:

@@ -83,5 +83,5 @@ def join_tracks(parts: list[Track]) -> Track:
     """One track of parts that follow each other; an empty track for no parts."""
     if not parts:
         empty = [np.zeros((0, n)) if n > 1 else np.zeros(0) for n in COLUMNS.values()]
-        return Track(*empty)  # type: ignore[arg-type]
+        return Track(*empty)  # type: ignore[arg-type]  # Track gives each array its own type
     return Track(*(np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS))

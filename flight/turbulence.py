@@ -68,4 +68,5 @@ def _transverse(gusts: Floats, k: int, noise: float, decay: float) -> float:  # 
     gusts[k + 1] = decay * gusts[k + 1] + (1.0 - decay) * 0.5 * (before + gusts[k])
     root = math.sqrt(3.0)
     # var(sqrt(3) y1 + (1 - sqrt(3)) y2) = 2.
-    return (root * gusts[k] + (1.0 - root) * gusts[k + 1]) / math.sqrt(2.0)
+    gust: float = (root * gusts[k] + (1.0 - root) * gusts[k + 1]) / math.sqrt(2.0)
+    return gust

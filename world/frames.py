@@ -44,7 +44,7 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
 
 
 def crs_transformer(crs: str) -> Transformer:
-    """Transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
+    """Make the transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
 
     Heights are never passed through: without a geoid grid PROJ would return them unchanged, in silence.
     Raises ValueError for a CRS that PROJ does not know.

@@ -33,7 +33,8 @@ def signed_turns(waypoints: ArrayLike) -> Floats:
     before, after = legs[..., :-1, :], legs[..., 1:, :]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
     dot = before[..., 0] * after[..., 0] + before[..., 1] * after[..., 1]
-    return np.asarray(np.arctan2(-cross, dot))
+    # + 0.0 turns -0.0 into 0.0: atan2(0, -0.0) is pi, and a leg without length would count as a U-turn.
+    return np.asarray(np.arctan2(0.0 - cross, dot + 0.0))
 
 
 def leg_courses(waypoints: ArrayLike) -> Floats:
@@ -62,7 +63,7 @@ def path_length(waypoints: ArrayLike) -> Floats:
 
 @njit(cache=True)
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
-    """The same angle in [-pi, pi], rad."""
+    """Bring an angle into [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
@@ -72,7 +73,8 @@ def turning_angle(
 ) -> float:  # pragma: no cover - compiled
     """Course change at b on the way a, b, c: rad in [0, pi] (paper eq. 1, by atan2)."""
     ux, uy, vx, vy = bx - ax, by - ay, cx - bx, cy - by
-    return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
+    # + 0.0 for a leg without length: see `signed_turns`.
+    return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
 
 @njit(cache=True)
@@ -132,8 +134,9 @@ def segment_exposure(
     length = math.sqrt(length2)
     middle = -along / length2
     h = math.sqrt(max(CLOSEST * CLOSEST, start2 - middle * middle * length2))
-    total = 0.0
-    for sign, fraction in ((1.0, leave), (-1.0, enter)):
-        s = (fraction - middle) * length
-        total += sign * (s / (2.0 * h * h * (h * h + s * s)) + math.atan(s / h) / (2.0 * h * h * h))
+    s1, s2 = (enter - middle) * length, (leave - middle) * length
+    # Differences in closed form: of a short segment far off, the two ends' values agree in all but the last digits.
+    piece = s2 - s1
+    first = piece * (h * h - s1 * s2) / ((h * h + s1 * s1) * (h * h + s2 * s2))
+    total = (first + math.atan2(h * piece, h * h + s1 * s2) / h) / (2.0 * h * h)
     return leave - enter, scale**4 * total / length

@@ -47,11 +47,11 @@ class Limits:
         return float(turn_radius_between(self.packed(airspeed), course_in, course_out, amsl))
 
     def packed(self, airspeed: float | None = None) -> Floats:
-        """The aircraft's side as one array, for the compiled functions.
+        """Pack the aircraft's side as one array, for the compiled functions.
 
         (3, 8 + h): row 0 holds airspeed, tan(max_bank), wind speed, wind direction (towards, rad), gradient,
-        reference height, the number of table heights, the gusts' standard deviation; from column 8 on, rows 0..2 hold the table's
-        heights (m), climb and descent angles to the air (rad) at this airspeed.
+        reference height, the number of table heights, the gusts' standard deviation; from column 8 on, rows 0..2 hold
+        the table's heights (m), climb and descent angles to the air (rad) at this airspeed.
         """
         speed = self.airspeed if airspeed is None else airspeed
         heights = self.envelope.amsl
@@ -77,7 +77,8 @@ class Limits:
 @njit(cache=True)
 def wind_speed_at(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
     """Mean wind speed at a height, m/s."""
-    return max(0.0, packed[0, 2] + packed[0, 4] * (amsl - packed[0, 5]))
+    speed: float = max(0.0, packed[0, 2] + packed[0, 4] * (amsl - packed[0, 5]))
+    return speed
 
 
 @njit(cache=True)
@@ -109,21 +110,25 @@ def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, 
 def turn_radius_between(
     packed: Floats, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
-    """Arc radius at the bank limit for the highest ground speed between two courses; inf where none is held.
+    """Arc radius at the bank limit for the highest ground speed between two courses; inf where one cannot be held.
 
     In turbulence a standard deviation of the gusts comes on top: airspeed, and with it the bank that an arc
     over the ground takes, swings by that much.
     """
     turn = wrap(course_out - course_in)
-    fastest = max(ground_speed_on(packed, course_in, amsl), ground_speed_on(packed, course_out, amsl))
+    before, after = ground_speed_on(packed, course_in, amsl), ground_speed_on(packed, course_out, amsl)
+    if math.isnan(before) or math.isnan(after):
+        return math.inf
+    fastest = max(before, after)
     # The highest ground speed is downwind, if the turn passes through that course.
     down = wrap(packed[0, 3] - course_in)
-    if (turn > 0.0 and 0.0 < down < turn) or (turn < 0.0 and turn < down < 0.0):
+    # A U-turn may be flown either way.
+    around = abs(turn) > math.pi - 1e-6
+    if around or (turn > 0.0 and 0.0 < down < turn) or (turn < 0.0 and turn < down < 0.0):
         fastest = max(fastest, ground_speed_on(packed, packed[0, 3], amsl))
-    if math.isnan(fastest):
-        return math.inf
     fastest += packed[0, 7]
-    return fastest * fastest / (GRAVITY * packed[0, 1])
+    radius: float = fastest * fastest / (GRAVITY * packed[0, 1])
+    return radius
 
 
 @njit(cache=True)

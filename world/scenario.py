@@ -1,18 +1,20 @@
 """A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
 
-from world.errors import ScenarioError
+from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
-from world.raster import open_raster, read_terrain, tile_bounds
+from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
 from world.scenario_file import (
     AreaTable,
     FlightTable,
@@ -23,7 +25,9 @@ from world.scenario_file import (
     ScenarioFile,
     TerrainTable,
     ThreatTable,
+    WindTable,
     check_scenario,
+    first_error,
     parse_scenario,
     read_scenario_text,
 )
@@ -32,6 +36,7 @@ from world.threats import Threats
 from world.wind import Wind
 
 Floats = NDArray[np.float64]
+Table = TypeVar("Table", bound=BaseModel)
 
 # Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
 MARGIN = 1000.0
@@ -73,13 +78,13 @@ class Scenario:
             object.__setattr__(self, name, array)
 
     def to_json(self) -> dict[str, Any]:
-        """The scenario as plain JSON data; `from_spec` reads it back."""
+        """Give the scenario as plain JSON data; `from_spec` reads it back."""
         return self.spec.model_dump(mode="json", exclude_none=True)
 
 
 @cache
 def embedded_scenarios() -> dict[str, ScenarioFile]:
-    """The scenarios that ship with planfly, by name, in a fixed order."""
+    """Read the scenarios that ship with planfly, by name, in a fixed order."""
     folder = resources.files("world") / "scenarios"
     found = {}
     for entry in sorted(folder.iterdir(), key=lambda item: (item.name != "jacksboro.toml", item.name)):
@@ -98,7 +103,11 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
         entry = resources.files("world") / "scenarios" / f"{name_or_path}.toml"
         return from_spec(parse_scenario(entry.read_text(encoding="utf-8"), name_or_path), name_or_path, terrain=terrain)
     path = Path(name_or_path)
-    if not path.exists():
+    try:
+        missing = not path.exists()
+    except OSError:  # a name that is too long
+        missing = True
+    if missing:
         raise ScenarioError(f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)})")
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
@@ -127,17 +136,11 @@ def from_spec(
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
     if terrain is not None:
-        spec = spec.model_copy(update={"terrain": TerrainTable(kind="dem", path=terrain)})
-        base = None
+        spec, base = _with_terrain(spec, terrain, source, base), None
     raster = None
     if spec.terrain.kind == "dem" and ground is None:
-        raster = open_raster(str(spec.terrain.path), base)
-        if spec.terrain.sha256 not in (None, raster.sha256):
-            raise ScenarioError(f"{source}: terrain.path: {spec.terrain.path}: the file has changed since (its SHA-256 differs)")
-        path = str(spec.terrain.path)
-        if Path(base or "", path).is_file():
-            path = str(Path(base or "", path).resolve())
-        spec = spec.model_copy(update={"terrain": TerrainTable(kind="dem", path=path, sha256=raster.sha256)})
+        raster, table = _open_terrain(spec.terrain, source if terrain is None else "--terrain", base)
+        spec = spec.model_copy(update={"terrain": table})
     if spec.origin is not None:
         origin = GeoOrigin(spec.origin.lat_deg, spec.origin.lon_deg)
     else:
@@ -154,13 +157,47 @@ def from_spec(
         else:
             ground = _made_terrain(spec.terrain, bounds)
     # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
-    spec = spec.model_copy(
-        update={
-            "origin": OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
-            "area": (spec.area or AreaTable(east_m=list(bounds[0]), north_m=list(bounds[1]))),
-        }
+    place = _checked(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
+    area = spec.area or _checked(
+        lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
     )
+    spec = spec.model_copy(update={"origin": place, "area": area})
     return _assemble(spec, source, origin, bounds, ground, foreign)
+
+
+def _checked(make: Callable[[], Table], source: str) -> Table:
+    """Make a table of values that no file was checked for.  Raises ScenarioError."""
+    try:
+        return make()
+    except ValidationError as error:
+        raise ScenarioError(f"{source}: {first_error(error)}") from error
+
+
+def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
+    """Replace the terrain by a file, and keep the map where it is: its origin may be the old tile's centre."""
+    changes: dict[str, Any] = {
+        "terrain": _checked(lambda: TerrainTable(kind="dem", path=terrain), "--terrain"),
+    }
+    if spec.origin is None and spec.terrain.kind == "dem":
+        centre = _open_terrain(spec.terrain, source, base)[0].centre
+        changes["origin"] = _checked(
+            lambda: OriginTable(lat_deg=centre.lat_deg, lon_deg=centre.lon_deg), f"{source}: origin"
+        )
+    return spec.model_copy(update=changes)
+
+
+def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[RasterFile, TerrainTable]:
+    """Open a scenario's elevation file, and say where it was found and what its hash is."""
+    path = str(table.path)
+    try:
+        raster = open_raster(path, base)
+    except TerrainError as error:
+        raise TerrainError(f"{source}: terrain.path: {error}") from error
+    if table.sha256 not in (None, raster.sha256):
+        raise ScenarioError(f"{source}: terrain.path: {path}: the file has changed since (its SHA-256 differs)")
+    if path not in EMBEDDED:
+        path = str(Path(base or "", path).resolve())
+    return raster, TerrainTable(kind="dem", path=path, sha256=raster.sha256)
 
 
 def _assemble(
@@ -206,14 +243,18 @@ def _assemble(
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
-    """The same scenario in another wind (m/s, rad); None keeps what it has."""
+    """Make the same scenario in another wind (m/s, rad); None keeps what it has.
+
+    Raises ScenarioError for a wind that a scenario file may not have either.
+    """
     table = scenario.spec.wind
     changes: dict[str, Any] = {}
     if speed is not None and from_course is not None:
         changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
     if turbulence is not None:
         changes["turbulence"] = turbulence
-    spec = scenario.spec.model_copy(update={"wind": table.model_copy(update=changes)})
+    changed = _checked(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
+    spec = scenario.spec.model_copy(update={"wind": changed})
     wind = replace(
         scenario.wind,
         speed=spec.wind.speed_mps,
@@ -243,7 +284,8 @@ def _position(table: PointTable, key: str, source: str, origin: GeoOrigin, groun
     under = float(ground.height(east, north)) if ground is not None else math.nan
     if math.isnan(under):
         raise ScenarioError(
-            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m: no terrain there to count a height from; give amsl_m"
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
+            " no terrain there to count a height from; give amsl_m"
         )
     return np.array([east, north, under + (table.height_m or 0.0)])
 
@@ -256,11 +298,15 @@ def _check_inside(
         if not low <= point[axis] <= high:
             raise ScenarioError(f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}")
     if not floor <= point[2] <= ceiling:
-        raise ScenarioError(f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}")
+        raise ScenarioError(
+            f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+        )
     if ground is not None:
         under = float(ground.height(point[0], point[1]))
         if point[2] <= under:
-            raise ScenarioError(f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m")
+            raise ScenarioError(
+                f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+            )
 
 
 def _threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:

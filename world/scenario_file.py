@@ -22,36 +22,40 @@ def _no_line_break(text: str) -> str:
     return text
 
 
-Metres = Annotated[float, Field(ge=-MAP_REACH, le=MAP_REACH)]
-Amsl = Annotated[float, Field(ge=-500.0, le=9000.0)]
-Height = Annotated[float, Field(ge=0.0, le=9000.0)]
-Latitude = Annotated[float, Field(ge=-89.0, le=89.0)]
-Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
-Course = Annotated[float, Field(ge=-360.0, le=360.0)]
-Radius = Annotated[float, Field(gt=0.0, le=200_000.0)]
+def _within(low: float, high: float, *, above: bool = False, below: bool = False, also: str = "") -> AfterValidator:
+    """Allow ``low``..``high``, without ``low`` if ``above`` and without ``high`` if ``below``; the error says so.
+
+    also: what else the field takes, for the message.
+    """
+
+    def check(value: float) -> float:
+        # Written so that NaN fails.
+        if (low < value if above else low <= value) and (value < high if below else value <= high):
+            return value
+        first, last = ("above " if above else ""), ("below " if below else "")
+        least, most = (x if isinstance(x, int) else f"{x:.12g}" for x in (low, high))
+        raise ValueError(f"allowed {first}{least}..{last}{most}{also}")
+
+    return AfterValidator(check)
+
+
+Metres = Annotated[float, _within(-MAP_REACH, MAP_REACH)]
+Amsl = Annotated[float, _within(-500.0, 9000.0)]
+Height = Annotated[float, _within(0.0, 9000.0)]
+Latitude = Annotated[float, _within(-89.0, 89.0)]
+Longitude = Annotated[float, _within(-180.0, 180.0)]
+Course = Annotated[float, _within(-360.0, 360.0)]
+Radius = Annotated[float, _within(0.0, 200_000.0, above=True)]
 Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_no_line_break)]
-Seed = Annotated[int, Field(ge=0, le=2**63 - 1)]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(_no_line_break)]
+Seed = Annotated[int, _within(0, 2**63 - 1)]
 Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 
 
 class _Table(BaseModel):
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _numbers_only(cls, values: Any) -> Any:
-        """Refuse booleans and quoted numbers where a number is meant; pydantic would take both."""
-        if isinstance(values, dict):
-            for key, value in values.items():
-                field = cls.model_fields.get(key)
-                if field is None:
-                    continue
-                numeric = any(kind in str(field.annotation) for kind in ("float", "int"))
-                if numeric and "bool" not in str(field.annotation) and isinstance(value, bool):
-                    raise ValueError(f"{key}: true/false where a number is expected")
-                if numeric and "str" not in str(field.annotation) and isinstance(value, str) and "Literal" not in str(field.annotation):
-                    raise ValueError(f"{key}: a text ({value[:40]!r}) where a number is expected")
-        return values
+    # Strict: pydantic would otherwise take true, "5" and "yes" for numbers and truths.  Each number states its own
+    # range, which NaN and the infinities are outside of.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class OriginTable(_Table):
@@ -66,15 +70,15 @@ class PeakTable(_Table):
 
     east_m: Metres
     north_m: Metres
-    height_m: Annotated[float, Field(gt=0.0, le=9000.0)]
-    sigma_m: Annotated[float, Field(ge=10.0, le=100_000.0)]
+    height_m: Annotated[float, _within(0.0, 9000.0, above=True)]
+    sigma_m: Annotated[float, _within(10.0, 100_000.0)]
 
 
 class TerrainTable(_Table):
     """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file."""
 
     kind: Literal["dem", "peaks", "flat", "none"]
-    path: Annotated[str, Field(min_length=1, max_length=4096)] | None = None
+    path: FilePath | None = None
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
     sha256: str | None = None
@@ -105,8 +109,14 @@ class AreaTable(_Table):
             low, high = getattr(self, key)
             if not high - low >= 100.0:
                 raise ValueError(f"{key}: [{low:g}, {high:g}]: the second must exceed the first by at least 100")
-        if self.ceiling_amsl_m is not None and self.floor_amsl_m is not None and self.ceiling_amsl_m <= self.floor_amsl_m:
-            raise ValueError(f"ceiling_amsl_m: {self.ceiling_amsl_m:g}: must be above floor_amsl_m {self.floor_amsl_m:g}")
+        if (
+            self.ceiling_amsl_m is not None
+            and self.floor_amsl_m is not None
+            and self.ceiling_amsl_m <= self.floor_amsl_m
+        ):
+            raise ValueError(
+                f"ceiling_amsl_m: {self.ceiling_amsl_m:g}: must be above floor_amsl_m {self.floor_amsl_m:g}"
+            )
         return self
 
 
@@ -163,35 +173,37 @@ class ThreatTable(PointTable):
         return self
 
 
-Angle = Annotated[float, Field(gt=0.0, lt=90.0)] | Literal["aircraft"]
+Angle = Annotated[float, _within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
 
 
 class LimitsTable(_Table):
     """[limits]: a number, or "aircraft" for what the envelope allows."""
 
-    max_turn_deg: Annotated[float, Field(gt=0.0, le=180.0)] | Literal["aircraft"] = "aircraft"
+    max_turn_deg: Annotated[float, _within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
+        "aircraft"
+    )
     max_climb_deg: Angle = "aircraft"
     max_dive_deg: Angle = "aircraft"
-    min_clearance_m: Annotated[float, Field(ge=0.0, le=5000.0)] = 30.0
+    min_clearance_m: Annotated[float, _within(0.0, 5000.0)] = 30.0
 
 
 class GoalsTable(_Table):
     """[planner] goals of the second level of preference."""
 
-    length_ratio: Annotated[float, Field(ge=1.0, le=100.0)] | None = None
-    kill_exposure: Annotated[float, Field(ge=0.0, le=1e9)] | None = None
+    length_ratio: Annotated[float, _within(1.0, 100.0)] | None = None
+    kill_exposure: Annotated[float, _within(0.0, 1e9)] | None = None
 
 
 class PlannerTable(_Table):
     """[planner]."""
 
     algorithm: Name | None = None
-    waypoints: Annotated[int, Field(ge=3, le=500)] = 12
-    population: Annotated[int, Field(ge=4, le=100_000)] = 200
-    generations: Annotated[int, Field(ge=0, le=100_000)] = 100
-    across_m: Annotated[float, Field(gt=0.0, le=MAP_REACH)] | None = None
+    waypoints: Annotated[int, _within(3, 500)] = 12
+    population: Annotated[int, _within(4, 100_000)] = 200
+    generations: Annotated[int, _within(0, 100_000)] = 100
+    across_m: Annotated[float, _within(0.0, MAP_REACH, above=True)] | None = None
     goals: GoalsTable = GoalsTable()
-    budget: Annotated[int, Field(ge=4, le=10**10)] | None = None
+    budget: Annotated[int, _within(4, 10**10)] | None = None
     seed: Seed | None = None
 
 
@@ -199,20 +211,20 @@ class FlightTable(_Table):
     """[flight]."""
 
     aircraft: Name = "aerosonde"
-    airspeed_mps: Annotated[float, Field(ge=15.0, le=60.0)] | None = None
-    max_bank_deg: Annotated[float, Field(ge=5.0, le=60.0)] = 30.0
+    airspeed_mps: Annotated[float, _within(15.0, 60.0)] | None = None
+    max_bank_deg: Annotated[float, _within(5.0, 60.0)] = 30.0
     guidance: Literal["path"] = "path"
     fly_over: bool = False
     motor_braking: bool = False
-    battery_wh: Annotated[float, Field(gt=0.0, le=100_000.0)] | None = None
+    battery_wh: Annotated[float, _within(0.0, 100_000.0, above=True)] | None = None
 
 
 class WindTable(_Table):
     """[wind]: gradient in m/s per metre of height above the start."""
 
-    speed_mps: Annotated[float, Field(ge=0.0, le=40.0)] = 0.0
+    speed_mps: Annotated[float, _within(0.0, 40.0)] = 0.0
     from_deg: Course = 0.0
-    gradient: Annotated[float, Field(ge=-0.05, le=0.05)] = 0.0
+    gradient: Annotated[float, _within(-0.05, 0.05)] = 0.0
     turbulence: Literal["none", "light", "moderate"] = "none"
     seed: Seed | None = None
 
@@ -247,9 +259,11 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    # Beside its own TOMLDecodeError: a number of thousands of digits, and brackets within brackets without end.
+    except (ValueError, RecursionError) as error:
         raise ScenarioError(f"{source}: not valid TOML: {_line(error)}") from error
-    if data.get("terrain") == {"kind": "none"}:
+    terrain = data.get("terrain")
+    if isinstance(terrain, dict) and terrain.get("kind") == "none":
         raise ScenarioError(f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"')
     return check_scenario(data, source)
 
@@ -265,11 +279,11 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
 
 
 def read_scenario_text(path: Path) -> str:
-    """The text of a scenario file.  Raises ScenarioError if it is missing, too large or not UTF-8."""
+    """Read the text of a scenario file.  Raises ScenarioError if it is missing, too large or not UTF-8."""
     try:
         if path.stat().st_size > 16 * 2**20:
             raise ScenarioError(f"{path}: {path.stat().st_size:,} bytes: a scenario file has at most 16 MiB")
-        return path.read_text(encoding="utf-8")
+        return path.read_text(encoding="utf-8-sig")
     except OSError as error:
         raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -277,21 +291,24 @@ def read_scenario_text(path: Path) -> str:
 
 
 def first_error(error: ValidationError) -> str:
-    """The first of a pydantic error's findings as ``key: value: what is allowed``."""
+    """Give the first of a pydantic error's findings as ``key: value: what is allowed``."""
     found = error.errors(include_url=False)
     first = found[0]
     # A union reports every branch; the branch's tag is not a key of the file.
-    keys = [str(part) for part in first["loc"] if not str(part).startswith(("constrained", "literal", "function-", "float", "int"))]
+    parts = [str(part) for part in first["loc"]]
+    keys = [part for part in parts if part not in ("float", "int") and not part.startswith(("function-", "literal["))]
     message = first["msg"].removeprefix("Value error, ")
     value = first.get("input")
     shown = "" if isinstance(value, dict | list) else f": {_shown(value)}"
     if first["type"] == "extra_forbidden":
         message = "unknown key"
         shown = ""
+        keys = parts
     if first["type"] == "missing":
         shown = ""
     more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
-    return f"{'.'.join(keys) or 'file'}{shown}: {message}{more}"
+    named = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
+    return f"{named or 'file'}{shown}: {message}{more}"
 
 
 def _shown(value: Any) -> str:

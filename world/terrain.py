@@ -19,6 +19,8 @@ Heights = NDArray[np.float32]
 # Segments are cut into pieces no longer than this (m) before they count as straight in the raster's grid: at
 # 60 degrees latitude a 500 m piece bows by 9 mm.
 STRAIGHT_PIECE = 500.0
+# What the map of positions to pixels may be out by: a place on the edge is not outside for it (pixels).
+EDGE = 2e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,9 +65,9 @@ class Terrain:
 
 @njit(cache=True)
 def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
-    """Bilinear height at fractional pixel coordinates; NaN outside the outermost pixel centres."""
+    """Bilinear height at fractional pixel coordinates; NaN further than `EDGE` outside the outermost pixel centres."""
     rows, cols = heights.shape
-    if not (0.0 <= col <= cols - 1 and 0.0 <= row <= rows - 1):
+    if not (-EDGE <= col <= cols - 1 + EDGE and -EDGE <= row <= rows - 1 + EDGE):
         return math.nan
     i = min(int(row), rows - 2)
     j = min(int(col), cols - 2)
@@ -73,7 +75,8 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
     u = col - j
     top = heights[i, j] * (1.0 - u) + heights[i, j + 1] * u
     low = heights[i + 1, j] * (1.0 - u) + heights[i + 1, j + 1] * u
-    return top * (1.0 - v) + low * v
+    height: float = top * (1.0 - v) + low * v
+    return height
 
 
 @njit(cache=True)
@@ -96,7 +99,7 @@ def segment_clearance(
     heights: Heights, packed: Floats, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Smallest height above the bilinear ground on a-b and its fraction; (NaN, fraction) off the raster."""
-    pieces = max(1, int(math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE)))
+    pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
     best = math.inf
     best_at = 0.0
     col1, row1 = polymap(packed, a[0], a[1])
@@ -130,7 +133,7 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """The same on a piece that is straight in pixels: within a cell the height difference is a parabola."""
+    """Do the same on a piece that is straight in pixels: within a cell the height difference is a parabola."""
     dc, dr, du = col1 - col0, row1 - row0, up1 - up0
     t = 0.0
     g0 = up0 - pixel_height(heights, col0, row0)
@@ -161,9 +164,7 @@ def _piece_clearance(
     return best, best_at
 
 
-def gridded(
-    function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str
-) -> Terrain:
+def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: str, sha256: str, datum: str) -> Terrain:
     """Terrain on a regular map grid: heights (n, e) at north (n,) and east (e,), both increasing and even."""
     step_e, step_n = east[1] - east[0], north[1] - north[0]
     to_pixel = fit_polymap(
@@ -171,9 +172,7 @@ def gridded(
         [[east[0], east[-1]], [north[0], north[-1]]],
         1e-9,
     )
-    return Terrain(
-        function_heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum
-    )
+    return Terrain(function_heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum)
 
 
 def flat_terrain(bounds: Floats, amsl: float, margin: float) -> Terrain:

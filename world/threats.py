@@ -36,6 +36,6 @@ class Threats:
 
 
 def no_threats() -> Threats:
-    """An empty set."""
+    """Return an empty set."""
     none = np.zeros(0)
     return Threats((), np.zeros((0, 3)), none, none, none, none)
