@@ -4,8 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from aircraft.compiled import compiled
 
 Floats = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ class Envelope:
         )
 
 
-@njit(cache=True)
+@compiled
 def ground_slope(
     air_angle: float, airspeed: float, tailwind: float, crosswind: float
 ) -> float:  # pragma: no cover - compiled
@@ -82,7 +83,7 @@ def ground_slope(
     return math.atan2(airspeed * math.sin(air_angle), along)
 
 
-@njit(cache=True)
+@compiled
 def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  # pragma: no cover - compiled
     """Speed over the ground along a course that is held against the wind, m/s; NaN where it cannot be held."""
     square = airspeed**2 - crosswind**2
@@ -90,7 +91,7 @@ def ground_speed(airspeed: float, tailwind: float, crosswind: float) -> float:  
     return along if along > 0.0 else math.nan
 
 
-@njit(cache=True)
+@compiled
 def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compiled
     """Radius of a coordinated level turn, m, from speed (m/s) and bank (rad)."""
     return speed**2 / (GRAVITY * math.tan(bank))

@@ -9,9 +9,9 @@ import math
 from enum import IntEnum
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from aircraft.envelope import GRAVITY
 from flight.state import C, S
 from world.geometry import wrap
@@ -80,7 +80,7 @@ _AIRSPEED_LAG = 2.0
 _ALL_IT_HAS = 1.0
 
 
-@njit(cache=True)
+@compiled
 def project(piece: Floats, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Distance along a piece (m), cross-track error to the right (m) and the path's course there (rad)."""
     course, curvature = piece[4], piece[5]
@@ -102,7 +102,7 @@ def project(piece: Floats, east: float, north: float) -> tuple[float, float, flo
     return turned / abs(curvature), side * (1.0 / abs(curvature) - math.hypot(ve, vn)), here
 
 
-@njit(cache=True)
+@compiled
 def mean_curvature(pieces: Floats, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0
@@ -116,7 +116,7 @@ def mean_curvature(pieces: Floats, k: int, start: float, end: float) -> float:  
     return total / (end - start)
 
 
-@njit(cache=True)
+@compiled
 def profile(nodes: Floats, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Height (m), slope (tangent) and its change per metre of the height profile at distance ``s``."""
     k = 0
@@ -132,7 +132,7 @@ def profile(nodes: Floats, s: float) -> tuple[float, float, float]:  # pragma: n
     return nodes[k, 1] + nodes[k, 2] * (s - nodes[k, 0]), nodes[k, 2], 0.0
 
 
-@njit(cache=True)
+@compiled
 def guide(
     state: Floats,
     place: Floats,
@@ -167,7 +167,7 @@ def guide(
     _roll_and_yaw(state, gains, memory, commands, bank, dt)
 
 
-@njit(cache=True)
+@compiled
 def _lateral(
     state: Floats, place: Floats, pieces: Floats, gains: Floats, memory: Floats, course: float, dt: float
 ) -> float:  # pragma: no cover - compiled
@@ -196,7 +196,7 @@ def _lateral(
     return bank
 
 
-@njit(cache=True)
+@compiled
 def _vertical(
     state: Floats,
     place: Floats,
@@ -267,7 +267,7 @@ def _vertical(
         memory[M.SPEED_SUM] = min(60.0, max(-60.0, memory[M.SPEED_SUM] + slow * dt))
 
 
-@njit(cache=True)
+@compiled
 def _roll_and_yaw(
     state: Floats, gains: Floats, memory: Floats, commands: Floats, bank: float, dt: float
 ) -> None:  # pragma: no cover - compiled

@@ -5,10 +5,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
+from aircraft.compiled import compiled
 from flight.chart import Chart, Ground
 from flight.fdm import Fdm, Variation
 from flight.gains import load_gains
@@ -35,7 +35,7 @@ TICK = STEPS_A_TICK / FDM_HZ
 # Rows that are handed on at a time, s of flight.
 BLOCK = 1.0
 # Bank that guidance may add to the planned turns' to correct an error, rad.
-BANK_RESERVE = math.radians(3.0)
+BANK_RESERVE = math.radians(2.5)
 STEEPEST_BANK = math.radians(75.0)
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
 PATIENCE = 1.5
@@ -202,7 +202,7 @@ def _as_track(rows: Floats) -> Track:
     return Track(*values)  # type: ignore[arg-type]  # Track gives each array its own type
 
 
-@njit(cache=True)
+@compiled
 def _tick(
     state: Floats, position: Floats, angle: Floats, heights: Heights, to_pixel: Floats, pieces: Floats, nodes: Floats,
     speeds: Floats, gains: Floats, memory: Floats, commands: Floats, wind: Floats, gusts: Floats, noise: Floats,
@@ -243,7 +243,7 @@ def _tick(
     return 1 if memory[M.DONE] > 0.0 else 0
 
 
-@njit(cache=True)
+@compiled
 def _wind(
     state: Floats, wind: Floats, gusts: Floats, noise: Floats, clearance: float, up: float, turn: float, air: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -264,7 +264,7 @@ def _wind(
         air[4] = down
 
 
-@njit(cache=True)
+@compiled
 def _fill(
     row: Floats, state: Floats, place: Floats, commands: Floats, memory: Floats, time: float, energy: float,
     clearance: float, cos: float, sin: float,

@@ -8,8 +8,9 @@ small against the scales.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from aircraft.compiled import compiled
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ _FOOT = 0.3048
 GUST_STATES = 5
 
 
-@njit(cache=True)
+@compiled
 def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Length scales L_u = L_v and L_w (m), and sigma_u / sigma_w, at a height above ground (m).
 
@@ -30,7 +31,7 @@ def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no co
     return h / base**1.2 * _FOOT, h * _FOOT, base**-0.4
 
 
-@njit(cache=True)
+@compiled
 def start_gusts(noise: Floats, gusts: Floats) -> None:  # pragma: no cover - compiled
     """Draw the filters' stationary state from (5,) unit normals into (5,) ``gusts``."""
     gusts[0] = noise[0]
@@ -41,7 +42,7 @@ def start_gusts(noise: Floats, gusts: Floats) -> None:  # pragma: no cover - com
         gusts[2 + 2 * axis] = 0.5 * y1 + 0.5 * noise[2 + 2 * axis]
 
 
-@njit(cache=True)
+@compiled
 def step_gusts(
     gusts: Floats, noise: Floats, w20: float, height: float, airspeed: float, dt: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -61,7 +62,7 @@ def step_gusts(
     return sigma_u * gusts[0], sigma_u * out_v, sigma_w * out_w
 
 
-@njit(cache=True)
+@compiled
 def _transverse(gusts: Floats, k: int, noise: float, decay: float) -> float:  # pragma: no cover - compiled
     before = gusts[k]
     gusts[k] = decay * before + math.sqrt(1.0 - decay * decay) * noise

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from world.geometry import sphere_window
 from world.terrain import Heights, Terrain, segment_clearance
 
@@ -70,7 +70,7 @@ def _far(position: Floats, centre: Floats, radius: float) -> bool:
     return bool((good.min(axis=0) > centre + radius).any() or (good.max(axis=0) < centre - radius).any())
 
 
-@njit(cache=True)
+@compiled
 def _clearances(heights: Heights, packed: Floats, position: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
     count = max(0, position.shape[0] - 1)
     low = np.full(count, math.nan)
@@ -81,7 +81,7 @@ def _clearances(heights: Heights, packed: Floats, position: Floats) -> tuple[Flo
     return low, at
 
 
-@njit(cache=True)
+@compiled
 def _windows(position: Floats, centre: Floats, radius: float) -> tuple[Floats, Floats, Floats]:  # pragma: no cover
     count = position.shape[0] - 1
     closest = np.full(count, math.inf)

@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from flight.track import Track
 from logs.route_shape import RouteShape
 from logs.sweeps import path_clearance
@@ -161,7 +161,7 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
     return rows, distance
 
 
-@njit(cache=True)
+@compiled
 def _align(
     position: Floats, marks: Floats, step: int, reach: float
 ) -> tuple[Rows, NDArray[np.bool_]]:  # pragma: no cover - compiled

@@ -4,9 +4,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from aircraft.envelope import GRAVITY
 from logs.fits import CLEAR_OF_TURN, Fit, leg_slope, straight_span
 from logs.flown import Flown, along_across
@@ -158,7 +158,7 @@ def _speed_in_mean_wind(shape: RouteShape, flown: Flown, rows: slice) -> Floats:
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 
-@njit(cache=True)
+@compiled
 def _lifted(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
     """Airspeed gained from rising air (m/s) in rows 0..stop, as it fades, for an aircraft that holds its path."""
     out = np.zeros(stop)

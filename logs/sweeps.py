@@ -7,9 +7,9 @@ they would be passed at.  Both are judged by the same code, exact on each straig
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from world.geometry import segment_exposure, sphere_window
 from world.terrain import segment_clearance
 
@@ -24,7 +24,7 @@ _JOINED = 16
 _FAR = 30.0
 
 
-@njit(cache=True)
+@compiled
 def path_clearance(
     heights: Heights, packed: Floats, points: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
@@ -39,7 +39,7 @@ def path_clearance(
     return low, at
 
 
-@njit(cache=True)
+@compiled
 def path_spheres(
     points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats
 ) -> Floats:  # pragma: no cover - compiled
@@ -72,7 +72,7 @@ def path_spheres(
     return out
 
 
-@njit(cache=True)
+@compiled
 def _boxes(points: Floats) -> Floats:  # pragma: no cover - compiled
     """Least and greatest corner of each block of segments, and its diagonal, (blocks, 7)."""
     segments = max(0, points.shape[0] - 1)
@@ -90,7 +90,7 @@ def _boxes(points: Floats) -> Floats:  # pragma: no cover - compiled
     return out
 
 
-@njit(cache=True)
+@compiled
 def _box_distances(box: Floats, centre: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Least and greatest distance of a box from a point."""
     low2 = 0.0
@@ -104,7 +104,7 @@ def _box_distances(box: Floats, centre: Floats) -> tuple[float, float]:  # pragm
     return math.sqrt(low2), math.sqrt(high2)
 
 
-@njit(cache=True)
+@compiled
 def _closest(points: Floats, time: Floats, block: int, centre: Floats, out: Floats) -> None:  # pragma: no cover
     """Bring the closest distance and its time up to date with one block."""
     for k in range(block * _BLOCK, min(points.shape[0] - 1, (block + 1) * _BLOCK)):
@@ -121,7 +121,7 @@ def _closest(points: Floats, time: Floats, block: int, centre: Floats, out: Floa
             out[3] = time[k] + f * (time[k + 1] - time[k])
 
 
-@njit(cache=True)
+@compiled
 def _inside(
     points: Floats, time: Floats, block: int, step: int, centre: Floats, radius: float, scale: float, out: Floats
 ) -> None:  # pragma: no cover - compiled

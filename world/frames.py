@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import ProjError
+
+from aircraft.compiled import compiled
 
 Floats = NDArray[np.float64]
 
@@ -124,7 +125,7 @@ def fit_polymap(
     return best
 
 
-@njit(cache=True)
+@compiled
 def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Both components of a packed `PolyMap` at one point (Horner's scheme)."""
     size = packed.shape[1]
@@ -143,7 +144,7 @@ def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragm
     return u, v
 
 
-@njit(cache=True)
+@compiled
 def _polymap_many(packed: Floats, x: Floats, y: Floats) -> Floats:  # pragma: no cover - compiled
     out = np.empty((2, x.size))
     for k in range(x.size):

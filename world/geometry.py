@@ -7,8 +7,9 @@ check of a flown track call the same code.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from aircraft.compiled import compiled
 
 Floats = NDArray[np.float64]
 
@@ -61,13 +62,13 @@ def path_length(waypoints: ArrayLike) -> Floats:
     return np.asarray(np.sqrt((legs**2).sum(axis=-1)).sum(axis=-1))
 
 
-@njit(cache=True)
+@compiled
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
     """Bring an angle into [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
-@njit(cache=True)
+@compiled
 def turning_angle(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float
 ) -> float:  # pragma: no cover - compiled
@@ -77,7 +78,7 @@ def turning_angle(
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
 
-@njit(cache=True)
+@compiled
 def sphere_window(
     a: Floats, b: Floats, centre: Floats, radius: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -107,7 +108,7 @@ def sphere_window(
     return math.sqrt(closest2), max(0.0, middle - half), min(1.0, middle + half)
 
 
-@njit(cache=True)
+@compiled
 def segment_exposure(
     a: Floats, b: Floats, centre: Floats, radius: float, scale: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

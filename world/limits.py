@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from world.geometry import wrap
 from world.wind import W20, Wind
@@ -74,14 +74,14 @@ class Limits:
         return packed
 
 
-@njit(cache=True)
+@compiled
 def wind_speed_at(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
     """Mean wind speed at a height, m/s."""
     speed: float = max(0.0, packed[0, 2] + packed[0, 4] * (amsl - packed[0, 5]))
     return speed
 
 
-@njit(cache=True)
+@compiled
 def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pragma: no cover - compiled
     """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
     wind = wind_speed_at(packed, amsl)
@@ -89,7 +89,7 @@ def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pra
     return ground_speed(packed[0, 0], wind * math.cos(angle), wind * math.sin(angle))
 
 
-@njit(cache=True)
+@compiled
 def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
     count = int(packed[0, 6])
@@ -106,7 +106,7 @@ def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, 
     return up, down
 
 
-@njit(cache=True)
+@compiled
 def turn_radius_between(
     packed: Floats, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
@@ -131,7 +131,7 @@ def turn_radius_between(
     return radius
 
 
-@njit(cache=True)
+@compiled
 def turn_tangents(packed: Floats, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
     """Length of leg that the fly-by arc at each waypoint uses on either side, (w,) m; 0 at the ends.
 

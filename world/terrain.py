@@ -8,9 +8,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from aircraft.compiled import compiled
 from world.frames import PolyMap, fit_polymap, polymap
 
 Floats = NDArray[np.float64]
@@ -63,7 +63,7 @@ class Terrain:
         return float(low), float(at)
 
 
-@njit(cache=True)
+@compiled
 def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
     """Bilinear height at fractional pixel coordinates; NaN further than `EDGE` outside the outermost pixel centres."""
     rows, cols = heights.shape
@@ -79,14 +79,14 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
     return height
 
 
-@njit(cache=True)
+@compiled
 def ground_height(heights: Heights, packed: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
     """Ground height at one map position; NaN outside the raster."""
     col, row = polymap(packed, east, north)
     return pixel_height(heights, col, row)
 
 
-@njit(cache=True)
+@compiled
 def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats) -> Floats:  # pragma: no cover
     out = np.empty(east.size)
     for k in range(east.size):
@@ -94,7 +94,7 @@ def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats)
     return out
 
 
-@njit(cache=True)
+@compiled
 def segment_clearance(
     heights: Heights, packed: Floats, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -119,7 +119,7 @@ def segment_clearance(
     return best, best_at
 
 
-@njit(cache=True)
+@compiled
 def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
     """Next fraction after t at which start + t * step is a whole number; inf if it never is."""
     if step == 0.0:
@@ -129,7 +129,7 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
     return (line - start) / step
 
 
-@njit(cache=True)
+@compiled
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flight.fdm import Fdm
 from flight.export import plan_mission
+from flight.fdm import Fdm
 from flight.simulate import FDM_HZ, simulate
 from logs.check import judge_flight
 from logs.reader import read_log
