@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from world.errors import MissionError, ScenarioError
 from world.scenario import Scenario, from_spec
 from world.scenario_file import first_error
+from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -69,8 +70,10 @@ class Plan:
     """A planned path.
 
     waypoints: (w, 3) world m.  violations: (4,) counts by `Violation`; objectives: (4,) by `Objective`; both
-    as the search saw them.  feasible: no violations and a clean certificate.  safe: feasible, and outside every missile sphere.
-    history: (g, 3) best length ratio, best kill exposure and smallest number of violations after each generation
+    on the paper's six points a leg, whatever the search looked at.  feasible: no violations and a clean certificate.
+    safe: feasible, and outside every missile sphere.
+    history: (g, 3) after each generation, of the best path yet: length ratio, kill exposure and violations (the
+    graded algorithms count kinds of violations).
     """
 
     scenario: Scenario
@@ -172,9 +175,12 @@ def plan_json(plan: Plan) -> str:
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def parse_plan(text: str, source: str, *, base: Path | None = None, terrain: str | None = None) -> Plan:
+def parse_plan(
+    text: str, source: str, *, base: Path | None = None, terrain: str | None = None, ground: Terrain | None = None
+) -> Plan:
     """Read the text of a ``plan.json``; ``terrain`` replaces its scenario's terrain by a file.
 
+    ground: terrain already at hand (from a log); then no elevation file is opened.
     Raises MissionError (or the scenario's own errors) with one line: file, field, value, what is allowed.
     """
     try:
@@ -188,7 +194,7 @@ def parse_plan(text: str, source: str, *, base: Path | None = None, terrain: str
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
     # The position of a scenario with its own terrain stays as planned, whatever terrain it is flown over.
-    scenario = from_spec(file.scenario, source, base=base, terrain=terrain)
+    scenario = from_spec(file.scenario, source, base=base, terrain=terrain, ground=ground)
     saved = file.certificate
     certificate = Certificate(
         turn=saved.turn_margin_rad,

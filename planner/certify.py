@@ -1,0 +1,141 @@
+"""The continuous check of a finished path: every leg and every fly-by arc, not six points a leg."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.corners import corner, corner_radii
+from planner.criteria import RESERVE_GROWTH, extended, settling_room, slope_limits
+from planner.plan import Certificate
+from planner.problem import SPARE, Problem
+from planner.rules import Rules
+from world.geometry import leg_runs, leg_slopes, sphere_window, turning_angles
+from world.limits import turn_tangents
+from world.terrain import segment_clearance
+
+Floats = NDArray[np.float64]
+
+# Rounding of a waypoint on a limit, rad and m.
+_EPSILON = 1e-9
+
+
+def certify(problem: Problem, waypoints: Floats) -> Certificate:
+    """Check a path (w, 3) exactly: turns, room for turns, slopes, clearance, map and missiles.
+
+    Clearance is exact for the bilinear terrain on the legs, and on the chords of the arcs that a fly-by turn
+    cuts at each corner; the distance to missiles is that of the same pieces to the spheres.
+    """
+    rules = problem.certified
+    problems: list[str] = []
+    turn, room = _turns(rules, waypoints, problems)
+    slope = _slopes(rules, waypoints, problems)
+    clearance = _clearance(rules, waypoints, problems)
+    bounds = _bounds(rules, waypoints, problems)
+    return Certificate(turn, room, slope, clearance, bounds, kill_distance(rules, waypoints), tuple(problems))
+
+
+def pieces(rules: Rules, waypoints: Floats) -> Iterator[tuple[str, Floats, Floats]]:
+    """Segments of the path and of its fly-by arcs: what it is ("leg 2"), and both ends (3,)."""
+    for i in range(len(waypoints) - 1):
+        yield f"leg {i}", waypoints[i], waypoints[i + 1]
+    radii = corner_radii(rules, waypoints)
+    for i in range(1, len(waypoints) - 1):
+        arc = corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        for k in range(max(1, len(arc) - 1)):
+            yield f"turn at waypoint {i}", arc[k], arc[min(k + 1, len(arc) - 1)]
+
+
+def kill_distance(rules: Rules, waypoints: Floats) -> float:
+    """Distance from the path to the surface of the nearest missile sphere, m: negative inside, inf without any."""
+    nearest = math.inf
+    armed = rules.threats[rules.threats[:, 3] > 0.0]
+    for _, a, b in pieces(rules, waypoints):
+        for unit in armed:
+            near, _, _ = sphere_window(a, b, unit[:3], unit[3])
+            nearest = min(nearest, near - unit[3])
+    return float(nearest)
+
+
+def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
+    way = extended(rules, waypoints)
+    allowed = rules.max_turn if rules.room else rules.max_turn + SPARE
+    margins = allowed - turning_angles(way)
+    spare = 0.0 if rules.room else SPARE
+    for i, margin in enumerate(margins):
+        if margin < spare - _EPSILON:
+            turned, most = math.degrees(allowed - margin), math.degrees(allowed - spare)
+            problems.append(f"waypoint {i}: turns {turned:.1f} deg, allowed {most:.1f} deg")
+    room = math.inf
+    if rules.room:
+        tangents = turn_tangents(rules.aircraft, way)[1:-1]
+        for i, run in enumerate(leg_runs(waypoints)):
+            need = tangents[i] + tangents[i + 1]
+            if need == 0.0:
+                continue
+            room = min(room, float(run - need))
+            settle = settling_room(float(need), float(run))
+            if need + settle > run + _EPSILON:
+                problems.append(f"leg {i}: {run:.0f} m long, its turns need {need:.0f} m and {settle:.0f} m to settle")
+    return float(margins.min(initial=math.inf)), room
+
+
+def _slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
+    least = math.inf
+    for i, slope in enumerate(leg_slopes(waypoints)):
+        climb, dive = slope_limits(rules, waypoints[i], waypoints[i + 1])
+        inside = min(climb - slope, dive + slope)
+        least = min(least, inside + rules.spare)
+        if inside < -_EPSILON:
+            word, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
+            steep, most = math.degrees(abs(slope)), math.degrees(limit)
+            problems.append(f"leg {i}: {word} {steep:.1f} deg, allowed {most:.1f} deg")
+    return float(least)
+
+
+def _clearance(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
+    least = math.inf
+    low: dict[str, float] = {}
+    for name, a, b in pieces(rules, waypoints):
+        height, _ = segment_clearance(rules.heights, rules.to_pixel, a, b)
+        if math.isnan(height):
+            low[name] = math.nan
+            least = math.nan
+            continue
+        margin = float(height) - rules.clearance
+        least = min(least, margin) if not math.isnan(least) else least
+        if margin < _reserve(rules, a, b) - _EPSILON and not low.get(name, math.inf) <= margin:
+            low[name] = margin
+    for name, margin in low.items():
+        if math.isnan(margin):
+            problems.append(f"{name}: leaves the terrain that is known")
+        else:
+            wanted = f"{rules.clearance:g} m and {rules.reserve:g} m in reserve wanted"
+            problems.append(f"{name}: {margin + rules.clearance:.1f} m above ground at its lowest, {wanted}")
+    return float(least)
+
+
+def _reserve(rules: Rules, a: Floats, b: Floats) -> float:
+    """Reserve wanted on a piece: fixed ends may have less, and it grows from where the piece is nearest to them.
+
+    It grows half as fast as a search asks, for what lies between the search's samples.
+    """
+    reserve = rules.reserve
+    for end, slack in ((rules.start, rules.start_slack), (rules.destination, rules.destination_slack)):
+        if slack < reserve:
+            flat = np.array([end[0], end[1], 0.0])
+            away, _, _ = sphere_window(np.array([a[0], a[1], 0.0]), np.array([b[0], b[1], 0.0]), flat, 0.0)
+            reserve = min(reserve, slack + 0.5 * RESERVE_GROWTH * away)
+    return float(reserve)
+
+
+def _bounds(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
+    low = np.array([rules.bounds[0, 0], rules.bounds[1, 0], rules.floor])
+    high = np.array([rules.bounds[0, 1], rules.bounds[1, 1], rules.ceiling])
+    margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
+    problems.extend(
+        f"waypoint {i}: {-margins[i]:.1f} m outside the area, floor or ceiling"
+        for i in np.nonzero(margins < -_EPSILON)[0]
+    )
+    return float(margins.min())

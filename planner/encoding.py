@@ -1,0 +1,171 @@
+"""Encodings: how a vector of numbers in a box becomes waypoints.
+
+`rotated` is the paper's idea (section III, eq. 12); `cartesian` and `polar` are what the paper compares it with.
+Lengths, angles and slopes survive the rotation, so nothing outside this file works in rotated axes except the
+grids that seed a search.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+# Lower end of a polar step, as a share of the mean leg: a zero step has no direction.
+_SHORTEST = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The rotated frame: `along` from start to destination on the plane, `across` to its left, `up` unchanged.
+
+    origin: (2,) m.  direction: (2,) unit vector.  length: horizontal distance D, m.
+    """
+
+    origin: Floats
+    direction: Floats
+    length: float
+
+    def rotate(self, points: ArrayLike) -> Floats:
+        """World (..., 3) to along, across, up (eq. 12)."""
+        points = np.asarray(points, dtype=np.float64)
+        east, north = points[..., 0] - self.origin[0], points[..., 1] - self.origin[1]
+        c, s = self.direction
+        return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
+
+    def restore(self, points: ArrayLike) -> Floats:
+        """Along, across, up (..., 3) to world: the inverse of `rotate`."""
+        points = np.asarray(points, dtype=np.float64)
+        along, across = points[..., 0], points[..., 1]
+        c, s = self.direction
+        return np.stack(
+            [self.origin[0] + c * along - s * across, self.origin[1] + s * along + c * across, points[..., 2]], axis=-1
+        )
+
+
+def rotated_frame(start: Floats, destination: Floats) -> Frame:
+    """Frame of a mission.  Raises ValueError if start and destination share a place on the map."""
+    step = destination[:2] - start[:2]
+    length = math.hypot(step[0], step[1])
+    if length == 0.0:
+        raise ValueError("start and destination have the same place: there is no direction along the path")
+    return Frame(np.array(start[:2]), step / length, length)
+
+
+@dataclass(frozen=True, slots=True)
+class Encoding:
+    """A box and the way from its vectors to paths.
+
+    lower, upper: (d,), d = 3(w - 2), three numbers a waypoint in flying order.  decode: (n, d) -> (n, w, 3)
+    world m, start and destination included.
+    """
+
+    name: str
+    waypoints: int
+    lower: Floats
+    upper: Floats
+    decode: Callable[[Floats], Floats]
+
+    def __post_init__(self) -> None:
+        """Lock the box."""
+        for name in ("lower", "upper"):
+            array = np.array(getattr(self, name), dtype=np.float64)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+@dataclass(frozen=True, slots=True)
+class Space:
+    """Where a path may go: its ends (3,), the map (2, 2), heights up[0]..up[1] and the reach across, all in m.
+
+    across: half-width of the box either side of the straight line, or None to take it from the map.
+    """
+
+    start: Floats
+    destination: Floats
+    bounds: Floats
+    up: tuple[float, float]
+    across: float | None = None
+
+
+def _with_ends(space: Space, inner: Floats) -> Floats:
+    count = len(inner)
+    ends = [np.broadcast_to(point, (count, 1, 3)) for point in (space.start, space.destination)]
+    return np.concatenate([ends[0], inner, ends[1]], axis=1)
+
+
+def rotated(space: Space, waypoints: int) -> Encoding:
+    """Paper's encoding: inner waypoint i lies in the i-th of w - 2 equal intervals along the way (section III)."""
+    frame = rotated_frame(space.start, space.destination)
+    edges = np.linspace(0.0, frame.length, waypoints - 1)
+    lower, upper = np.empty((waypoints - 2, 3)), np.empty((waypoints - 2, 3))
+    for i in range(waypoints - 2):
+        low, high = _across_span(frame, space, edges[i], edges[i + 1])
+        lower[i] = edges[i], low, space.up[0]
+        upper[i] = edges[i + 1], high, space.up[1]
+
+    def decode(vectors: Floats) -> Floats:
+        return _with_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
+
+    return Encoding("rotated", waypoints, lower.ravel(), upper.ravel(), decode)
+
+
+def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
+    """Vectors (n, d) of paths (n, w, 3) in the rotated encoding, clipped to its box."""
+    inner = rotated_frame(space.start, space.destination).rotate(paths[:, 1:-1])
+    return np.clip(inner.reshape(len(paths), -1), encoding.lower, encoding.upper)
+
+
+def _across_span(frame: Frame, space: Space, low: float, high: float) -> tuple[float, float]:
+    """Span across the line that the map covers between two distances along; +-across where that is given."""
+    if space.across is not None:
+        return -space.across, space.across
+    c, s = frame.direction
+    best_low, best_high = math.inf, -math.inf
+    for along in np.linspace(low, high, 9):
+        a, b = -math.inf, math.inf
+        for axis, (base, slope) in enumerate(((c * along, -s), (s * along, c))):
+            first = space.bounds[axis, 0] - frame.origin[axis] - base
+            last = space.bounds[axis, 1] - frame.origin[axis] - base
+            if abs(slope) > 1e-12:
+                a, b = max(a, min(first / slope, last / slope)), min(b, max(first / slope, last / slope))
+        best_low, best_high = min(best_low, a), max(best_high, b)
+    if not best_high - best_low >= 1.0:
+        return -1.0, 1.0
+    return best_low, best_high
+
+
+def cartesian(space: Space, waypoints: int) -> Encoding:
+    """Absolute east, north, up of each inner waypoint, anywhere on the map."""
+    low = np.array([space.bounds[0, 0], space.bounds[1, 0], space.up[0]])
+    high = np.array([space.bounds[0, 1], space.bounds[1, 1], space.up[1]])
+
+    def decode(vectors: Floats) -> Floats:
+        return _with_ends(space, vectors.reshape(len(vectors), waypoints - 2, 3))
+
+    return Encoding("cartesian", waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
+
+
+def polar(space: Space, waypoints: int) -> Encoding:
+    """Each inner waypoint as a step from the one before: r, theta, up.
+
+    theta: angle of the step from the direction start-destination, within +-pi, positive to the left.  r: from 5 %
+    to 200 % of the straight distance over the number of legs (the paper states no range).
+    """
+    frame = rotated_frame(space.start, space.destination)
+    mean = frame.length / (waypoints - 1)
+    low, high = np.array([_SHORTEST * mean, -math.pi, space.up[0]]), np.array([2.0 * mean, math.pi, space.up[1]])
+
+    def decode(vectors: Floats) -> Floats:
+        steps = vectors.reshape(len(vectors), waypoints - 2, 3)
+        along = np.cumsum(steps[..., 0] * np.cos(steps[..., 1]), axis=1)
+        across = np.cumsum(steps[..., 0] * np.sin(steps[..., 1]), axis=1)
+        return _with_ends(space, frame.restore(np.stack([along, across, steps[..., 2]], axis=-1)))
+
+    return Encoding("polar", waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
+
+
+ENCODINGS: dict[str, Callable[[Space, int], Encoding]] = {"rotated": rotated, "cartesian": cartesian, "polar": polar}

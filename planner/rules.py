@@ -1,0 +1,43 @@
+"""What the compiled judges are given: a scenario and its limits as numbers and arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Heights = NDArray[np.float32]
+
+
+class Rules(NamedTuple):
+    """What paths are judged against, in the form that the compiled functions take.
+
+    threats: (m, 7) east, north, up, kill radius and scale, detection radius and scale.  aircraft: packed limits.
+    max_turn: rad.  room: whether a leg must hold its turns.  climb, dive: rad, NaN to ask the aircraft.
+    spare: rad kept inside slope limits.  clearance, reserve: m, required and kept on top.  kill_margin: m.
+    pitch: m between terrain samples of the graded judge.
+    start_course, destination_course: rad or NaN.  start_slack, destination_slack: m of reserve at the ends.
+    """
+
+    heights: Heights
+    to_pixel: Floats
+    threats: Floats
+    aircraft: Floats
+    bounds: Floats
+    start: Floats
+    destination: Floats
+    floor: float
+    ceiling: float
+    max_turn: float
+    room: bool
+    climb: float
+    dive: float
+    spare: float
+    clearance: float
+    reserve: float
+    kill_margin: float
+    pitch: float
+    start_course: float
+    destination_course: float
+    start_slack: float
+    destination_slack: float

@@ -1,0 +1,96 @@
+"""UMDAc: the univariate marginal distribution algorithm for continuous variables, as ask and tell.
+
+Larrañaga and Lozano 2002; the paper's section IV.  It knows a box, samples and a ranking, and nothing of what
+they stand for.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+# Draws of a sample that falls outside the box before it is clipped to it.
+REDRAWS = 10
+
+
+class Umda:
+    """One run: keeps the better half of the population, samples the other half from its marginals.
+
+    lower, upper: (d,) box.  rank: (n, c) scores -> (n,) ranks, smaller is better.  population: even number of
+    rows.  initial: (population, d) first samples; None for uniform.  basis: (d, d) orthogonal matrix whose
+    columns are the directions in which the marginals are independent; None for the variables themselves.
+    floor: (d,) smallest standard deviation along each direction, or None.
+    """
+
+    def __init__(
+        self,
+        lower: Floats,
+        upper: Floats,
+        rank: Callable[[Floats], Ints],
+        population: int,
+        rng: np.random.Generator,
+        *,
+        initial: Floats | None = None,
+        basis: Floats | None = None,
+        floor: Floats | None = None,
+    ) -> None:
+        self.lower, self.upper = lower, upper
+        self._rank = rank
+        self._half = population // 2
+        self._rng = rng
+        self._basis = basis
+        self._floor = floor
+        if initial is None:
+            initial = rng.uniform(lower, upper, (population, lower.size))
+        self._asked = np.clip(initial, lower, upper)
+        self.samples: Floats = np.empty((0, lower.size))
+        self.scores: Floats | None = None
+
+    def ask(self) -> Floats:
+        """Rows (n, d) inside the box that want scores: the whole population first, then half of it."""
+        return self._asked
+
+    def tell(self, scores: Floats) -> None:
+        """Take the scores (n, c) of what was asked; keep the better half and sample the next rows."""
+        samples = np.concatenate([self.samples, self._asked])
+        known = scores if self.scores is None else np.concatenate([self.scores, scores])
+        # Equal ranks are ordered by a seeded draw, not by age.
+        order = np.lexsort((self._rng.random(len(known)), self._rank(known)))[: self._half]
+        self.samples, self.scores = samples[order], known[order]
+        self._asked = self._sample(len(samples) - self._half)
+
+    def _sample(self, count: int) -> Floats:
+        """Rows from independent Gaussians (maximum likelihood, 1/N), redrawn and then clipped to the box."""
+        kept = self.samples if self._basis is None else _project(self.samples, self._basis)
+        mean, deviation = kept.mean(axis=0), kept.std(axis=0)
+        if self._floor is not None:
+            deviation = np.maximum(deviation, self._floor)
+        drawn = self._rng.normal(mean, deviation, (count, mean.size))
+        if self._basis is None:
+            return self._redraw_each(drawn, mean, deviation)
+        return self._redraw_rows(drawn, mean, deviation, self._basis)
+
+    def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
+        for _ in range(REDRAWS):
+            rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
+            if rows.size == 0:
+                return drawn
+            drawn[rows, columns] = self._rng.normal(mean[columns], deviation[columns])
+        return np.clip(drawn, self.lower, self.upper)
+
+    def _redraw_rows(self, drawn: Floats, mean: Floats, deviation: Floats, basis: Floats) -> Floats:
+        out = _project(drawn, basis.T)
+        for _ in range(REDRAWS):
+            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
+            if rows.size == 0:
+                return out
+            out[rows] = _project(self._rng.normal(mean, deviation, (rows.size, mean.size)), basis.T)
+        return np.clip(out, self.lower, self.upper)
+
+
+def _project(rows: Floats, basis: Floats) -> Floats:
+    # einsum without optimisation sums in a fixed order; BLAS may not, and a plan must not depend on the machine.
+    return np.asarray(np.einsum("nd,dk->nk", rows, basis, optimize=False))
