@@ -14,12 +14,10 @@ from numpy.typing import NDArray
 from flight.guidance import profile
 from flight.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns
-from world.limits import Limits
+from world.limits import BLEND_ACCELERATION, Limits
 
 Floats = NDArray[np.float64]
 
-# Vertical acceleration on a slope blend, m/s^2.
-BLEND_ACCELERATION = 1.0
 # Where the legs have no room for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
 # by most of the legs, and a U-turn has no arc at all.
 SHARPEST = math.radians(150.0)

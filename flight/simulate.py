@@ -22,6 +22,7 @@ from flight.turbulence import GUST_STATES, start_gusts, step_gusts
 from world.errors import FlightError
 from world.frames import polymap, to_geo
 from world.geometry import wrap
+from world.streams import TURBULENCE, stream
 from world.terrain import Heights, ground_height
 from world.wind import W20
 
@@ -114,8 +115,7 @@ class _Flight:
         # Guidance knows the model; it is not told how the aircraft differs from it.
         self._start(setup, gains.reference_airspeed, Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking))
         seed = wind.seed if wind.seed is not None else setup.seed
-        # Stream 1 of the run's seed; the planner has stream 0.
-        self.random = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
+        self.random = stream(seed, TURBULENCE)
         self.gusts = np.zeros(GUST_STATES)
         start_gusts(self.random.standard_normal(GUST_STATES), self.gusts)
         self.slowest = 0.94 * aircraft.stall_speed

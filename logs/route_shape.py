@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flight.setup import FlightSetup, limits_of
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
-from world.limits import Limits, aircraft_slopes, ground_speed_on, turn_radius_between
+from world.limits import BLEND_ACCELERATION, Limits, aircraft_slopes, ground_speed_on, turn_radius_between
 
 Floats = NDArray[np.float64]
 
@@ -16,8 +16,6 @@ Floats = NDArray[np.float64]
 _U_TURN = math.pi - 1e-6
 # The distance by which a fly-by passes its waypoint is capped at this many radii (a turn of about 141 degrees).
 _LARGEST_CUT = 2.0
-# A change of slope is flown with this vertical acceleration or more, m/s^2.
-_BLEND_ACCELERATION = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +143,7 @@ def _blends(
             # The arc is shorter than its two tangents, so that its slope is steeper than the legs'.
             on_arc = (rise[i - 1] + rise[i]) * after[i] / arc
             steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
-        blend[i] = max(steps) * speed**2 / (2.0 * _BLEND_ACCELERATION)
+        blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
         sag[i] = 0.25 * max(steps) * blend[i]
     return blend, sag
 

@@ -3,22 +3,20 @@
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from planner.rules import Rules
 from world.geometry import turning_angle
-from world.limits import turn_tangents
+from world.limits import BLEND_ACCELERATION, turn_tangents
 
 Floats = NDArray[np.float64]
 
-# Vertical acceleration of the parabolas that blend slopes, m/s^2, as the guidance flies them.
-BLEND_ACCELERATION = 1.0
 # Chords of a corner's arc: at most this angle each; on a 160 m radius the arc leaves its chord by 1.4 m.
 ARC_STEP = math.radians(15.0)
 
 
-@njit(cache=True)
+@compiled
 def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:  # pragma: no cover
     """Vertices (k, 3) of the way that a flight takes past a waypoint, at least as low as the flight.
 
@@ -63,14 +61,14 @@ def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: floa
     return out
 
 
-@njit(cache=True)
+@compiled
 def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  # pragma: no cover - compiled
     out[row, 0] = east
     out[row, 1] = north
     out[row, 2] = up
 
 
-@njit(cache=True)
+@compiled
 def corner_radii(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compiled
     """Radius (m) of the fly-by arc at each waypoint (w,); 0 at the ends and where the path goes straight on.
 

@@ -8,9 +8,9 @@ a constraint is missed instead of how often.
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from planner.corners import corner, corner_radii
 from planner.rules import Rules
 from world.frames import polymap
@@ -30,7 +30,7 @@ ROOM_LENGTH = 20.0
 RESERVE_GROWTH = 0.05
 
 
-@njit(cache=True)
+@compiled
 def extended(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compiled
     """Path with a far point before the start and after the destination, on the courses asked for there.
 
@@ -52,7 +52,7 @@ def extended(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compil
     return out
 
 
-@njit(cache=True)
+@compiled
 def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, spare taken off."""
     climb, dive = rules.climb, rules.dive
@@ -69,7 +69,7 @@ def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # 
     return climb - rules.spare, dive - rules.spare
 
 
-@njit(cache=True)
+@compiled
 def slope_excess(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
     """How far the leg a-b is too steep, as m of height per m of run; 0 where it is not (eq. 3-4)."""
     run = math.hypot(b[0] - a[0], b[1] - a[1])
@@ -79,13 +79,13 @@ def slope_excess(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cov
     return float(over / max(run, 1.0))
 
 
-@njit(cache=True)
+@compiled
 def settling_room(need: float, run: float) -> float:  # pragma: no cover - compiled
     """Length of a leg (m) that stays straight between its turns, so that the first has settled; need: what they use."""
     return ROOM_SHARE * run + min(ROOM_LENGTH, need)
 
 
-@njit(cache=True)
+@compiled
 def constraints(rules: Rules, path: Floats, counts: Ints, graded: Floats) -> None:  # pragma: no cover - compiled
     """Add the turn, slope and bounds violations of a path (w, 3) to counts (4,) and graded (4,).
 
@@ -120,7 +120,7 @@ def constraints(rules: Rules, path: Floats, counts: Ints, graded: Floats) -> Non
             graded[1] += over
 
 
-@njit(cache=True)
+@compiled
 def required_clearance(rules: Rules, east: float, north: float) -> float:  # pragma: no cover - compiled
     """Height above ground that a path needs here, m: the reserve grows from what the fixed ends leave of it."""
     keep = rules.reserve
@@ -133,7 +133,7 @@ def required_clearance(rules: Rules, east: float, north: float) -> float:  # pra
     return rules.clearance + keep
 
 
-@njit(cache=True)
+@compiled
 def _paper_point(
     units: Floats, east: float, north: float, up: float, ground: float, need: float, counts: Ints, objectives: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -149,7 +149,7 @@ def _paper_point(
     return max(0.0, up - ground) if ground == ground else 0.0
 
 
-@njit(cache=True)
+@compiled
 def paper_scores(rules: Rules, paths: Floats) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
     """Judge paths (n, w, 3) on six points a leg and the destination: counts (n, 4), objectives (n, 4) (eq. 1-11).
 
@@ -187,7 +187,7 @@ def paper_scores(rules: Rules, paths: Floats) -> tuple[Ints, Floats]:  # pragma:
     return counts, objectives
 
 
-@njit(cache=True)
+@compiled
 def straight(rules: Rules) -> float:  # pragma: no cover - compiled
     """Straight distance from start to destination in three dimensions, m."""
     total = 0.0
@@ -196,7 +196,7 @@ def straight(rules: Rules) -> float:  # pragma: no cover - compiled
     return math.sqrt(total)
 
 
-@njit(cache=True)
+@compiled
 def terrain_excess(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Depth below the required clearance along a-b, summed over samples (m x km), and the mean height."""
     col0, row0 = polymap(rules.to_pixel, a[0], a[1])
@@ -223,7 +223,7 @@ def terrain_excess(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  
     return depth * max(run, 1.0) / pieces / 1000.0, total / (pieces + 1)
 
 
-@njit(cache=True)
+@compiled
 def exposures(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Mean over the segment a-b of the kill and detection densities; kill radii grow by the margin."""
     kill = 0.0
@@ -239,7 +239,7 @@ def exposures(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pra
     return kill, seen
 
 
-@njit(cache=True)
+@compiled
 def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
     """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and fly-by arcs.
 
@@ -268,7 +268,7 @@ def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # prag
     return graded, objectives
 
 
-@njit(cache=True)
+@compiled
 def _add_segment(
     rules: Rules, a: Floats, b: Floats, graded: Floats, objectives: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -282,7 +282,7 @@ def _add_segment(
     return length
 
 
-@njit(cache=True)
+@compiled
 def _add_arc(rules: Rules, a: Floats, b: Floats, graded: Floats, objectives: Floats) -> None:  # pragma: no cover
     depth, _ = terrain_excess(rules, a, b)
     graded[2] += depth

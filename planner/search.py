@@ -20,6 +20,7 @@ from planner.umda import Umda
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
+from world.streams import PLANNER, stream
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -107,11 +108,11 @@ def plan_path(
     problem = make_problem(scenario, limits)
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     empty = _Archive(np.empty((0, encoding.lower.size)), np.empty((0, 8)))
-    run = _Run(problem, chosen, encoding, np.random.default_rng(seed), progress, empty)
-    # An end inside a missile's reach leaves no path outside it: then any certified one will do.
+    run = _Run(problem, chosen, encoding, stream(seed, PLANNER), progress, empty)
+    # No path is further from a missile's sphere than its own ends are.
     ends = kill_distance(problem.certified, np.stack([scenario.start, scenario.start]))
     ends = min(ends, kill_distance(problem.certified, np.stack([scenario.destination, scenario.destination])))
-    wanted = CERTIFIED_KILL_MARGIN if ends >= CERTIFIED_KILL_MARGIN else -math.inf
+    wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
     attempts = ATTEMPTS if chosen.seeded else ATTEMPTS[:1]
     best: tuple[Floats, Certificate] | None = None
     for number in range(len(attempts)):
@@ -150,6 +151,16 @@ def _check_options(scenario: Scenario) -> None:
     if table.budget is not None and table.budget < table.population:
         allowed = f"at least the population, {table.population}, is evaluated"
         raise ScenarioError(f"{scenario.name}: planner.budget: {table.budget}: {allowed}")
+    threats = scenario.threats
+    for name, end in (("start", scenario.start), ("destination", scenario.destination)):
+        outside = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
+        inside = np.flatnonzero((threats.kill_radius > 0.0) & (outside <= 0.0))
+        if inside.size:
+            unit = int(inside[0])
+            raise ScenarioError(
+                f"{scenario.name}: {name}: {-outside[unit]:.0f} m inside the kill radius of {threats.names[unit]} "
+                f"({threats.kill_radius[unit]:.0f} m): no path from there is safe"
+            )
 
 
 def _spent(run: _Run) -> bool:

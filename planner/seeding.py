@@ -9,9 +9,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from planner.criteria import exposures, required_clearance, slope_excess, slope_limits, terrain_excess
 from planner.encoding import Frame, rotated_frame
 from planner.rules import Rules
@@ -79,7 +79,7 @@ def grid_route(rules: Rules, frame: Frame, grid: Grid, used: list[Floats]) -> Fl
     return np.column_stack([along, grid.across[cells[:, 0]], grid.layers[cells[:, 1]]])
 
 
-@njit(cache=True)
+@compiled
 def _place(packed: Floats, along: float, across: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """World position of a rotated one; packed: origin, direction, length."""
     return (
@@ -88,7 +88,7 @@ def _place(packed: Floats, along: float, across: float) -> tuple[float, float]: 
     )
 
 
-@njit(cache=True)
+@compiled
 def _floors(rules: Rules, packed: Floats, stages: int, across: Floats) -> Floats:  # pragma: no cover - compiled
     """Lowest height allowed in each cell (stages + 1, across): highest ground on 3 x 3 samples, plus clearance."""
     step = packed[4] / stages
@@ -113,7 +113,7 @@ def _floors(rules: Rules, packed: Floats, stages: int, across: Floats) -> Floats
     return out
 
 
-@njit(cache=True)
+@compiled
 def _danger(
     rules: Rules, packed: Floats, stage: int, step: float, across: Floats, layers: Floats, out: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -135,7 +135,7 @@ def _danger(
                     out[y, z] += KILL_COST * (1.0 + 2.0 * (1.0 - math.sqrt(d2) / radius))
 
 
-@njit(cache=True)
+@compiled
 def _moves(rules: Rules, packed: Floats, step: float, layers: Floats) -> Ints:  # pragma: no cover - compiled
     """Layers that one step may climb and sink, (sideways, layers, 2), on its course and at its height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
@@ -154,7 +154,7 @@ def _moves(rules: Rules, packed: Floats, step: float, layers: Floats) -> Ints:  
     return out
 
 
-@njit(cache=True)
+@compiled
 def _step_on(
     cost: Floats, after: Floats, came: Ints, moves: Ints, lowest: Ints, dear: Floats, step: float, pitch: float
 ) -> None:  # pragma: no cover - compiled
@@ -176,7 +176,7 @@ def _step_on(
                         came[y2, z2] = y * high + z
 
 
-@njit(cache=True)
+@compiled
 def _dynamic(
     rules: Rules, packed: Floats, across: Floats, layers: Floats, floors: Floats, extra: Floats
 ) -> Ints:  # pragma: no cover - compiled
@@ -214,7 +214,7 @@ def _dynamic(
     return cells
 
 
-@njit(cache=True)
+@compiled
 def leg_cost(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
     """Cost of one leg, in m of path: its length and what it violates."""
     length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
@@ -227,7 +227,7 @@ def leg_cost(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover -
     return total
 
 
-@njit(cache=True)
+@compiled
 def _choose(rules: Rules, candidates: Floats) -> Ints:  # pragma: no cover - compiled
     """Which of the candidates (w, c, 3) world m to take at each waypoint, so that the legs cost least."""
     count, width, _ = candidates.shape
