@@ -1,0 +1,54 @@
+"""`steep` and `tight`: the flight fails where the plan asks too much, and only there."""
+
+import dataclasses
+import re
+
+import pytest
+
+from flight.export import plan_mission
+from logs.verdict import Verdict
+from planfly.pipeline import Vehicle, fly, load_vehicle, make_plan, make_setup
+from planner.plan import Plan
+from world.scenario import load_scenario
+
+
+def judge(plan: Plan, vehicle: Vehicle, first: int, last: int) -> Verdict:
+    """The verdict on waypoints first..last of a plan, flown as a mission of their own."""
+    mission = plan_mission(plan, vehicle.airspeed, vehicle.max_bank)
+    # Item 0 sets the speed; item k + 1 is waypoint k.
+    part = dataclasses.replace(mission, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
+    setup = make_setup(plan.scenario, vehicle, part, 1)
+    return fly(setup, vehicle, None)[2]
+
+
+def failing_legs(verdict: Verdict, legs: int) -> set[int]:
+    """Legs that a failed finding names, and those beside the waypoints that one names."""
+    out: set[int] = set()
+    for finding in verdict.findings:
+        named = re.match(r"(leg|waypoint) (\d+)", finding.where)
+        if finding.ok is False and named:
+            number = int(named[2])
+            out |= {number} if named[1] == "leg" else {number - 1, number}
+    return {leg for leg in out if 0 <= leg < legs}
+
+
+@pytest.mark.parametrize(("name", "rule"), [("steep", "slope"), ("tight", "turn")])
+def test_the_rest_of_it_flies(name: str, rule: str) -> None:
+    scenario = load_scenario(name)
+    vehicle = load_vehicle(scenario)
+    plan = make_plan(scenario, vehicle, 1)
+    assert plan.safe
+    legs = len(plan.waypoints) - 1
+    whole = judge(plan, vehicle, 0, legs)
+    assert not whole.flyable
+    assert rule in {finding.rule for finding in whole.findings if finding.ok is False}
+    bad = failing_legs(whole, legs)
+    assert 0 < len(bad) < legs - 2
+    flown = 0
+    starts = [leg for leg in range(legs) if leg not in bad and (leg == 0 or leg - 1 in bad)]
+    for first in starts:
+        last = min([leg for leg in bad if leg > first], default=legs)
+        verdict = judge(plan, vehicle, first, last)
+        assert verdict.flyable, (first, last, verdict.summary)
+        flown += last - first
+    assert flown == legs - len(bad)
