@@ -16,7 +16,7 @@ def progress(title: str) -> Iterator[Advance]:
         return
     from tqdm import tqdm
 
-    with tqdm(total=100, desc=title, bar_format="{desc:<22} {bar:30} {percentage:3.0f}% {postfix}", leave=True) as bar:
+    with tqdm(total=100, desc=title, bar_format="{desc:<22} {bar:30} {percentage:3.0f} %{postfix}", leave=True) as bar:
 
         def advance(done: float, whole: float, remark: str = "") -> None:
             share = 100.0 * done / whole if whole > 0 else 100.0
