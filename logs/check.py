@@ -7,8 +7,8 @@ not read.
 from flight.setup import FlightSetup
 from flight.track import Track
 from logs.flown import lay_track
-from logs.geometric import judge_geometry, judge_plan_only
-from logs.route_shape import route_shape
+from logs.geometric import geometric_findings, judge_geometry, judge_plan_only
+from logs.route_shape import RouteShape, route_shape
 from logs.rules_flight import (
     completion_findings,
     departure_findings,
@@ -19,8 +19,9 @@ from logs.rules_flight import (
 from logs.rules_slope import slope_findings
 from logs.rules_turn import turn_findings
 from logs.rules_world import bounds_findings, clearance_findings, threat_findings
-from logs.summary import summary_text
-from logs.verdict import Verdict
+from logs.suggest import with_suggestions
+from logs.summary import headline, summary_text
+from logs.verdict import Finding, Prediction, Verdict
 
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 
@@ -48,4 +49,23 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     )
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
-    return Verdict(findings, flyable, complete, summary_text(findings, flyable, setup, "flown"), "flown")
+    findings = with_suggestions(shape, flown, findings)
+    prediction = _predict(shape, findings) if envelope else None
+    summary = summary_text(findings, flyable, setup, "flown", prediction)
+    return Verdict(findings, flyable, complete, summary, "flown", prediction)
+
+
+def _predict(shape: RouteShape, flown: tuple[Finding, ...]) -> Prediction:
+    """What the geometric level says, and where it and the flight differ."""
+    predicted = geometric_findings(shape)
+    judged = {(item.rule, item.where): item.ok for item in flown}
+    words = {True: "passes", False: "fails"}
+    disagreements = []
+    for item in predicted:
+        other = judged.get((item.rule, item.where))
+        if item.ok is not None and other is not None and item.ok != other:
+            disagreements.append(
+                f"{item.rule} at {item.where} {words[item.ok]} by geometry and {words[other]} in flight"
+            )
+    flyable = not any(item.ok is False for item in predicted)
+    return Prediction(flyable, headline(predicted, flyable), tuple(disagreements))

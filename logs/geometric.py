@@ -3,20 +3,20 @@
 import math
 
 from flight.setup import FlightSetup
-from logs.route_shape import route_shape
+from logs.route_shape import RouteShape, route_shape
 from logs.rules_flight import energy_findings, speed_findings
 from logs.rules_slope import slope_findings
 from logs.rules_turn import turn_findings
 from logs.rules_world import bounds_findings, clearance_findings, threat_findings
+from logs.suggest import with_suggestions
 from logs.summary import headline, summary_text
 from logs.verdict import Finding, Verdict, make_finding
 from planner.plan import Plan, Violation
 
 
-def judge_geometry(setup: FlightSetup) -> Verdict:
-    """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
-    shape = route_shape(setup)
-    findings = (
+def geometric_findings(shape: RouteShape) -> tuple[Finding, ...]:
+    """Findings of a route's geometry against the aircraft's envelope."""
+    return (
         *turn_findings(shape, None, geometric=True),
         *slope_findings(shape, None, geometric=True),
         *clearance_findings(shape, None, geometric=True),
@@ -24,6 +24,14 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
         *bounds_findings(shape, None, geometric=True),
         *speed_findings(shape, None, geometric=True),
         *energy_findings(shape, None, geometric=True),
+    )
+
+
+def judge_geometry(setup: FlightSetup) -> Verdict:
+    """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
+    shape = route_shape(setup)
+    findings = (
+        *with_suggestions(shape, None, geometric_findings(shape)),
         *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible

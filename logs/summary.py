@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from flight.setup import FlightSetup
-from logs.verdict import Finding
+from logs.verdict import Finding, Prediction
 
 # Failed findings that the first line names.
 _NAMED = 4
@@ -77,7 +77,9 @@ def _clause(reason: str) -> str:
     return text if len(text) <= 80 else text[:77] + "..."
 
 
-def summary_text(findings: Sequence[Finding], flyable: bool, setup: FlightSetup, level: str) -> str:
+def summary_text(
+    findings: Sequence[Finding], flyable: bool, setup: FlightSetup, level: str, prediction: Prediction | None = None
+) -> str:
     """Write the summary: the answer; how the flight started; what was not judged; what is not flown as written."""
     lines = [headline(findings, flyable)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
@@ -90,4 +92,14 @@ def summary_text(findings: Sequence[Finding], flyable: bool, setup: FlightSetup,
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
+    if prediction is not None:
+        lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
     return "\n".join(lines)
+
+
+def _agreement(prediction: Prediction) -> str:
+    told = prediction.disagreements
+    if not told:
+        return "flight and geometry agree on every finding"
+    more = f", +{len(told) - _NAMED} more" if len(told) > _NAMED else ""
+    return "; ".join(told[:_NAMED]) + more

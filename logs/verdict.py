@@ -17,7 +17,8 @@ class Finding:
     where: "waypoint 3 (item 4)", "leg 2", "flight"; waypoints and legs count from 0, as `Track.leg` does.
     planned, flown, limit, tolerance, margin: in `unit`, None where there is no such number.  margin: how far inside
     the limit (negative: beyond), tolerance not counted.  limit_source: "scenario", "aircraft", or what set it.
-    method: how the number was got.  ok: None where it was not judged, with the reason.
+    method: how the number was got.  ok: None where it was not judged, with the reason.  suggestion: of a failed
+    finding, the smallest changes of the plan that would pass it, "" where none is known.
     """
 
     rule: str
@@ -32,6 +33,19 @@ class Finding:
     method: str
     ok: bool | None
     reason: str
+    suggestion: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Prediction:
+    """What the geometric level says of a mission that was flown.
+
+    headline: its answer in a line.  disagreements: one line for each finding that the two levels judge differently.
+    """
+
+    flyable: bool
+    headline: str
+    disagreements: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +55,7 @@ class Verdict:
     flyable: complete, and no finding failed.  complete: the plan was feasible, flown to its end, and recorded
     whole (at the geometric level: feasible, or a mission that a person brought).  summary: lines, of which the first
     answers the question.  level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible
-    plan, so nothing was flown).
+    plan, so nothing was flown).  prediction: of a flown verdict, what the geometric level says beside it.
     """
 
     findings: tuple[Finding, ...]
@@ -49,6 +63,7 @@ class Verdict:
     complete: bool
     summary: str
     level: str
+    prediction: Prediction | None = None
 
 
 def make_finding(
@@ -97,6 +112,7 @@ def verdict_json(verdict: Verdict) -> str:
         "flyable": verdict.flyable,
         "complete": verdict.complete,
         "summary": verdict.summary,
+        "geometric": None if verdict.prediction is None else asdict(verdict.prediction),
         "findings": [asdict(finding) for finding in verdict.findings],
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"

@@ -34,6 +34,8 @@ def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
     failed = [finding for finding in verdict.findings if finding.ok is False]
     for finding in failed[:12]:
         print(f"  failed  {finding.rule} at {finding.where}: {finding.reason}")
+        if finding.suggestion:
+            print(f"          would pass: {finding.suggestion}")
     if len(failed) > 12:
         print(f"  failed  and {len(failed) - 12} more")
     for rule, title in _RULE_TITLES.items():

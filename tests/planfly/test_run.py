@@ -51,7 +51,7 @@ def test_the_verdict_file(demo: Path) -> None:
     assert verdict["complete"] is True
     assert {finding["rule"] for finding in verdict["findings"]} == set(RULES)
     numbers = ["planned", "flown", "limit", "tolerance", "margin", "unit"]
-    keys = ["rule", "where", *numbers, "limit_source", "method", "ok", "reason"]
+    keys = ["rule", "where", *numbers, "limit_source", "method", "ok", "reason", "suggestion"]
     assert all(sorted(finding) == sorted(keys) for finding in verdict["findings"])
     assert all(finding["ok"] is True for finding in verdict["findings"])
 
