@@ -30,6 +30,12 @@ def _seed(text: str) -> int:
     return value
 
 
+def _count(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) <= 20):
+        raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 0 to 20 is expected")
+    return int(text)
+
+
 def _positive(text: str) -> float:
     try:
         value = float(text)
@@ -104,6 +110,13 @@ def _add_run_and_plan(command: _Command) -> None:
     run.add_argument("--out", metavar="DIR", help="where the files go (default: runs/<name>-seed<N>, replaced)")
     run.add_argument(
         "--seed", metavar="N", type=_seed, help="of planner and turbulence (default: the scenario's, or 1)"
+    )
+    run.add_argument(
+        "--refine",
+        metavar="N",
+        type=_count,
+        default=0,
+        help="where it does not fly, tighten and try again, up to N times",
     )
     _overwrite(run)
     plan = command("plan", "plan only", "planfly plan jacksboro --seed 3 --out plan.json")

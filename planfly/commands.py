@@ -7,13 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.files import prepare_folder, refuse_existing
+from planfly.files import default_folder, prepare_folder, refuse_existing, refuse_folder
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
 from world.scenario import Scenario, embedded_scenarios, load_scenario, with_wind
 
-RUNS = Path("runs")
 MCAP_MAGIC = b"\x89MCAP"
 
 
@@ -26,37 +25,9 @@ def scenarios(_args: argparse.Namespace) -> int:
 
 def run(args: argparse.Namespace) -> int:
     """``planfly run``: the whole chain."""
-    from flight.export import plan_mission
-    from logs.check import judge_plan_only
-    from planfly.pipeline import choose_seed, fly, load_vehicle, make_plan, make_setup
-    from planfly.results import print_verdict, write_missions, write_pictures, write_verdict
-    from planner.plan import plan_json
+    from planfly.run import run as run_chain
 
-    scenario = load_scenario(args.scenario)
-    seed = choose_seed(scenario, args.seed)
-    vehicle = load_vehicle(scenario)
-    folder = Path(args.out) if args.out else _default_folder(scenario.name, seed)
-    with progress(f"planning {scenario.name}") as advance:
-        plan = make_plan(scenario, vehicle, seed, advance=advance)
-    prepare_folder(folder, named=bool(args.out), overwrite=args.overwrite)
-    write_whole(folder / "plan.json", plan_json(plan))
-    mission = plan_mission(plan, vehicle.airspeed, vehicle.max_bank, source="mission.waypoints")
-    write_missions(mission, [folder / "mission.waypoints", folder / "mission.plan"])
-    setup = make_setup(scenario, vehicle, mission, seed, plan=plan)
-    if not plan.feasible:
-        verdict = judge_plan_only(plan)
-        write_verdict(folder / "verdict.json", verdict)
-        print_verdict(verdict, [])
-        print(f"results   {folder}/ (plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown)")
-        return NOT_FLYABLE
-    with progress("flying") as advance:
-        track, ended, verdict = fly(setup, vehicle, folder / "flight.mcap", advance)
-    write_verdict(folder / "verdict.json", verdict)
-    with progress("drawing"):
-        write_pictures(folder, setup, track, verdict, ended, f"planfly run {args.scenario} --seed {seed}")
-    print_verdict(verdict, setup.route.notes)
-    print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
-    return FLYABLE if verdict.flyable else NOT_FLYABLE
+    return FLYABLE if run_chain(args).flyable else NOT_FLYABLE
 
 
 def plan(args: argparse.Namespace) -> int:
@@ -67,7 +38,7 @@ def plan(args: argparse.Namespace) -> int:
 
     scenario = load_scenario(args.scenario)
     seed = choose_seed(scenario, args.seed)
-    target = _target(args.out, _default_folder(scenario.name, seed) / "plan.json", args.overwrite)
+    target = _target(args.out, default_folder(scenario.name, seed) / "plan.json", args.overwrite)
     vehicle = load_vehicle(scenario)
     with progress(f"planning {scenario.name}") as advance:
         made = make_plan(scenario, vehicle, seed, args.algorithm, advance)
@@ -106,7 +77,7 @@ def fly(args: argparse.Namespace) -> int:
     from planfly.results import print_verdict, print_warnings
 
     opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, wind=_wind(args))
-    default = _default_folder(opened.name, opened.setup.seed) / "flight.mcap"
+    default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
     target = _target(args.log, default, args.overwrite)
     print_warnings(opened.setup.mission.warnings)
     target.parent.mkdir(parents=True, exist_ok=True)
@@ -196,8 +167,10 @@ def report(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = read_log(source)
     folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-report")
+    if args.out:
+        refuse_folder(folder, args.overwrite)
     verdict = judge_flight(log.setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
-    prepare_folder(folder, named=bool(args.out), overwrite=args.overwrite)
+    prepare_folder(folder)
     with progress("drawing"):
         files = write_pictures(
             folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions, log.events
@@ -226,11 +199,6 @@ def _target(named: str | None, default: Path, overwrite: bool) -> Path:
     target = Path(named)
     refuse_existing(target, overwrite)
     return target
-
-
-def _default_folder(name: str, seed: int) -> Path:
-    safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
-    return RUNS / f"{safe}-seed{seed}"
 
 
 def _wind(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from world.errors import PlanflyError
 
+RUNS = Path("runs")
 RUN_FILES = (
     "plan.json",
     "mission.waypoints",
@@ -26,15 +27,26 @@ def refuse_existing(path: Path, overwrite: bool) -> None:
         raise PlanflyError(f"{path}: its folder {path.parent} does not exist")
 
 
-def prepare_folder(folder: Path, *, named: bool, overwrite: bool) -> None:
-    """Make a run's folder ready: refuse a named one that holds anything, and clear old results of ours.
-
-    Only files that a run writes are removed, never anything else that lies there.  Raises PlanflyError.
-    """
+def refuse_folder(folder: Path, overwrite: bool) -> None:
+    """Refuse a named target folder that is a file or holds anything.  Raises PlanflyError."""
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected")
-    if named and not overwrite and folder.is_dir() and any(folder.iterdir()):
+    if not overwrite and folder.is_dir() and any(folder.iterdir()):
         raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make a folder and clear old results of ours: files that a run writes, never anything else that lies there."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name in RUN_FILES:
-        (folder / name).unlink(missing_ok=True)
+    (folder / "rounds.json").unlink(missing_ok=True)
+    for place in (folder, *sorted(folder.glob("round-[0-9]*"))):
+        for name in RUN_FILES:
+            (place / name).unlink(missing_ok=True)
+        if place != folder and not any(place.iterdir()):
+            place.rmdir()
+
+
+def default_folder(name: str, seed: int) -> Path:
+    """Where results go that nobody named a place for: ``runs/<name>-seed<N>``."""
+    safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
+    return RUNS / f"{safe}-seed{seed}"
