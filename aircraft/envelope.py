@@ -44,9 +44,11 @@ class Envelope:
     def air_angles(self, airspeed: float, amsl: float) -> tuple[float, float]:
         """Steepest climb and descent relative to the air, rad, both positive, bilinear in the table.
 
-        NaN at an airspeed outside the table, and beside an entry without a trim.  Above and below the table's
-        heights its nearest edge counts.
+        NaN at an airspeed outside the table or below the slowest level flight; between that and the slowest trim of
+        the table the latter counts.  Above and below the table's heights its nearest edge counts.
         """
+        if not airspeed >= float(np.interp(amsl, self.amsl, self.level_speed_min)):
+            return math.nan, math.nan
         return (
             _bilinear(self.airspeed, self.amsl, self.climb, airspeed, amsl),
             _bilinear(self.airspeed, self.amsl, self.descent, airspeed, amsl),
@@ -99,4 +101,6 @@ def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compi
 
 def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
     rows = np.array([np.interp(y, ys, row) for row in table])
+    first = int(np.argmax(~np.isnan(rows)))
+    rows[:first] = rows[first]
     return float(np.interp(x, xs, rows, left=np.nan, right=np.nan))

@@ -33,16 +33,19 @@ class Chart:
     def around(setup: FlightSetup) -> "Chart":
         """Fit the area and the route with `SPARE` to spare; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
 
-        Raises FlightError where the map cannot be fitted: an area across the 180th meridian, or about a pole.
+        Raises FlightError where the map cannot be fitted: an area about a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
         low, high = points.min(axis=0) - SPARE, points.max(axis=0) + SPARE
         outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
         lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+        # Longitudes about the origin's, so that an area may lie across the 180th meridian.
+        middle = math.radians(origin.lon_deg)
+        lon = middle + (lon - middle + math.pi) % (2.0 * math.pi) - math.pi
         bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
         if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
-            raise FlightError(f"{setup.mission.source}: the area lies across the 180th meridian or a pole")
+            raise FlightError(f"{setup.mission.source}: the area lies about a pole")
 
         def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
             return to_map(origin, np.degrees(phi), np.degrees(lam))
@@ -63,7 +66,9 @@ class Chart:
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
         """Map course of true north at a place, rad."""
-        return float(self.angle(math.radians(lat_deg), math.radians(lon_deg))[0])
+        middle = float(self.angle.packed[0, 1])
+        lon = middle + math.remainder(math.radians(lon_deg) - middle, 2.0 * math.pi)
+        return float(self.angle(math.radians(lat_deg), lon)[0])
 
 
 class Ground:

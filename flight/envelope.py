@@ -16,9 +16,9 @@ from flight.trim import Floats, Trim, fastest, full_throttle, idle, slowest
 from world.files import write_whole
 
 # Any change of what the file holds or of how it is computed counts this up.
-_SCHEMA = 1
+_SCHEMA = 2
 _AIRSPEED = np.arange(16.0, 37.0, 2.0)
-_AMSL = np.arange(0.0, 4001.0, 500.0)
+_AMSL = np.arange(0.0, 9001.0, 500.0)
 _TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
 
 

@@ -147,10 +147,8 @@ class _Heights:
                 )
             return home.alt
         if math.isnan(under):
-            raise MissionError(
-                f"{self.source}: {_name(stop)}: height over home (frame {stop.frame}): the mission has no home height,"
-                " and no terrain is given to take one from"
-            )
+            self.notes.add("no home height, and no terrain to take one from: heights over home count from 0 m AMSL")
+            return 0.0
         self.notes.add(
             f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {under:.1f} m AMSL"
         )

@@ -21,7 +21,8 @@ from flight.trim import straight
 from flight.turbulence import GUST_STATES, start_gusts, step_gusts
 from world.errors import FlightError
 from world.frames import polymap, to_geo
-from world.geometry import wrap
+from world.geometry import leg_courses, wrap
+from world.limits import Limits, ground_speed_on
 from world.streams import TURBULENCE, stream
 from world.terrain import Heights, ground_height
 from world.wind import W20
@@ -42,6 +43,8 @@ STEEPEST_BANK = math.radians(75.0)
 PATIENCE = 1.5
 PATIENCE_SECONDS = 60.0
 ROW = sum(COLUMNS.values())
+# A flight that passes the end of its route further than this from it, m, has missed it.
+_FAR = 100.0
 
 _ENDS = {
     1: "completed",
@@ -49,6 +52,7 @@ _ENDS = {
     3: "ground contact",
     4: "departure: bank beyond 75 degrees",
     5: "departure: airspeed below the stall",
+    6: "missed: passed the end of the route more than 100 m from it",
 }
 
 
@@ -90,6 +94,16 @@ def simulate(
     return Flown(join_tracks(blocks), ended, flight.path)
 
 
+def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
+    """Least ground speed on any leg in the mean wind at its heights, m/s, at least 3."""
+    points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
+    speeds = []
+    for leg, airspeed in enumerate(setup.route.airspeed):
+        table = limits.packed(float(airspeed))
+        speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
+    return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0
+
+
 class _Flight:
     """One flight in progress."""
 
@@ -120,7 +134,7 @@ class _Flight:
         start_gusts(self.random.standard_normal(GUST_STATES), self.gusts)
         self.slowest = 0.94 * aircraft.stall_speed
         self.ticks = 0
-        slow = max(5.0, float(self.speeds.min()) - wind.speed)
+        slow = _slowest_leg(setup, limits)
         self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / TICK)
 
     def _start(self, setup: FlightSetup, reference: float, model: Fdm) -> None:
@@ -147,7 +161,7 @@ class _Flight:
         east_wind, north_wind = setup.scenario.wind.at(up)
         cos, sin = math.cos(turn), math.sin(turn)
         wind = (north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0)
-        ground = 0.0 if math.isnan(under) else under
+        ground = min(0.0, up - 1000.0) if math.isnan(under) else under
         trimmed = None
         for climb in (slope, 0.0):
             try:
@@ -217,6 +231,8 @@ def _tick(
     for value in state:
         if not math.isfinite(value):
             return 2
+    # About the chart's middle, so that a flight may cross the 180th meridian.
+    state[S.LONGITUDE] = position[0, 1] + wrap(state[S.LONGITUDE] - position[0, 1])
     east, north = polymap(position, state[S.LATITUDE], state[S.LONGITUDE])
     turn, _ = polymap(angle, state[S.LATITUDE], state[S.LONGITUDE])
     cos, sin = math.cos(turn), math.sin(turn)
@@ -240,7 +256,9 @@ def _tick(
         return 4
     if state[S.AIRSPEED] < slowest:
         return 5
-    return 1 if memory[M.DONE] > 0.0 else 0
+    if memory[M.DONE] > 0.0:
+        return 1 if abs(memory[M.CROSS_TRACK]) <= _FAR and abs(memory[M.HEIGHT_ERROR]) <= _FAR else 6
+    return 0
 
 
 @compiled

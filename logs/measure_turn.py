@@ -49,7 +49,9 @@ def measure_turn(shape: RouteShape, flown: Flown, i: int) -> TurnMeasure:
     entry = _first(before >= shape.runs[i - 1] - shape.before[i], middle - first)
     leaving = np.arange(first, last + 1) >= middle
     leave = _first(leaving & (along >= shape.after[i]), last - first)
-    end = _first(leaving & (along >= shape.runs[i] - shape.before[i + 1]), last - first)
+    # A neighbour that asks for more than the leg has gets half of it: it is at fault, not this turn.
+    room = min(float(shape.before[i + 1]), max(0.5 * shape.runs[i], shape.runs[i] - shape.after[i]))
+    end = _first(leaving & (along >= shape.runs[i] - room), last - first)
     around = flown.around(first + entry, first + max(entry, leave), 1.0)
     held, radius = _second_by_second(flown, around)
     angle, tolerance, fitted = _angle(shape, flown, i)

@@ -14,8 +14,8 @@ Floats = NDArray[np.float64]
 
 # A turn sharper than this has no useful tangent length; a U-turn's is infinite.
 _U_TURN = math.pi - 1e-6
-# The distance by which a fly-by passes its waypoint is capped at this many radii (a turn of about 141 degrees).
-_LARGEST_CUT = 2.0
+# The distance by which a fly-by passes its waypoint is capped at this many radii (a turn of about 176 degrees).
+_LARGEST_CUT = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +135,7 @@ def _blends(
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend, sag = np.zeros(len(points)), np.zeros(len(points))
-    speed = float(setup.route.airspeed.max()) + setup.scenario.wind.speed
+    speed = float(setup.route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
         steps = [abs(rise[i] - rise[i - 1])]
         arc = radius[i] * abs(turns[i])

@@ -57,7 +57,7 @@ def _waypoint(shape: RouteShape, flown: Flown | None, i: int, apexes: Floats) ->
     if flown is not None and not ok:
         reason = f"missed: {reason}; at most {limit:.0f} m and {room:.0f} m of height count as passed"
         if i > 0 and not flown.passed[i]:
-            reason = f"missed: the flight ended {away:.0f} m away"
+            reason = f"missed: the flight ended {math.hypot(away, off):.0f} m away"
     return make_finding(
         "waypoint",
         shape.waypoint(i),

@@ -23,6 +23,8 @@ Singles = NDArray[np.float32]
 OFF_SLOPE = math.radians(0.5)
 OFF_HEIGHT = 10.0
 OFF_HEIGHT_SHORT = 15.0
+# A leg within this (rad) of level.
+LEVEL = math.radians(0.5)
 # Throttle at a limit for this long in one leg (s), with the mean airspeed of as long off by this (m/s, and a gust's
 # standard deviation in turbulence), is not flyable: a moment's saturation is normal.
 SATURATED = 5.0
@@ -137,7 +139,7 @@ def _saturation(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float
     full = throttle >= _FULL
     idle = throttle <= _IDLE
     if not shape.setup.envelope.motor_braking:
-        idle |= track.current[rows] <= _NO_CURRENT
+        idle |= (track.current[rows] <= _NO_CURRENT) & ~full
     commanded = float(shape.setup.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
@@ -184,6 +186,9 @@ def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding
     planned = float(shape.slopes[leg])
     limit, source = slope_limit(shape, leg)
     sign = 1.0 if planned >= 0.0 else -1.0
+    if abs(planned) <= LEVEL and not _in_envelope(shape, leg):
+        # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
+        limit = max(limit, LEVEL)
     wrong = [_too_steep(shape, leg, limit, source)] if abs(planned) > limit + PLAN_TOLERANCE else []
     facts = [f"slope {math.degrees(planned):+.2f}°"]
     fit: Fit | None = None
@@ -217,6 +222,11 @@ def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding
         unit="deg",
         method=method,
     )
+
+
+def _in_envelope(shape: RouteShape, leg: int) -> bool:
+    low, high = shape.setup.envelope.level_speeds(float(shape.points[leg, 2]))
+    return low <= float(shape.setup.route.airspeed[leg]) <= high
 
 
 def _too_steep(shape: RouteShape, leg: int, limit: float, source: str) -> str:

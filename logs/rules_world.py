@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.path import fly_by_path, path_polyline
 from logs.flown import Flown
 from logs.route_shape import RouteShape
 from logs.sweeps import path_clearance, path_spheres
@@ -17,11 +18,12 @@ ROUNDING = 0.02
 HEIGHT_ROUNDING = 0.1
 
 
-def planned_times(shape: RouteShape) -> Floats:
-    """When each waypoint would be passed at the commanded airspeeds in the mean wind, (w,) s."""
-    # Where the wind leaves no way the airspeed stands in; the speed rule says so.
+def planned_path(shape: RouteShape) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Chain of points on the fly-by path (n, 3), the leg of each segment (n - 1,), and when each is passed (n,) s."""
+    points, legs = path_polyline(fly_by_path(shape.setup.route, shape.limits))
     speed = np.where(np.isfinite(shape.ground_speed), shape.ground_speed, shape.setup.route.airspeed)
-    return np.concatenate([[0.0], np.cumsum(shape.runs / speed)])
+    run = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    return points, legs, np.concatenate([[0.0], np.cumsum(run / speed[legs])])
 
 
 def clearance_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool = False) -> list[Finding]:
@@ -31,13 +33,15 @@ def clearance_findings(shape: RouteShape, flown: Flown | None, *, geometric: boo
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
         return [make_finding("clearance", "flight", ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
-    planned, _ = path_clearance(ground.heights, ground.to_pixel.packed, shape.points)
+    points, legs, _ = planned_path(shape)
+    low, _ = path_clearance(ground.heights, ground.to_pixel.packed, points)
+    planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(shape.legs)]
     out = []
     for leg in range(shape.legs):
         if geometric:
-            out.append(_planned_clearance(leg, float(planned[leg]), limit))
+            out.append(_planned_clearance(leg, planned[leg], limit))
         else:
-            out.append(_flown_clearance(shape, flown, leg, float(planned[leg]), limit))
+            out.append(_flown_clearance(shape, flown, leg, planned[leg], limit))
     return out
 
 
@@ -57,7 +61,7 @@ def _planned_clearance(leg: int, planned: float, limit: float) -> Finding:
         tolerance=HEIGHT_ROUNDING,
         margin=planned - limit,
         unit="m",
-        method="exact along the leg's line",
+        method="exact along the fly-by path",
     )
 
 
@@ -81,7 +85,7 @@ def _flown_clearance(shape: RouteShape, flown: Flown | None, leg: int, planned: 
         if ok is False:
             reason += f"; {limit:.0f} m are required"
     if planned < limit - HEIGHT_ROUNDING:
-        reason += f"; the leg's own line comes down to {planned:.1f} m"
+        reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
         "clearance",
         f"leg {leg}",
@@ -113,14 +117,14 @@ def threat_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool =
         reason = "the mission came without a scenario, so threats are not known"
         return [make_finding("threat", "flight", ok=None, reason=reason, unit="s")]
     threats = scenario.threats
-    times = planned_times(shape)
+    points, _, times = planned_path(shape)
     touched: list[Finding] = []
     nearest = math.inf
     for kind, radii, scales in (
         ("kill", threats.kill_radius, threats.kill_scale),
         ("detection", threats.detection_radius, threats.detection_scale),
     ):
-        plan = path_spheres(shape.points, times, threats.position, radii, scales)
+        plan = path_spheres(points, times, threats.position, radii, scales)
         track = np.full_like(plan, math.nan)
         if flown is not None:
             track = path_spheres(flown.track.position, flown.track.time, threats.position, radii, scales)

@@ -10,7 +10,7 @@ from logs.flown import Flown
 from logs.route_shape import RouteShape, turn_room
 from logs.rules_slope import slope_limit
 from logs.rules_turn import turn_limit
-from logs.rules_world import planned_times
+from logs.rules_world import planned_path
 from logs.sweeps import path_spheres
 from logs.verdict import Finding
 from world.limits import aircraft_slopes, turn_radius_between
@@ -149,7 +149,8 @@ def _threat(shape: RouteShape, flown: Flown | None, item: Finding) -> str:
     m = threats.names.index(name)
     one = slice(m, m + 1)
     spheres = (threats.position[one], threats.kill_radius[one], threats.kill_scale[one])
-    nearest = path_spheres(shape.points, planned_times(shape), *spheres)[0, 2]
+    points, _, times = planned_path(shape)
+    nearest = path_spheres(points, times, *spheres)[0, 2]
     if flown is not None and len(flown.track) > 1:
         nearest = min(nearest, path_spheres(flown.track.position, flown.track.time, *spheres)[0, 2])
     return f"pass {name} {threats.kill_radius[m] - nearest + SPARE_LENGTH:.0f} m further away"

@@ -81,7 +81,12 @@ def make_finding(
     unit: str = "",
     method: str = "",
 ) -> Finding:
-    """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite."""
+    """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite.
+
+    A finding that fails by other evidence than its number has no margin: the reason says what failed.
+    """
+    if ok is False and margin is not None and margin >= 0.0:
+        margin = None
     return Finding(
         rule=rule,
         where=where,

@@ -183,22 +183,25 @@ def _add_log_commands(command: _Command) -> None:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     args = build_parser().parse_args(argv)
-    # Imported here: pydantic and numba take longer than --help may.
-    from planfly.commands import COMMANDS
-    from world.errors import PlanflyError
-
     try:
-        return COMMANDS[args.command](args)
-    except PlanflyError as error:
-        return _fail(BAD_INPUT, error)
-    except BrokenPipeError:
-        # Whoever read our output has gone; there is nobody to tell.
-        sys.stderr.close()
-        return FAULT
+        return _command(args)
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, "interrupted")
+
+
+def _command(args: argparse.Namespace) -> int:
+    # Imported here: pydantic and numba take longer than --help may.
+    from planfly.commands import COMMANDS
+    from planfly.output import patient_output
+    from world.errors import PlanflyError
+
+    try:
+        with patient_output():
+            return COMMANDS[args.command](args)
+    except PlanflyError as error:
+        return _fail(BAD_INPUT, error)
 
 
 def _fail(code: int, message: object) -> int:

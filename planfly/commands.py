@@ -11,7 +11,7 @@ from planfly.files import default_folder, prepare_folder, refuse_existing, refus
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, with_wind
+from world.scenario import Scenario, embedded_scenarios, load_scenario, over_terrain, with_wind
 
 MCAP_MAGIC = b"\x89MCAP"
 
@@ -38,7 +38,7 @@ def plan(args: argparse.Namespace) -> int:
 
     scenario = load_scenario(args.scenario)
     seed = choose_seed(scenario, args.seed)
-    target = _target(args.out, default_folder(scenario.name, seed) / "plan.json", args.overwrite)
+    target = _target(args.out, default_folder(scenario.name, seed) / "plan.json", args, Path(args.scenario))
     vehicle = load_vehicle(scenario)
     with progress(f"planning {scenario.name}") as advance:
         made = make_plan(scenario, vehicle, seed, args.algorithm, advance)
@@ -46,7 +46,7 @@ def plan(args: argparse.Namespace) -> int:
     write_whole(target, plan_json(made))
     print_plan(made)
     print(f"plan      {target}")
-    return FLYABLE if made.feasible else NOT_FLYABLE
+    return FLYABLE if made.safe else NOT_FLYABLE
 
 
 def export(args: argparse.Namespace) -> int:
@@ -60,7 +60,7 @@ def export(args: argparse.Namespace) -> int:
     targets = [Path(name) for name in args.files]
     for target in targets:
         mission_kind(target)
-        refuse_existing(target, args.overwrite)
+        refuse_existing(target, args.overwrite, Path(args.plan))
     made = read_plan(Path(args.plan))
     vehicle = load_vehicle(made.scenario)
     mission = plan_mission(made, vehicle.airspeed, vehicle.max_bank, source=args.plan)
@@ -78,7 +78,7 @@ def fly(args: argparse.Namespace) -> int:
 
     opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, wind=_wind(args))
     default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
-    target = _target(args.log, default, args.overwrite)
+    target = _target(args.log, default, args, Path(args.mission))
     print_warnings(opened.setup.mission.warnings)
     target.parent.mkdir(parents=True, exist_ok=True)
     with progress("flying") as advance:
@@ -98,7 +98,7 @@ def check(args: argparse.Namespace) -> int:
     target = None
     if args.json:
         target = Path(args.json)
-        refuse_existing(target, args.overwrite)
+        refuse_existing(target, args.overwrite, source)
     if is_log(source):
         return _check_log(source, args, target)
     opened = open_mission(source, args.scenario, args.terrain)
@@ -122,11 +122,7 @@ def _check_log(source: Path, args: argparse.Namespace, target: Path | None) -> i
     log = read_log(source)
     setup = log.setup
     if args.terrain:
-        from world.raster import open_raster, read_terrain
-        from world.scenario import MARGIN
-
-        ground = read_terrain(open_raster(args.terrain), setup.scenario.origin, setup.scenario.bounds, MARGIN)
-        setup = replace(setup, scenario=replace(setup.scenario, terrain=ground))
+        setup = replace(setup, scenario=over_terrain(setup.scenario, args.terrain))
     verdict = judge_flight(setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
     if target:
         write_verdict(target, verdict)
@@ -193,11 +189,11 @@ def is_log(path: Path) -> bool:
     return head == MCAP_MAGIC or path.suffix.lower() == ".mcap"
 
 
-def _target(named: str | None, default: Path, overwrite: bool) -> Path:
+def _target(named: str | None, default: Path, args: argparse.Namespace, source: Path) -> Path:
     if named is None:
         return default
     target = Path(named)
-    refuse_existing(target, overwrite)
+    refuse_existing(target, args.overwrite, source)
     return target
 
 

@@ -17,8 +17,10 @@ RUN_FILES = (
 )
 
 
-def refuse_existing(path: Path, overwrite: bool) -> None:
-    """Refuse a named target file that exists, is a folder, or cannot be made.  Raises PlanflyError."""
+def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> None:
+    """Refuse a named target file that exists, is a folder, cannot be made, or is the input.  Raises PlanflyError."""
+    if source is not None and path.exists() and source.exists() and path.samefile(source):
+        raise PlanflyError(f"{path}: is the input itself; name another file to write")
     if path.is_dir():
         raise PlanflyError(f"{path}: is a folder; a file name is expected")
     if path.exists() and not overwrite:

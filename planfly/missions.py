@@ -8,7 +8,7 @@ from flight.export import plan_mission
 from flight.foreign import foreign_scenario
 from flight.mission_files import read_mission
 from flight.setup import FlightSetup
-from planfly.pipeline import Vehicle, load_vehicle, make_setup
+from planfly.pipeline import Vehicle, choose_seed, load_vehicle, make_setup
 from planner.plan import read_plan
 from world.errors import MissionError
 from world.scenario import Scenario, load_scenario
@@ -47,7 +47,7 @@ def open_mission(
         scenario = foreign_scenario(mission, terrain)
     scenario = wind(scenario)
     vehicle = load_vehicle(scenario)
-    number = seed if seed is not None else scenario.planner.seed or 1
+    number = choose_seed(scenario, seed)
     return OpenedMission(make_setup(scenario, vehicle, mission, number), vehicle, path.stem)
 
 

@@ -12,10 +12,12 @@ from flight.export import plan_mission
 from flight.mission import Mission
 from flight.mission_files import mission_text
 from flight.routing import make_route
+from flight.run_in import with_end_courses
 from flight.setup import FlightSetup, make_limits
 from flight.simulate import simulate
 from flight.track import Track
 from logs.check import judge_flight, judge_plan_only
+from logs.reader import LogEvent
 from logs.recorder import Recorder
 from logs.verdict import Verdict
 from planner.plan import Plan
@@ -112,6 +114,8 @@ def make_setup(
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario."""
     route = make_route(mission, scenario.origin, scenario.terrain, vehicle.airspeed, scenario.flight.fly_over)
+    limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+    route = with_end_courses(route, scenario, limits)
     return FlightSetup(
         scenario=scenario,
         mission=mission,
@@ -125,6 +129,12 @@ def make_setup(
         seed=seed,
         plan=plan,
     )
+
+
+def flight_events(track: Track, ended: str) -> list[LogEvent]:
+    """What a log tells of a flight beside its rows."""
+    end = float(track.time[-1]) if len(track) else 0.0
+    return [LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")]
 
 
 def fly(
@@ -142,7 +152,7 @@ def fly(
     with Recorder(log, setup) as recorder:
         flown = simulate(setup, vehicle.aircraft, sink=recorder.write, progress=tell)
         verdict = judge_flight(setup, flown.track, flown.ended)
-        end = float(flown.track.time[-1]) if len(flown.track) else 0.0
-        recorder.event(end, f"flight ended: {flown.ended}", "info" if flown.ended == "completed" else "error")
+        for event in flight_events(flown.track, flown.ended):
+            recorder.event(event.time, event.text, event.level)
         recorder.finish(flown.ended, verdict)
     return flown.track, flown.ended, verdict

@@ -9,7 +9,7 @@ from flight.export import plan_mission
 from logs.check import judge_plan_only
 from logs.verdict import Verdict
 from planfly.files import RUN_FILES, default_folder, prepare_folder, refuse_folder
-from planfly.pipeline import choose_seed, fly, load_vehicle, make_plan, make_setup
+from planfly.pipeline import choose_seed, flight_events, fly, load_vehicle, make_plan, make_setup
 from planfly.progress import progress
 from planfly.refine import refine
 from planfly.results import print_verdict, write_missions, write_pictures, write_verdict
@@ -62,7 +62,7 @@ def _fly_round(folder: Path, scenario: Scenario, plan: Any, seed: int, command: 
         track, ended, verdict = fly(setup, vehicle, folder / "flight.mcap", advance)
     write_verdict(folder / "verdict.json", verdict)
     with progress("drawing"):
-        write_pictures(folder, setup, track, verdict, ended, command)
+        write_pictures(folder, setup, track, verdict, ended, command, events=flight_events(track, ended))
     print_verdict(verdict, setup.route.notes)
     print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
     return verdict, True

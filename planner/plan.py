@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from world.errors import MissionError, ScenarioError
-from world.scenario import Scenario, from_spec
+from world.scenario import Scenario, fixed_ends, from_spec
 from world.scenario_file import first_error
 from world.terrain import Terrain
 
@@ -193,8 +193,10 @@ def parse_plan(
         raise MissionError(f"{source}: {first_error(error)}") from error
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
-    # The position of a scenario with its own terrain stays as planned, whatever terrain it is flown over.
-    scenario = from_spec(file.scenario, source, base=base, terrain=terrain, ground=ground)
+    waypoints = np.array(file.waypoints_east_north_amsl_m)
+    # Over another terrain a plan's ends stay where they were planned.
+    given = file.scenario if terrain is None else fixed_ends(file.scenario, waypoints[0], waypoints[-1])
+    scenario = from_spec(given, source, base=base, terrain=terrain, ground=ground)
     saved = file.certificate
     certificate = Certificate(
         turn=saved.turn_margin_rad,
@@ -208,7 +210,7 @@ def parse_plan(
     history = np.array([[np.nan if v is None else v for v in row] for row in file.history]).reshape(-1, 3)
     return Plan(
         scenario=scenario,
-        waypoints=np.array(file.waypoints_east_north_amsl_m),
+        waypoints=waypoints,
         violations=np.array([file.violations[item.name.lower()] for item in Violation]),
         objectives=np.array([file.objectives[item.name.lower()] for item in Objective]),
         certificate=certificate,

@@ -162,7 +162,7 @@ def from_spec(
         lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
     )
     spec = spec.model_copy(update={"origin": place, "area": area})
-    return _assemble(spec, source, origin, bounds, ground, foreign)
+    return _assemble(spec, source, origin, bounds, ground, foreign=foreign, replaced=terrain is not None)
 
 
 def _checked(make: Callable[[], Table], source: str) -> Table:
@@ -201,7 +201,14 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
 
 
 def _assemble(
-    spec: ScenarioFile, source: str, origin: GeoOrigin, bounds: Floats, ground: Terrain | None, foreign: bool
+    spec: ScenarioFile,
+    source: str,
+    origin: GeoOrigin,
+    bounds: Floats,
+    ground: Terrain | None,
+    *,
+    foreign: bool,
+    replaced: bool,
 ) -> Scenario:
     area = spec.area
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
@@ -209,7 +216,8 @@ def _assemble(
     ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else top + 1000.0
     start = _position(spec.start, "start", source, origin, ground)
     destination = _position(spec.destination, "destination", source, origin, ground)
-    for name, point in (("start", start), ("destination", destination)):
+    # Ends that another terrain buries are for the verdict to find.
+    for name, point in () if replaced else (("start", start), ("destination", destination)):
         _check_inside(name, point, source, bounds, floor, ceiling, ground)
     if not foreign and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start")
@@ -240,6 +248,26 @@ def _assemble(
         wind=wind,
         foreign=foreign,
     )
+
+
+def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
+    """Make the same scenario over another elevation file.
+
+    Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
+    Raises TerrainError.
+    """
+    spec = fixed_ends(scenario.to_json(), scenario.start, scenario.destination)
+    return from_spec(spec, scenario.name, terrain=terrain, foreign=scenario.foreign)
+
+
+def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
+    """Give the start and destination of a scenario's JSON data these heights (m AMSL), whatever is below them."""
+    changed = dict(spec)
+    for key, point in (("start", start), ("destination", destination)):
+        if isinstance(spec.get(key), dict):
+            kept = {name: value for name, value in spec[key].items() if name != "height_m"}
+            changed[key] = kept | {"amsl_m": float(point[2])}
+    return changed
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:

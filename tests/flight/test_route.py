@@ -101,10 +101,17 @@ def test_samples_without_terrain(name: str) -> None:
     assert np.array_equal(again.bounds, scenario.bounds)
 
 
-@pytest.mark.parametrize("name", sorted(ON_TERRAIN))
-def test_heights_that_need_terrain(name: str) -> None:
-    with pytest.raises(MissionError, match=r"item 1: height (above terrain|over home).*no terrain is given"):
-        foreign_scenario(read_mission(SAMPLES / name), None)
+def test_heights_that_need_terrain() -> None:
+    with pytest.raises(MissionError, match=r"item 1: height above terrain.*no terrain is given"):
+        foreign_scenario(read_mission(SAMPLES / "mavproxy_terrain.txt"), None)
+
+
+def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
+    mission = read_mission(SAMPLES / "endless.waypoints")
+    scenario = foreign_scenario(mission, None)
+    route = make_route(mission, scenario.origin, None, 25.0, False)
+    assert route.waypoints[0, 2] == mission.items[0].alt
+    assert any("count from 0 m AMSL" in note for note in route.notes)
 
 
 def test_foreign_scenario_from_its_log() -> None:

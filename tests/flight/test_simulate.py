@@ -273,10 +273,13 @@ def test_chart_against_the_map(make_setup: MakeSetup, origin: GeoOrigin) -> None
     assert turn == pytest.approx(np.arctan2(ahead_e - back_e, ahead_n - back_n), abs=1e-7)
 
 
-def test_a_chart_across_the_180th_meridian_is_refused(make_setup: MakeSetup) -> None:
-    setup = make_setup([[-15000, 0, 500], [15000, 0, 500]], origin={"lat_deg": 10.0, "lon_deg": 179.99})
-    with pytest.raises(FlightError, match="180th meridian"):
-        Chart.around(setup)
+def test_a_flight_crosses_the_180th_meridian(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    points = [[-2000, 0, 500], [2000, 500, 520]]
+    here = simulate(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 179.999}), aerosonde)
+    there = simulate(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 100.0}), aerosonde)
+    assert here.ended == there.ended == "completed"
+    assert np.abs(here.track.cross_track).max() < 0.5
+    assert np.allclose(here.track.position, there.track.position, atol=0.01)
 
 
 def test_tracks_hold_their_types_and_join() -> None:

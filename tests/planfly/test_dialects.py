@@ -20,7 +20,7 @@ LEGS = {
     "qgc_amsl.plan": 4,
     "qgc_takeoff.plan": 7,
 }
-ABOVE_TERRAIN = {"endless.waypoints", "mavproxy_terrain.txt"}
+ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
 
 
 def test_every_sample_is_listed() -> None:
