@@ -5,6 +5,7 @@ import math
 from flight.setup import FlightSetup
 from logs.route_shape import route_shape
 from logs.rules_flight import energy_findings, speed_findings
+from logs.rules_loiter import fold_loiters
 from logs.rules_slope import slope_findings
 from logs.rules_turn import turn_findings
 from logs.rules_world import bounds_findings, clearance_findings, threat_findings
@@ -16,7 +17,7 @@ from planner.plan import Plan, Violation
 def judge_geometry(setup: FlightSetup) -> Verdict:
     """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
     shape = route_shape(setup)
-    findings = (
+    findings: tuple[Finding, ...] = (
         *turn_findings(shape, None, geometric=True),
         *slope_findings(shape, None, geometric=True),
         *clearance_findings(shape, None, geometric=True),
@@ -26,6 +27,7 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
         *energy_findings(shape, None, geometric=True),
         *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
+    findings = fold_loiters(shape, None, findings)
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
     return Verdict(findings, flyable, complete, summary_text(findings, flyable, setup, "geometric"), "geometric")

@@ -33,7 +33,8 @@ def turn_limit(shape: RouteShape, i: int) -> tuple[float, str]:
     """Tighter of the scenario's and the aircraft's limit at a waypoint, rad, and whose it is."""
     fixed = shape.limits.max_turn
     aircraft = float(shape.turn_limit[i])
-    if fixed is not None and fixed <= aircraft:
+    # A circle has no angle: its corners are of our making.
+    if fixed is not None and fixed <= aircraft and shape.setup.route.arcs[i] == 0.0:
         return fixed, "scenario"
     return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
 
