@@ -6,6 +6,7 @@ from flight.setup import FlightSetup
 from logs.route_shape import route_shape
 from logs.rules_flight import energy_findings, speed_findings
 from logs.rules_loiter import fold_loiters
+from logs.rules_mission import mission_findings
 from logs.rules_slope import slope_findings
 from logs.rules_turn import turn_findings
 from logs.rules_world import bounds_findings, clearance_findings, threat_findings
@@ -18,6 +19,7 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
     shape = route_shape(setup)
     findings: tuple[Finding, ...] = (
+        *mission_findings(setup),
         *turn_findings(shape, None, geometric=True),
         *slope_findings(shape, None, geometric=True),
         *clearance_findings(shape, None, geometric=True),

@@ -98,7 +98,7 @@ def summary_text(findings: Sequence[Finding], flyable: bool, setup: FlightSetup,
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
     if setup.route.notes:
