@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import prepare_folder, refuse_existing
@@ -12,6 +13,9 @@ from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
 from world.scenario import Scenario, embedded_scenarios, load_scenario, with_wind
+
+if TYPE_CHECKING:
+    from logs.reader import FlightLog
 
 RUNS = Path("runs")
 MCAP_MAGIC = b"\x89MCAP"
@@ -173,18 +177,35 @@ def replay(args: argparse.Namespace) -> int:
 
     from logs.reader import read_log
     from logs.replay import entry_lines, timeline
-    from planfly.results import print_warnings
 
     log = read_log(Path(args.log))
+    if args.to:
+        from planfly.serve import play
+
+        play(log, args)
+        return _replayed(args, log)
     started = time.monotonic()
     for entry in timeline(log):
         if args.speed:
             time.sleep(max(0.0, entry.time / args.speed - (time.monotonic() - started)))
         print("\n".join(entry_lines(entry)), flush=bool(args.speed))
+    return _replayed(args, log)
+
+
+def _replayed(args: argparse.Namespace, log: "FlightLog") -> int:
+    from planfly.results import print_warnings
+
     if not log.complete:
         print_warnings([f"{args.log}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
         return LOSS
     return FLYABLE
+
+
+def serve(args: argparse.Namespace) -> int:
+    """``planfly serve``."""
+    from planfly.serve import serve as serve_vehicle
+
+    return serve_vehicle(args)
 
 
 def report(args: argparse.Namespace) -> int:
@@ -249,5 +270,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "check": check,
     "replay": replay,
     "report": report,
+    "serve": serve,
     "scenarios": scenarios,
 }
