@@ -53,7 +53,9 @@ class Pilot:
         forced = param2 in _FORCED
         if not on:
             if self.flying and not forced:
-                return Answer(DENIED, "in flight: disarming by force (param2 21196) ends the flight")
+                return Answer(
+                    DENIED, "in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight"
+                )
             self.stop_asked = self.flying
             self.armed = False
             return Answer(ACCEPTED)
@@ -72,7 +74,7 @@ class Pilot:
         if mode not in MODE_NAMES:
             return Answer(DENIED, f"mode {mode}: this vehicle has MANUAL, LOITER and AUTO")
         if self.flying and mode != AUTO:
-            return Answer(DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; disarming by force ends the flight")
+            return Answer(DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; a forced disarm ends the flight")
         if mode == AUTO and self.ready is None and not self.judging:
             return Answer(DENIED, "AUTO denied: no mission")
         self.mode = mode

@@ -73,6 +73,11 @@ class Ready:
 
 
 @dataclass(frozen=True, slots=True)
+class Up:
+    """The process is there, and its compiled code loaded."""
+
+
+@dataclass(frozen=True, slots=True)
 class Ended:
     """The flight is over: "completed" or why not."""
 
@@ -140,16 +145,16 @@ def serve_flights(connection: Connection, hangar: Hangar) -> None:
         return
 
 
-def answer(connection: Connection, what: Ready | Ended | Landed) -> None:
+def answer(connection: Connection, what: Up | Ready | Ended | Landed) -> None:
     """Send an answer to the link."""
     connection.send_bytes(_ANSWER + pickle.dumps(what))
 
 
-def read_answer(data: bytes) -> Moment | Ready | Ended | Landed:
+def read_answer(data: bytes) -> Moment | Up | Ready | Ended | Landed:
     """Read what the flying process sent."""
     if data[:1] == _MOMENT:
         return Moment.unpack(data[1:])
-    found: Ready | Ended | Landed = pickle.loads(data[1:])
+    found: Up | Ready | Ended | Landed = pickle.loads(data[1:])
     return found
 
 

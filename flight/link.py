@@ -94,7 +94,7 @@ class Link:
         self._clock, self._wall = clock, wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
-        self._hello = [mavlink.MAVLink(None, SYSTEM, COMPONENT) for _ in access.to]
+        self._hello = {address: mavlink.MAVLink(None, SYSTEM, COMPONENT) for address in access.to}
         family = socket.AF_INET6 if ":" in access.bind[0] else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         try:
@@ -161,12 +161,16 @@ class Link:
         if peer is None:
             if len(self.peers) >= MOST_PEERS:
                 return None
-            peer = Peer(source, system, component, now, mavlink.MAVLink(None, SYSTEM, COMPONENT))
+            # One count of frames a station: a second one reads as lost packets there.
+            peer = Peer(source, system, component, now, self._counter(source))
             # Spread over the first tenth of a second, so that not all is sent at once.
             peer.due = {name: now + 0.1 * k / len(PERIODS) for k, name in enumerate(PERIODS)}
             self.peers[source] = peer
         peer.heard = now
         return peer
+
+    def _counter(self, address: Address) -> Any:
+        return self._hello.get(address) or mavlink.MAVLink(None, SYSTEM, COMPONENT)
 
     @staticmethod
     def _for_us(message: Any) -> bool:
@@ -186,7 +190,7 @@ class Link:
 
     def hello(self, message: Any) -> None:
         """Send a HEARTBEAT to where stations are expected, and to every peer."""
-        for mav, address in zip(self._hello, self.access.to, strict=True):
+        for address, mav in self._hello.items():
             if address not in self.peers:
                 self._transmit(message.pack(mav), mav, address)
         for peer in self.peers.values():

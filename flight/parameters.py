@@ -78,6 +78,7 @@ def vehicle_parameters(
             Parameter("AIRSPEED_CRUISE", airspeed),
             Parameter("AIRSPEED_MAX", fastest),
             Parameter("AIRSPEED_MIN", slowest),
+            Parameter("ARMING_CHECK", 1.0),
             Parameter("ARMING_REQUIRE", 1.0),
             Parameter("FENCE_TOTAL", 0.0),
             Parameter("MIS_TOTAL", 0.0),

@@ -1,6 +1,7 @@
 """The live vehicle: stations on one side, the process that flies on the other, and the state between them."""
 
 import contextlib
+import errno
 import select
 import time
 from collections.abc import Callable
@@ -11,7 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.commands import Pilot
-from flight.flight_process import Ended, Fly, Judge, Landed, Ready, Stop, read_answer
+from flight.flight_process import Ended, Fly, Judge, Landed, Ready, Stop, Up, read_answer
 from flight.link import Link, Peer
 from flight.mavlink_items import MissionType
 from flight.mission import FENCES, Command, Home, Mission, MissionItem, is_located, renumbered
@@ -28,6 +29,9 @@ _NAP = 0.02
 _LATE = 0.5
 # How long a process that is to end may be silent, s.
 _LAST_WORDS = 10.0
+_MOST_DEATHS = 3
+# Within this time (s) the same answer is said once.
+_SAME = 3.0
 
 Tell = Callable[[str], None]
 
@@ -55,6 +59,8 @@ class Vehicle:
         self.requests = Requests(self.pilot, parameters, self.status)
         self._where = where
         self._spawn = spawn
+        # In a row, without being ready in between.
+        self._deaths = 0
         self._flight = spawn()
         self._parameters = parameters
         self._tell = tell
@@ -65,6 +71,8 @@ class Vehicle:
         self._busy = 0.0
         # Which mission is judged or flown: the item at each waypoint, and what to add to it for the station's number.
         self._number = 0
+        self._brief = False
+        self._said = ("", 0.0)
         self._shift = 0
         self._leg = -1
 
@@ -134,7 +142,11 @@ class Vehicle:
         for peer, content in replies:
             if peer is None:
                 severity, text = content
-                self.say(text, severity)
+                now = self._clock()
+                # A station that tries again within a moment is told once.
+                if self._said[0] != text or now - self._said[1] > _SAME:
+                    self.say(text, severity)
+                self._said = (text, now)
             else:
                 self.link.send(content, peer)
 
@@ -160,6 +172,7 @@ class Vehicle:
         """Have a changed mission judged; a fence or rally points that change belong to it."""
         if not self.server.changed or self.pilot.flying:
             return
+        changed = set(self.server.changed)
         self.server.changed.clear()
         totals = {"MIS_TOTAL": MissionType.MISSION, "FENCE_TOTAL": MissionType.FENCE, "RALLY_TOTAL": MissionType.RALLY}
         for name, kind in totals.items():
@@ -171,6 +184,8 @@ class Vehicle:
             self._refresh()
             return
         mission, self._shift = uploaded(self.server.lists)
+        # A fence or rally points that are changed need not repeat what was said of the mission.
+        self._brief = MissionType.MISSION not in changed and (self._brief or not self.pilot.judging)
         self.pilot.judging = True
         self._order(Judge(mission, self._number))
         self._refresh()
@@ -191,6 +206,9 @@ class Vehicle:
     def _lost(self) -> None:
         """Start another process in place of one that has died: JSBSim can abort, and that must not end the vehicle."""
         self._flight.close()
+        self._deaths += 1
+        if self._deaths >= _MOST_DEATHS:
+            raise ChildProcessError(errno.ECHILD, "keeps dying", "the process that flies")
         self._flight = self._spawn()
         if self.pilot.flying:
             self._ended("lost: the process that flew it has died")
@@ -198,7 +216,7 @@ class Vehicle:
             words = ((CRITICAL, "the process that flies has died; upload the mission again"),)
             self._judged(Ready(self._number, False, False, words))
 
-    def _take(self, answer: Moment | Ready | Ended | Landed) -> None:
+    def _take(self, answer: Moment | Up | Ready | Ended | Landed) -> None:
         if isinstance(answer, Moment):
             if answer.finite:
                 self.status.moment = answer
@@ -207,6 +225,9 @@ class Vehicle:
             self._judged(answer)
         elif isinstance(answer, Ended):
             self._ended(answer.ended)
+        elif isinstance(answer, Up):
+            self._deaths = 0
+            self._tell("ready")
         else:
             for severity, text in answer.words:
                 self.say(text, severity)
@@ -214,14 +235,16 @@ class Vehicle:
     def _judged(self, ready: Ready) -> None:
         if ready.number != self._number:
             return
-        for severity, text in ready.words:
-            self.say(text, severity)
+        known = self.pilot.ready
+        if not self._brief or known is None or known.words != ready.words:
+            for severity, text in ready.words:
+                self.say(text, severity)
         disarmed = self.pilot.judged(ready)
         if disarmed:
             self.say(disarmed, WARNING)
         if ready.start is not None and ready.home is not None:
             self.status.moment, self.status.home = ready.start, ready.home
-        self.status.current = self._item(1)
+        self.status.current = self._item(0)
         self._pass_on(self.requests.verdict_came())
         self._after_command()
 
@@ -267,7 +290,7 @@ class Vehicle:
         items = self.server.lists[MissionType.MISSION]
         status.total = max(0, len(items) - 1) if items else 0
         if pilot.mission_state not in (ACTIVE, COMPLETE):
-            status.current = self._item(1) if pilot.ready is not None else 0
+            status.current = self._item(0) if pilot.ready is not None else 0
 
     def _telemetry(self, now: float) -> None:
         if now >= self._next_hello:

@@ -1,13 +1,13 @@
 """``planfly serve``: a vehicle that ground stations fly; and ``planfly replay --to``: a log played into one."""
 
 import argparse
+import contextlib
 import ipaddress
 import math
 import multiprocessing
 import signal
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -15,13 +15,13 @@ from types import FrameType
 
 import numpy as np
 
-from flight.flight_process import Judge, Landed, Ready, Words, serve_flights
+from flight.flight_process import Judge, Landed, Ready, Up, Words, answer, serve_flights
 from flight.link import SYSTEM, Access, Link, check_access
-from flight.mission import Home, Mission
+from flight.mission import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.parameters import vehicle_parameters
 from flight.setup import FlightSetup
 from flight.signing import read_key
-from flight.simulate import Flight
+from flight.simulate import Flight, as_track
 from flight.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, status_texts, telemetry_message
 from flight.track import COLUMNS, Track, join_tracks
 from flight.vehicle import CRITICAL, INFO, NOTICE, WARNING, Vehicle
@@ -140,7 +140,10 @@ def fly_process(connection: Connection, served: Served) -> None:
     # Ctrl-C reaches the whole group; the link tells this process when to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    serve_flights(connection, ServedHangar(served))
+    hangar = ServedHangar(served)
+    hangar.warm()
+    answer(connection, Up())
+    serve_flights(connection, hangar)
 
 
 class ServedHangar:
@@ -151,6 +154,22 @@ class ServedHangar:
         self._logs = served.logs
         self.aircraft = self._world.airframe.aircraft
         self.speed = served.speed
+
+    def warm(self) -> None:
+        """Fly half a second and judge it, so that no station waits for compilers later."""
+        scenario = self._world.scenario
+        points = np.linspace(scenario.start, scenario.destination, 3)
+        lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
+        none, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
+        items = tuple(
+            MissionItem(k, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), none, on_grid(lat), on_grid(lon), amsl)
+            for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
+        )
+        with contextlib.suppress(PlanflyError):
+            setup = make_setup(scenario, self._world.airframe, Mission(None, items), self._world.seed)
+            judge_geometry(setup)
+            rows, _ = Flight(setup, self.aircraft).block(30)
+            judge_flight(setup, as_track(rows), "warm")
 
     def prepare(self, order: Judge) -> tuple[FlightSetup | None, Ready]:
         """Judge a mission on its geometry, and see that it can be started."""
@@ -346,7 +365,7 @@ class _Stopped:
         self._asked = True
 
 
-@contextmanager
+@contextlib.contextmanager
 def stop_signals() -> Iterator[_Stopped]:
     """Turn SIGINT and SIGTERM into a question, so that logs are closed in order."""
     stopped = _Stopped()
