@@ -10,6 +10,7 @@ from flight.mission import (
     PLACES,
     TAKEOFFS,
     Command,
+    Frame,
     Home,
     Mission,
     MissionItem,
@@ -202,7 +203,9 @@ class _Walk:
             self._land(item)
         elif item.command == Command.DO_CHANGE_SPEED:
             self._change_speed(item)
-        elif item.command not in (Command.DO_JUMP, Command.DO_LAND_START):
+        elif item.command == Command.DO_LAND_START:
+            self.notes.add("DO_LAND_START: a mark, nothing to fly", item.seq)
+        elif item.command != Command.DO_JUMP:
             self.notes.add(f"{command_name(item.command)}: not flown", item.seq)
 
     def _stop(self, item: MissionItem, acceptance: float = 0.0) -> Stop:
@@ -232,7 +235,8 @@ class _Walk:
         name = command_name(item.command)
         if not item.has_position and loiter_of(item) is not None and self.stops:
             self.notes.add(f"{name} without a position: flown about the place before", item.seq)
-            item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg)
+            alt = math.nan if item.frame == Frame.MISSION else item.alt
+            item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
         elif not item.has_position:
             self.notes.add(
                 f"{name} without a position, which means the place where the aircraft is: not flown", item.seq

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from flight.fences import fence_problem
 from flight.mission import (
     LANDINGS,
     OVER_HOME,
@@ -23,7 +24,6 @@ from flight.mission import (
     command_name,
 )
 from flight.setup import FlightSetup
-from logs.fences import fence_problem
 from logs.verdict import Finding, make_finding
 from world.frames import GeoOrigin, to_map
 
@@ -103,7 +103,7 @@ def _validity(mission: Mission) -> Iterator[_Said]:
             yield False, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{_MOST_SERVO}"
         elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= _MOST_PWM:
             yield False, item.seq, f"actuator value {item.params[1]:g} is out of bounds -{_MOST_PWM:g}..{_MOST_PWM:g}"
-    if mission.items[0].command == C.NAV_LAND:
+    if mission.items and mission.items[0].command == C.NAV_LAND:
         yield False, mission.items[0].seq, "starts with landing"
 
 
@@ -210,7 +210,8 @@ def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
 def _below_home(mission: Mission) -> Iterator[_Said]:
     for item in _positions(mission):
         if item.frame in OVER_HOME and mission.home is None:
-            yield False, item.seq, f"no home position, waypoint {item.seq} uses relative altitude"
+            reason = "the file has no home, and heights over it: PX4 refuses them until the vehicle has one"
+            yield None, item.seq, reason
             return
         if _over_home(mission, item) < 0.0:
             yield True, item.seq, f"waypoint {item.seq} below home: a warning"
