@@ -131,11 +131,16 @@ def _add_run_and_plan(command: _Command) -> None:
 
 def _add_export_and_fly(command: _Command) -> None:
     export = command(
-        "export", "write a plan as mission files, by suffix: .waypoints, .plan",
-        "planfly export plan.json mission.waypoints mission.plan",
+        "export",
+        "write a plan, mission or log by suffix: .waypoints, .plan, .fence, .rally, .kml, .gpx",
+        "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
     )  # fmt: skip
-    export.add_argument("plan", metavar="PLAN.json", help="a plan that planfly made")
-    export.add_argument("files", metavar="FILE", nargs="+", help="mission files to write (.waypoints, .plan)")
+    export.add_argument(
+        "plan", metavar="PLAN.json|MISSION|LOG.mcap", help="a plan that planfly made, a mission file, or a flight log"
+    )
+    export.add_argument(
+        "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
+    )
     _overwrite(export)
     fly = command(
         "fly", "fly a plan or any mission file, write the log, end with the verdict",

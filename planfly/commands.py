@@ -84,23 +84,9 @@ def plan(args: argparse.Namespace) -> int:
 
 def export(args: argparse.Namespace) -> int:
     """``planfly export``."""
-    from flight.export import plan_mission
-    from flight.mission_files import mission_kind
-    from planfly.pipeline import load_vehicle
-    from planfly.results import write_missions
-    from planner.plan import read_plan
+    from planfly.exporting import export as export_files
 
-    targets = [Path(name) for name in args.files]
-    for target in targets:
-        mission_kind(target)
-        refuse_existing(target, args.overwrite)
-    made = read_plan(Path(args.plan))
-    vehicle = load_vehicle(made.scenario)
-    mission = plan_mission(made, vehicle.airspeed, vehicle.max_bank, source=args.plan)
-    write_missions(mission, targets)
-    for target in targets:
-        print(f"mission   {target} ({len(mission.items)} items)")
-    return FLYABLE
+    return export_files(args, log=Path(args.plan).is_file() and is_log(Path(args.plan)))
 
 
 def fly(args: argparse.Namespace) -> int:
