@@ -103,6 +103,13 @@ def _world(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
 
 
+def _flown_by(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--aircraft", metavar="A", help="the aircraft, in place of the scenario's (default: aerosonde)")
+    parser.add_argument(
+        "--airspeed", metavar="M/S", type=_positive, help="until the mission sets one (default: the aircraft's cruise)"
+    )
+
+
 def _add_run_and_plan(command: _Command) -> None:
     run = command("run", "plan, export, fly, log, judge and report", "planfly run jacksboro --seed 3 --out my-run")
     run.add_argument(
@@ -148,6 +155,7 @@ def _add_export_and_fly(command: _Command) -> None:
     )  # fmt: skip
     fly.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan")
     _world(fly)
+    _flown_by(fly)
     fly.add_argument(
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
@@ -164,6 +172,7 @@ def _add_log_commands(command: _Command) -> None:
     )  # fmt: skip
     check.add_argument("file", metavar="LOG.mcap|MISSION", help="a flight log, or plan.json, .waypoints, .plan")
     _world(check)
+    _flown_by(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     _overwrite(check)
     replay = command(

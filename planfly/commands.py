@@ -12,7 +12,7 @@ from planfly.files import prepare_folder, refuse_existing
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, with_wind
+from world.scenario import Scenario, embedded_scenarios, load_scenario, with_flight, with_wind
 
 if TYPE_CHECKING:
     from logs.reader import FlightLog
@@ -95,7 +95,7 @@ def fly(args: argparse.Namespace) -> int:
     from planfly.pipeline import fly as fly_setup
     from planfly.results import print_verdict, print_warnings
 
-    opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, wind=_wind(args))
+    opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, change=_change(args))
     default = _default_folder(opened.name, opened.setup.seed) / "flight.mcap"
     target = _target(args.log, default, args.overwrite)
     print_warnings(opened.setup.mission.warnings)
@@ -120,7 +120,7 @@ def check(args: argparse.Namespace) -> int:
         refuse_existing(target, args.overwrite)
     if is_log(source):
         return _check_log(source, args, target)
-    opened = open_mission(source, args.scenario, args.terrain)
+    opened = open_mission(source, args.scenario, args.terrain, change=_change(args))
     print_warnings(opened.setup.mission.warnings)
     verdict = judge_geometry(opened.setup)
     if target:
@@ -134,6 +134,11 @@ def _check_log(source: Path, args: argparse.Namespace, target: Path | None) -> i
     from logs.reader import read_log
     from planfly.results import print_verdict, print_warnings, write_verdict
 
+    given = [name for name in ("aircraft", "airspeed") if getattr(args, name) is not None]
+    if given:
+        raise ScenarioError(
+            f"{source}: --{given[0]}: a log is judged with the aircraft and the speeds it was flown with"
+        )
     if args.scenario:
         raise ScenarioError(
             f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces it"
@@ -240,10 +245,14 @@ def _default_folder(name: str, seed: int) -> Path:
     return RUNS / f"{safe}-seed{seed}"
 
 
-def _wind(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
+def _change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
+    """What the command's options change in a scenario: aircraft, airspeed, and for a flight the wind."""
+
     def change(scenario: Scenario) -> Scenario:
-        speed, source = args.wind if args.wind else (None, None)
-        return with_wind(scenario, speed, None if source is None else math.radians(source), args.turbulence)
+        flown = with_flight(scenario, args.aircraft, args.airspeed)
+        speed, source = getattr(args, "wind", None) or (None, None)
+        turbulence = getattr(args, "turbulence", None)
+        return with_wind(flown, speed, None if source is None else math.radians(source), turbulence)
 
     return change
 
