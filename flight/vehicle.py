@@ -71,7 +71,7 @@ class Vehicle:
         self._busy = 0.0
         # Which mission is judged or flown: the item at each waypoint, and what to add to it for the station's number.
         self._number = 0
-        self._brief = False
+        self._outstanding = self._brief = False
         self._said = ("", 0.0)
         self._shift = 0
         self._leg = -1
@@ -170,7 +170,8 @@ class Vehicle:
 
     def _changes(self) -> None:
         """Have a changed mission judged; a fence or rally points that change belong to it."""
-        if not self.server.changed or self.pilot.flying:
+        # One order at a time: stations that upload faster than missions are judged must not fill the pipe.
+        if not self.server.changed or self.pilot.flying or self._outstanding:
             return
         changed = set(self.server.changed)
         self.server.changed.clear()
@@ -181,12 +182,14 @@ class Vehicle:
         if not self.server.lists[MissionType.MISSION]:
             self.pilot.cleared()
             self.status.moment, self.status.home = self._where
+            self._pass_on(self.requests.verdict_came())
             self._refresh()
             return
-        mission, self._shift = uploaded(self.server.lists)
+        mission, self._shift = uploaded(self.server.lists, self._where[1])
         # A fence or rally points that are changed need not repeat what was said of the mission.
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.pilot.judging)
         self.pilot.judging = True
+        self._outstanding = True
         self._order(Judge(mission, self._number))
         self._refresh()
 
@@ -234,6 +237,11 @@ class Vehicle:
 
     def _judged(self, ready: Ready) -> None:
         if ready.number != self._number:
+            return
+        self._outstanding = False
+        if self.server.changed:
+            # It is about a mission that is no longer here.
+            self._changes()
             return
         known = self.pilot.ready
         if not self._brief or known is None or known.words != ready.words:
@@ -285,6 +293,9 @@ class Vehicle:
 
     def _refresh(self) -> None:
         pilot, status = self.pilot, self.status
+        if (status.mode, status.armed, status.flying) != (pilot.mode, pilot.armed, pilot.flying):
+            # A change is told at once.
+            self._next_hello = self._clock()
         status.mode, status.armed, status.flying = pilot.mode, pilot.armed, pilot.flying
         status.ready, status.mission_state = pilot.armable or pilot.armed, pilot.mission_state
         items = self.server.lists[MissionType.MISSION]
@@ -294,7 +305,7 @@ class Vehicle:
 
     def _telemetry(self, now: float) -> None:
         if now >= self._next_hello:
-            self._next_hello = max(self._next_hello + 1.0, now + 0.5)
+            self._next_hello = now + 1.0 if now - self._next_hello > _LATE else self._next_hello + 1.0
             self.link.forget_silent()
             self.link.hello(heartbeat(self.status))
         for peer in self.link.peers.values():
@@ -319,17 +330,18 @@ class Vehicle:
                 peer.parameter = None
 
 
-def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]]) -> tuple[Mission, int]:
+def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tuple[Mission, int]:
     """Mission of the lists, and what to add to its items' seq for the numbers that stations know.
 
     Item 0 is home, as ArduPilot has it, if it is a waypoint above mean sea level, or one with no parameter set:
     MAVSDK's `mission` plugin sends no home, and its waypoints are relative and have a radius.
+    ``own``: the vehicle's home, for a mission that brings none.
     """
     items = lists[MissionType.MISSION]
-    home = None
+    home = own
     if items and _is_home(items[0]):
         first = items[0]
-        home = Home(first.lat_deg, first.lon_deg, first.alt) if first.has_position else None
+        home = Home(first.lat_deg, first.lon_deg, first.alt) if first.has_position else own
         items = items[1:]
         shift = 0
     else:
