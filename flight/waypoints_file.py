@@ -31,6 +31,8 @@ from flight.mission import (
 from world.errors import MissionError
 
 HEADER = "QGC WPL 110"
+# Lines of a file, comments and empty ones included: ten an item.
+MOST_LINES = 10 * MOST_ITEMS
 
 _COLUMNS = (
     "seq",
@@ -67,6 +69,9 @@ def parse_waypoints(text: str, source: str) -> Mission:
     decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Raises MissionError with file, line, field,
     value and what is allowed.
     """
+    breaks = max(text.count("\n"), text.count("\r"))
+    if breaks > MOST_LINES:
+        raise MissionError(f"{source}: {breaks:,} lines: at most {MOST_LINES:,} are read")
     lines = [
         (number, line.strip())
         for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
