@@ -1,0 +1,204 @@
+"""A served vehicle over real sockets, with a ground station of our own."""
+
+import math
+import os
+import random
+import signal
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.simulate import simulate
+from logs.reader import read_log
+from planfly.cli import main
+from planfly.pipeline import load_vehicle
+from tests.planfly.conftest import Served
+from tests.stations import UdpStation, item
+
+SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+LAT, LON = 460_000_000, 80_000_000
+ROUTE = [
+    item(0, LAT, LON, 0.0),
+    item(1, LAT, LON, 100.0),
+    item(2, LAT, LON + 33_333, 100.0, frame=3),
+    item(3, LAT + 3_000, LON + 65_000, 100.0),
+]
+# 4 km out: long enough for whatever is done to it.
+LONG = [*ROUTE[:3], item(3, LAT, LON + 300_000, 100.0)]
+STEEP = [*ROUTE[:3], item(3, LAT, LON + 65_000, 300.0)]
+
+
+def done(message: object) -> bool:
+    return message.get_type() == "MISSION_CURRENT" and message.mission_state == 5
+
+
+def test_a_flight_at_real_time(serve: Callable[..., Served]) -> None:
+    """Rates within 5 %, under 15 % of a core, and the very flight that ``planfly fly`` gives."""
+    vehicle = serve("--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(ROUTE) == 0
+        station.fly()
+        station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
+        before, begun, used = len(station.log), time.monotonic(), vehicle.cpu()
+        station.listen(10.0)
+        seconds = time.monotonic() - begun
+        share = (vehicle.cpu() - used) / seconds
+        counts = Counter(message.get_type() for message in station.log[before:])
+        assert counts["ATTITUDE"] / seconds == pytest.approx(30.0, rel=0.05)
+        assert counts["GLOBAL_POSITION_INT"] / seconds == pytest.approx(10.0, rel=0.05)
+        assert {"VFR_HUD", "SYS_STATUS", "WIND", "HOME_POSITION", "EXTENDED_SYS_STATE", "HEARTBEAT"} <= set(counts)
+        assert share < 0.15, f"{share:.3f} of a core"
+        station.until(done)
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and "log" in m.text)
+        reached = [m.seq for m in station.log if m.get_type() == "MISSION_ITEM_REACHED"]
+        assert reached == [1, 2, 3]
+        assert "verdict (flown): FLYABLE" in station.texts()
+        assert station.upload(STEEP) == 0
+    assert vehicle.stop() == 0
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert log.ended == "completed"
+    again = simulate(log.setup, load_vehicle(log.setup.scenario).aircraft)
+    assert again.track.position.tobytes() == log.track.position.tobytes()
+    assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 0
+
+
+def test_a_mission_that_cannot_be_flown(serve: Callable[..., Served]) -> None:
+    """It is stored, warned of, and armed only by force; the forced flight is logged and judged."""
+    vehicle = serve("--scenario", "field.toml", "--speed", "50")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(STEEP) == 0
+        assert station.command(400, 1) == mavlink.MAV_RESULT_DENIED
+        station.listen(0.3)
+        assert "NOT FLYABLE" in station.texts()
+        assert "slope at leg" in station.texts()
+        far = [ROUTE[0], item(1, -LAT, LON, 100.0), item(2, -LAT, LON + 40_000, 100.0)]
+        assert station.upload(far) == 0
+        assert station.command(400, 1, 21196) == mavlink.MAV_RESULT_DENIED
+        assert "mission cannot be flown" in station.texts()
+        assert station.upload(STEEP) == 0
+        station.send(mavlink.MAVLink_param_set_message(1, 1, b"PFLY_FORCE", 1.0, 9))
+        station.until(lambda m: m.get_type() == "PARAM_VALUE" and m.param_value == 1.0)
+        station.fly()
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and m.text.startswith("log"))
+        assert "verdict (flown): NOT FLYABLE" in station.texts()
+    assert vehicle.stop() == 0
+    assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 4
+
+
+def test_two_stations_over_sockets(serve: Callable[..., Served]) -> None:
+    vehicle = serve("--scenario", "field.toml")
+    rng = random.Random(4)
+    with UdpStation(vehicle.port) as one, UdpStation(vehicle.port, system=254) as two:
+        for station in (one, two):
+            station.until(lambda m: m.get_type() == "HEARTBEAT")
+        for _ in range(100 if SOAK else 5):
+            first, second = (one, two) if rng.random() < 0.5 else (two, one)
+            first.send(mavlink.MAVLink_mission_count_message(1, 1, len(ROUTE), 0))
+            first.until(lambda m: m.get_type() == "MISSION_REQUEST_INT")
+            second.send(mavlink.MAVLink_mission_count_message(1, 1, len(LONG), 0))
+            assert second.until(lambda m: m.get_type() == "MISSION_ACK").type == mavlink.MAV_MISSION_DENIED
+            assert first.upload(ROUTE) == 0
+            first.send(mavlink.MAVLink_mission_request_int_message(1, 1, 3, 0))
+            back = first.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
+            assert (back.x, back.y) == (ROUTE[3].x, ROUTE[3].y)
+    assert vehicle.stop() == 0
+
+
+@pytest.mark.parametrize("seed", range(20 if SOAK else 2))
+def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], seed: int) -> None:
+    """Kill -9 of all of it, in flight, at any moment: what is logged is exact, and no more than a second is lost."""
+    vehicle = serve("--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(LONG) == 0
+        station.fly()
+        begun = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0).time_boot_ms
+        last = station.listen(random.Random(seed).uniform(1.0, 4.0))
+        vehicle.kill()
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert not log.complete
+    flown = max(m.time_boot_ms for m in last if m.get_type() == "GLOBAL_POSITION_INT") - begun
+    assert log.end_time >= flown / 1000.0 - 1.0
+    whole = simulate(log.setup, load_vehicle(log.setup.scenario).aircraft).track
+    count = len(log.track)
+    assert count > 30
+    assert np.array_equal(whole.position[:count], log.track.position)
+    assert np.array_equal(whole.controls[:count], log.track.controls)
+
+
+def test_the_process_that_flies_may_die(serve: Callable[..., Served]) -> None:
+    """The vehicle stays, says so, and flies the next mission."""
+    vehicle = serve("--scenario", "field.toml", "--speed", "20")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(LONG) == 0
+        station.fly()
+        flying = [n for n in vehicle.children() if "spawn_main" in Path(f"/proc/{n}/cmdline").read_text("utf-8")]
+        os.kill(flying[0], signal.SIGKILL)
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and "died" in m.text)
+        assert station.command(400, 1) == mavlink.MAV_RESULT_DENIED
+        assert station.upload(ROUTE) == 0
+        station.fly()
+        station.until(done)
+    assert vehicle.stop() == 0
+
+
+def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served]) -> None:
+    vehicle = serve("--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(LONG) == 0
+        station.fly()
+        station.listen(1.0)
+    assert vehicle.stop() == 0
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert log.ended == "stopped by the ground station"
+
+
+def test_the_default_scenario_stands_ready(serve: Callable[..., Served]) -> None:
+    """And a log is played into a station as it was flown."""
+    vehicle = serve()
+    with UdpStation(vehicle.port) as station:
+        place = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT")
+        assert math.isclose(place.lat / 1e7, 36.5, abs_tol=0.2)
+        assert math.isclose(place.relative_alt / 1e3, 150.0, abs_tol=1.0)
+        state = station.until(lambda m: m.get_type() == "MISSION_CURRENT")
+        assert state.mission_state == mavlink.MISSION_STATE_NO_MISSION
+        assert station.command(176, 1, 10) == mavlink.MAV_RESULT_DENIED
+        station.send(mavlink.MAVLink_param_request_list_message(1, 1))
+        count = station.until(lambda m: m.get_type() == "PARAM_VALUE").param_count
+        station.listen(0.5)
+        names = {m.param_id for m in station.log if m.get_type() == "PARAM_VALUE"}
+        assert len(names) == count
+        assert {"AIRSPEED_CRUISE", "PFLY_FORCE"} <= names
+    assert vehicle.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("argv", "word"),
+    [
+        (["--bind", "0.0.0.0:0"], "--bind 0.0.0.0:0"),
+        (["--to", "192.0.2.1:14550"], "--to 192.0.2.1"),
+        (["--to", "here:14550"], "an IP address is expected"),
+        (["--to", "127.0.0.1:x"], "IP:PORT is expected"),
+        (["--speed", "0"], "0.1 to 100"),
+        (["none.waypoints"], "no such file"),
+        (["--sign-key", "none"], "none: cannot be read"),
+        (["--allow", "300.1.1.1"], "--allow 300.1.1.1"),
+    ],
+)
+def test_bad_usage_is_refused(
+    argv: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = main(["serve", *argv])
+    except SystemExit as exit_:
+        code = exit_.code
+    assert code == 2
+    assert word in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
