@@ -171,7 +171,7 @@ def replay(args: argparse.Namespace) -> int:
 
     log = read_log(Path(args.log))
     if args.to:
-        from planfly.serve import play
+        from planfly.play import play
 
         play(log, args)
         return _replayed(args, log)
