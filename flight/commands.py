@@ -72,7 +72,9 @@ class Pilot:
     def set_mode(self, mode: int) -> Answer:
         """Change to one of ArduPlane's modes."""
         if mode not in MODE_NAMES:
-            return Answer(DENIED, f"mode {mode}: this vehicle has MANUAL, LOITER and AUTO")
+            known = mavlink.enums["PLANE_MODE"].get(mode)
+            name = known.name.removeprefix("PLANE_MODE_") if known else f"mode {mode}"
+            return Answer(DENIED, f"{name} denied: this vehicle has MANUAL, LOITER and AUTO")
         if self.flying and mode != AUTO:
             return Answer(DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; a forced disarm ends the flight")
         if mode == AUTO and self.ready is None and not self.judging:

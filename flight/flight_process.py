@@ -29,7 +29,7 @@ FLUSH = 0.2
 # A machine that falls this far behind the clock (s) lets the flight run late rather than in one leap.
 _BEHIND = 0.5
 _MOMENT, _ANSWER = b"M", b"A"
-STOPPED = "stopped by the ground station"
+STOPPED, SHUT = "stopped by the ground station", "stopped: the vehicle was shut down"
 
 # Words for the stations: MAV_SEVERITY and text.
 Words = tuple[int, str]
@@ -103,14 +103,6 @@ class FlightLog(Protocol):
 
     def abandon(self) -> None:
         """Close the log of a flight that could not go on."""
-
-
-@dataclass(frozen=True, slots=True)
-class Prepared:
-    """A mission ready to fly."""
-
-    setup: FlightSetup
-    ready: Ready
 
 
 class Hangar(Protocol):
@@ -210,7 +202,7 @@ def _in_step(
         if connection.poll():
             order = _order(connection)
             if isinstance(order, Stop):
-                ended = ended or STOPPED
+                ended = ended or (SHUT if order.quit else STOPPED)
                 go_on = not order.quit
         if pending and (ended or now - flushed >= FLUSH):
             log.write(as_track(np.concatenate(pending)))

@@ -112,7 +112,8 @@ def telemetry_message(name: str, status: Status) -> Any:
 
 def status_texts(text: str, severity: int, number: int) -> list[Any]:
     """STATUSTEXT of any text, in pieces of 50 bytes that stations join again.  number: 1..65535, new for each text."""
-    data = text.encode("ascii", "replace")[:400]
+    # Ground stations show ASCII.
+    data = text.replace("°", " deg").encode("ascii", "replace")[:400]
     pieces = [data[at : at + 50] for at in range(0, len(data), 50)]
     if len(pieces) <= 1:
         return [mavlink.MAVLink_statustext_message(severity, data)]

@@ -18,7 +18,7 @@ from flight.vehicle import CRITICAL, INFO, NOTICE, WARNING
 from flight.watch import Watcher
 from logs.check import judge_flight, judge_geometry
 from logs.recorder import Recorder
-from logs.verdict import Verdict
+from logs.verdict import Finding, Verdict
 from planfly.missions import open_mission
 from planfly.pipeline import Vehicle as Airframe
 from planfly.pipeline import load_vehicle, make_setup
@@ -175,7 +175,12 @@ def verdict_words(level: str, verdict: Verdict) -> tuple[Words, ...]:
     failed = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
         return ((INFO, f"verdict ({level}): FLYABLE"),)
-    lines = [(WARNING, f"{item.rule} at {item.where}: {item.reason}") for item in failed[:_MOST_WORDS]]
+    lines = [(WARNING, f"{_heading(item)}: {item.reason}") for item in failed[:_MOST_WORDS]]
     if len(failed) > _MOST_WORDS:
         lines.append((WARNING, f"and {len(failed) - _MOST_WORDS} more findings"))
     return ((WARNING, f"verdict ({level}): NOT FLYABLE"), *lines)
+
+
+def _heading(item: Finding) -> str:
+    """Rule and place, the place once."""
+    return item.rule if item.reason.startswith(item.where) else f"{item.rule} at {item.where}"
