@@ -74,6 +74,12 @@ def check_access(access: Access) -> None:
             )
         if name == "--to" and host not in access.allowed:
             raise FlightError(f"{name} {host}:{port}: beyond this machine: give --sign-key FILE or --allow {host}")
+    far = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
+    if far and is_loopback(access.bind[0]):
+        raise FlightError(
+            f"--bind {access.bind[0]}:{access.bind[1]}: cannot reach {far[0]} from there; bind to an address of this"
+            " machine's network, or 0.0.0.0"
+        )
 
 
 def is_loopback(host: str) -> bool:

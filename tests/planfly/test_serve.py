@@ -199,6 +199,23 @@ def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served]) -> None:
     assert log.ended == "stopped: the vehicle was shut down"
 
 
+def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """A station that signs is served; one that does not is called by heartbeats alone."""
+    key = bytes(range(32))
+    (tmp_path / "key").write_text(key.hex(), encoding="ascii")
+    (tmp_path / "key").chmod(0o600)
+    vehicle = serve("--scenario", "field.toml", "--sign-key", "key")
+    with UdpStation(vehicle.port) as stranger, UdpStation(vehicle.port, system=254) as station:
+        for mav in (station.mav, station._parser):
+            mav.signing.secret_key = key
+            mav.signing.timestamp = int((time.time() - 1_420_070_400) * 1e5)
+        station.mav.signing.sign_outgoing = True
+        assert station.upload(ROUTE) == 0
+        assert station.until(lambda m: m.get_type() == "ATTITUDE").get_signed()
+        assert stranger.listen(1.5) == []
+    assert vehicle.stop() == 0
+
+
 def test_the_default_scenario_stands_ready(serve: Callable[..., Served]) -> None:
     """And a log is played into a station as it was flown."""
     vehicle = serve()
