@@ -94,6 +94,10 @@ class Pilot:
             Answer(ACCEPTED) if on else Answer(DENIED, "pause denied: a flight is evidence only if it is flown through")
         )
 
+    def uploaded(self) -> None:
+        """A mission has come and is being judged."""
+        self.judging, self.mission_state = True, NOT_STARTED
+
     def judged(self, ready: Ready) -> str:
         """Take a verdict; why the vehicle was disarmed, "" if it was not."""
         self.judging = False

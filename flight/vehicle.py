@@ -188,7 +188,7 @@ class Vehicle:
         mission, self._shift = uploaded(self.server.lists, self._where[1])
         # A fence or rally points that are changed need not repeat what was said of the mission.
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.pilot.judging)
-        self.pilot.judging = True
+        self.pilot.uploaded()
         self._outstanding = True
         self._order(Judge(mission, self._number))
         self._refresh()
