@@ -7,7 +7,7 @@ read.  Nothing is printed here.
 import itertools
 import math
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,19 +87,14 @@ def _stretches(track: Track, route: Route) -> list[_Stretch]:
     return [stretch for stretch in cut if 0 <= stretch.leg < route.legs]
 
 
-def _circle(route: Route, leg: int) -> int:
-    """First leg of the loiter that a leg is part of; the leg itself where it is of none."""
-    while leg and min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]:
-        if route.arcs[leg - 1] == 0.0 or route.items[leg - 1] != route.items[leg]:
-            break
-        leg -= 1
-    return leg
-
-
 def _grouped(stretches: list[_Stretch], route: Route) -> list[list[_Stretch]]:
     """Stretches, those around one circle together."""
-    groups = itertools.groupby(stretches, key=lambda stretch: _circle(route, stretch.leg))
-    return [list(group) for _, group in groups]
+    first: list[int] = []
+    for leg in range(route.legs):
+        around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
+        goes_on = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
+        first.append(first[-1] if goes_on else leg)
+    return [list(group) for _, group in itertools.groupby(stretches, key=lambda stretch: first[stretch.leg])]
 
 
 def _waypoint(route: Route, index: int) -> str:
@@ -147,7 +142,9 @@ def _turns(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
     bank = np.abs(track.attitude[:, 0].astype(np.float64))
     entries = []
     for before, after in itertools.pairwise(stretches):
-        if after.leg != before.leg + 1 or _circle(route, after.leg) == _circle(route, before.leg):
+        # The corners of a circle are told as its loiter; a loiter that is left at once has one.
+        same = route.items[max(0, after.leg - 1) : after.leg + 2] == route.items[after.leg]
+        if after.leg != before.leg + 1 or (route.arcs[after.leg] > 0.0 and same.sum() > 1):
             continue
         angle = math.degrees(turns[before.leg])
         way = "right" if angle > 0.0 else "left"

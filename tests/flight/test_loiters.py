@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from flight.routing import make_route
 from flight.setup import FlightSetup, limits_of
 from flight.simulate import simulate
 from logs.check import judge_flight, judge_geometry
+from logs.reader import read_log
+from logs.recorder import Recorder
+from logs.replay import timeline
 from tests.flight.test_route import ORIGIN, ground, mission, refusal, route, wp
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
@@ -215,3 +219,19 @@ def test_a_loiter_cut_short_is_not_complete(flight: tuple[FlightSetup, Any]) -> 
 def test_terrain_and_relative_heights_of_loiters() -> None:
     flown = route(wp(0, 0), wp(0, 2000, 250, command=18, frame=10, p="1 0 150 0"), wp(2500, 0), terrain=ground(320.0))
     assert (flown.waypoints[flown.items == 2, 2] == 570.0).all()
+
+
+def test_a_replay_tells_a_loiter_in_one_line(flight: tuple[FlightSetup, Any], tmp_path: Path) -> None:
+    setup, flown = flight
+    with Recorder(tmp_path / "a.mcap", setup) as recorder:
+        recorder.write(flown.track)
+        recorder.finish(flown.ended, judge_flight(setup, flown.track, flown.ended))
+    log = read_log(tmp_path / "a.mcap")
+    assert (log.setup.route.arcs == setup.route.arcs).all()
+    texts = [entry.text for entry in timeline(log) if entry.kind == "leg"]
+    around = [text for text in texts if text.startswith("loiter of item")]
+    assert [text.split(":")[0] for text in around] == [f"loiter of item {item}" for item in (2, 3, 7)]
+    # Item 5 has its height on the way in and is left at once, on one arc.
+    assert len(texts) < 14
+    lowest = [entry.text for entry in timeline(log) if entry.kind == "ground"]
+    assert len(lowest) == len(texts)
