@@ -50,7 +50,7 @@ class Served:
         try:
             first = self.wait(lambda line: line.startswith("vehicle "))
             self.port = int(first.split(",")[0].rsplit(":", 1)[1])
-            self.wait(lambda line: line.endswith(" ready"), 120.0)
+            self.wait(lambda line: line.endswith(" ready"), 300.0)
         except AssertionError:
             self.kill()
             raise
