@@ -187,10 +187,18 @@ def test_a_log_is_played_into_a_station(tmp_path: Path, served_log: Path) -> Non
     assert main(["replay", str(served_log), "--to", "127.0.0.1:9", "--wait", "0.3"]) == 2
 
 
-def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served]) -> None:
-    vehicle = serve("--scenario", "field.toml")
+def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """The mission is from a file, with a gap in its numbers, and is given to stations that ask for it."""
+    lines = ["0 1 0 16 0 0 0 0 46 8 0 1", "3 0 0 16 0 0 0 0 46 8 100 1", "7 0 3 16 0 0 0 0 46 8.03 100 1"]
+    (tmp_path / "m.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="ascii")
+    vehicle = serve("m.waypoints", "--scenario", "field.toml")
     with UdpStation(vehicle.port) as station:
-        assert station.upload(LONG) == 0
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+        assert station.until(lambda m: m.get_type() == "MISSION_COUNT").count == 3
+        station.send(mavlink.MAVLink_mission_request_int_message(1, 1, 2, 0))
+        back = station.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
+        assert (back.seq, back.frame, back.x, back.y) == (2, 3, LAT, LON + 300_000)
         station.fly()
         station.listen(1.0)
     assert vehicle.stop() == 0
