@@ -30,9 +30,9 @@ def foreign_scenario(mission: Mission, terrain_path: str | None, flight: FlightT
     """Scenario for a mission that has none: its surroundings, no threats, default limits, ``foreign`` set.
 
     terrain_path: an elevation file or embedded name, None for no terrain at all.  flight: the aircraft and how it
-    flies, the defaults if None.  The area is the box of the places flown to and 2 km around, cut at the edge of the
-    tile.  Start and destination are the route's ends; where those are not above ground they are lifted to 1 m, because
-    a scenario's ends must be, while the route (and its verdict) keeps what the mission says.
+    flies, the defaults if None.  The area is the box of the places flown to, their circles and 2 km around, cut at the
+    edge of the tile.  Start and destination are the route's ends; where those are not above ground they are lifted to
+    1 m, because a scenario's ends must be, while the route (and its verdict) keeps what the mission says.
 
     Raises MissionError, and TerrainError where the mission leaves the tile.
     """
@@ -85,7 +85,8 @@ def _boxes(mission: Mission, origin: GeoOrigin) -> tuple[Floats, Floats]:
         # The error that names the item.
         make_route(mission, origin, None, 1.0, False)
     flown = np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
-    return np.clip(flown + np.array([-AROUND, AROUND]), -MAP_REACH, MAP_REACH), flown
+    around = AROUND + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
+    return np.clip(flown + np.array([-around, around]), -MAP_REACH, MAP_REACH), flown
 
 
 def _ground(

@@ -10,6 +10,7 @@ from flight.mission import (
     PLACES,
     TAKEOFFS,
     Command,
+    Frame,
     Home,
     Mission,
     MissionItem,
@@ -21,16 +22,48 @@ from world.errors import MissionError
 MOST_STOPS = 10_000
 _MOST_STEPS = 200_000
 
-_LOITERS = frozenset(
-    {Command.NAV_LOITER_UNLIM, Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME, Command.NAV_LOITER_TO_ALT}
-)
+# A loiter without end is flown for this long, s, and the mission ends there.
+UNLIMITED = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Loiter:
+    """A circle to fly: radius in m, positive to the right, 0 for the aircraft's own.
+
+    turns, seconds: how long, 0 for what does not count; neither is shortened, and the circle is left on the first
+    tangent to the next place after them.  to_height: until the item's height is reached.
+    """
+
+    radius: float
+    turns: float = 0.0
+    seconds: float = 0.0
+    to_height: bool = False
+
+    def sweep(self, airspeed: float, radius: float) -> float:
+        """Angle to fly around at least, rad.  In wind a circle over the ground takes longer than the air distance."""
+        return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
+
+
+def loiter_of(item: MissionItem) -> Loiter | None:
+    """Circle that an item asks for; None for any other command."""
+    p1, p2, p3, _ = (0.0 if math.isnan(value) else value for value in item.params)
+    if item.command == Command.NAV_LOITER_UNLIM:
+        return Loiter(p3, seconds=UNLIMITED)
+    if item.command == Command.NAV_LOITER_TURNS:
+        return Loiter(p3, turns=p1)
+    if item.command == Command.NAV_LOITER_TIME:
+        return Loiter(p3, seconds=p1)
+    if item.command == Command.NAV_LOITER_TO_ALT:
+        # Its radius is the second parameter; the first asks to leave on the next leg's course, as all do here.
+        return Loiter(p2, to_height=True)
+    return None
 
 
 @dataclass(frozen=True, slots=True)
 class Stop:
     """A place to fly to: the item's seq (-1: none), degrees, height in the item's frame, NaN to keep the last height.
 
-    airspeed: m/s on the leg that ends here.  acceptance: m, 0 where none is stated.
+    airspeed: m/s on the leg that ends here.  acceptance: m, 0 where none is stated.  loiter: the circle flown about it.
     """
 
     item: int
@@ -41,11 +74,7 @@ class Stop:
     frame: int
     airspeed: float
     acceptance: float = 0.0
-
-    @property
-    def loiters(self) -> bool:
-        """Whether an autopilot would circle here."""
-        return self.command in _LOITERS
+    loiter: Loiter | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,12 +203,14 @@ class _Walk:
             self._land(item)
         elif item.command == Command.DO_CHANGE_SPEED:
             self._change_speed(item)
+        elif item.command == Command.DO_LAND_START:
+            self.notes.add("DO_LAND_START: a mark, nothing to fly", item.seq)
         elif item.command != Command.DO_JUMP:
             self.notes.add(f"{command_name(item.command)}: not flown", item.seq)
 
     def _stop(self, item: MissionItem, acceptance: float = 0.0) -> Stop:
         lat, lon = item.lat_deg, item.lon_deg
-        return Stop(item.seq, item.command, lat, lon, item.alt, item.frame, self.airspeed, acceptance)
+        return Stop(item.seq, item.command, lat, lon, item.alt, item.frame, self.airspeed, acceptance, loiter_of(item))
 
     def _take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)
@@ -202,7 +233,11 @@ class _Walk:
 
     def _go(self, item: MissionItem) -> None:
         name = command_name(item.command)
-        if not item.has_position:
+        if not item.has_position and loiter_of(item) is not None and self.stops:
+            self.notes.add(f"{name} without a position: flown about the place before", item.seq)
+            alt = math.nan if item.frame == Frame.MISSION else item.alt
+            item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
+        elif not item.has_position:
             self.notes.add(
                 f"{name} without a position, which means the place where the aircraft is: not flown", item.seq
             )
@@ -212,7 +247,10 @@ class _Walk:
                 self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
         elif item.command == Command.NAV_SPLINE_WAYPOINT:
             self.notes.add(f"{name}: flown as a straight waypoint", item.seq)
-        else:
+        elif item.command == Command.NAV_LOITER_UNLIM:
+            self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
+            self.ended = True
+        elif loiter_of(item) is None:
             self.notes.add(f"{name}: flown through as a waypoint", item.seq)
         if math.isnan(item.alt):
             self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)

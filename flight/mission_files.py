@@ -1,22 +1,35 @@
 """Mission files by suffix and content."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
 from flight.mission import MOST_BYTES, Mission
 from flight.plan_file import parse_plan_file, plan_file_text
-from flight.waypoints_file import parse_waypoints, waypoints_text
+from flight.waypoints_file import fence_text, parse_waypoints, rally_text, waypoints_text
 from world.errors import MissionError
 
-Kind = Literal["waypoints", "plan"]
+Kind = Literal["waypoints", "plan", "fence", "rally"]
 
-KINDS: dict[str, Kind] = {".waypoints": "waypoints", ".plan": "plan", ".txt": "waypoints"}
+KINDS: dict[str, Kind] = {
+    ".waypoints": "waypoints",
+    ".plan": "plan",
+    ".txt": "waypoints",
+    ".fence": "fence",
+    ".rally": "rally",
+}
 
+_WRITERS: dict[Kind, Callable[[Mission], str]] = {
+    "waypoints": waypoints_text,
+    "plan": plan_file_text,
+    "fence": fence_text,
+    "rally": rally_text,
+}
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> Kind:
-    """Form that a file's suffix names.  Raises MissionError for any suffix but .waypoints, .txt and .plan."""
+    """Form that a file's suffix names.  Raises MissionError for any other suffix."""
     try:
         return KINDS[path.suffix.lower()]
     except KeyError:
@@ -24,7 +37,7 @@ def mission_kind(path: Path) -> Kind:
 
 
 def read_mission(path: Path) -> Mission:
-    """Read a mission file: WPL 110 text (.waypoints, .txt) or a `.plan`.
+    """Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
 
     The suffix must be known; where text and suffix disagree, the text decides.  Raises MissionError with one line:
     file, line or field, value, what is allowed.
@@ -44,7 +57,7 @@ def parse_mission(text: str, source: str) -> Mission:
 
 def mission_text(mission: Mission, kind: Kind) -> str:
     """Mission as the text of a file; the same mission always gives the same bytes."""
-    return waypoints_text(mission) if kind == "waypoints" else plan_file_text(mission)
+    return _WRITERS[kind](mission)
 
 
 def _read_text(path: Path) -> str:

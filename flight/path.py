@@ -1,8 +1,9 @@
 """The path that a fixed wing can fly: straight legs joined by fly-by arcs, slopes joined by parabolas.
 
-A fly-by arc has the bank-limited radius for the highest ground speed on its way.  Where the legs are too short for
-their turns, arcs are drawn tighter than the bank limit so that the path stays whole: the flight will then leave it, and
-the verdict says so.  A fly-over waypoint is passed through: its corner stays sharp, as do U-turns.
+A fly-by arc has the bank-limited radius for the highest ground speed on its way, and the corners of a loiter that of
+its circle.  Where the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
+stays whole: the flight will then leave it, and the verdict says so.  A fly-over waypoint is passed through: its corner
+stays sharp, as do U-turns.
 """
 
 import math
@@ -86,7 +87,9 @@ def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Fl
         if route.fly_over[i] or turn < 1e-6:
             continue
         speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
-        radius = limits.turn_radius(float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed)
+        radius = float(route.arcs[i]) or limits.turn_radius(
+            float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed
+        )
         tangents[i] = radius * math.tan(turn / 2)
     sharp = np.concatenate([[False], np.abs(turns) > SHARPEST, [False]])
     short = tangents[:-1] + tangents[1:] > runs

@@ -1,6 +1,6 @@
 """The `.plan` JSON form of a mission (QGroundControl's "Plan File Format"): read, and written for QGC and MAVSDK.
 
-Only SimpleItems: a ComplexItem is a recipe that its ground station turns into items.
+ComplexItems are read as the simple items that they stand for (`flight.plan_complex`).
 """
 
 import json
@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from flight.fences import INCLUSIONS, POLYGONS, fence_shapes
 from flight.mission import (
     AMSL,
     LANDINGS,
@@ -28,6 +29,7 @@ from flight.mission import (
     position_problem,
     renumbered,
 )
+from flight.plan_complex import expand_items
 from world.errors import MissionError
 from world.scenario_file import first_error
 
@@ -133,22 +135,15 @@ def parse_plan_file(text: str, source: str) -> Mission:
 
 
 def _check_kind(data: Any, source: str) -> list[str]:
-    """Refuse what is not a plan of simple items, before its missing keys are named; returns warnings."""
+    """Refuse what is no plan before its missing keys are named, and expand its items; returns warnings."""
     if not isinstance(data, dict):
         raise MissionError(f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}')
     if data.get("fileType") != "Plan":
         raise MissionError(f'{source}: fileType: {json.dumps(data.get("fileType"))[:60]}: "Plan" is expected')
+    warnings: list[str] = []
     mission = data.get("mission")
-    items = mission.get("items") if isinstance(mission, dict) else None
-    for k, item in enumerate(items if isinstance(items, list) else []):
-        kind = item.get("type") if isinstance(item, dict) else "SimpleItem"
-        if kind != "SimpleItem":
-            name = str(item.get("complexItemType", ""))[:40]
-            raise MissionError(
-                f"{source}: mission.items.{k}.type: {json.dumps(kind)[:40]} {name!r}: only SimpleItem is read;"
-                f" have the ground station turn it into items first"
-            )
-    warnings = []
+    if isinstance(mission, dict) and isinstance(mission.get("items"), list):
+        mission["items"] = expand_items(mission["items"], source, warnings)
     for key in ("geoFence", "rallyPoints"):
         part = data.get(key)
         if isinstance(part, dict) and part.get("version") != 2:
@@ -185,7 +180,7 @@ def _read_fences(fence: _Fence, source: str) -> tuple[MissionItem, ...]:
 
     def add(command: Command, p1: float, point: list[float], place: str) -> None:
         item = MissionItem(
-            len(found) + 1, int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
+            len(found), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
         )
         problem = item_problem(item)
         if problem is not None:
@@ -206,7 +201,7 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
     found = []
     for k, (lat, lon, alt) in enumerate(rally.points):
         item = MissionItem(
-            k + 1, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, on_grid(lat), on_grid(lon), alt
+            k, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, on_grid(lat), on_grid(lon), alt
         )
         problem = item_problem(item)
         if problem is not None:
@@ -281,21 +276,15 @@ def _item_json(item: MissionItem) -> dict[str, Any]:
 def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
     circles: list[dict[str, Any]] = []
     polygons: list[dict[str, Any]] = []
-    k = 0
-    while k < len(fences):
-        item = fences[k]
-        inclusion = item.command in (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
-        if item.command in (Command.NAV_FENCE_CIRCLE_INCLUSION, Command.NAV_FENCE_CIRCLE_EXCLUSION):
+    for shape in fence_shapes(fences):
+        item = shape[0]
+        inclusion = item.command in INCLUSIONS
+        if item.command in POLYGONS:
+            polygon = [[corner.lat_deg, corner.lon_deg] for corner in shape]
+            polygons.append({"inclusion": inclusion, "polygon": polygon, "version": 1})
+        else:
             disc = {"center": [item.lat_deg, item.lon_deg], "radius": item.params[0]}
             circles.append({"circle": disc, "inclusion": inclusion, "version": 1})
-            k += 1
-            continue
-        corners = fences[k : k + int(item.params[0])]
-        if len(corners) < item.params[0] or any(corner.command != item.command for corner in corners):
-            raise MissionError(f"fence item {item.seq}: p1 {item.params[0]:g}: fewer corners follow than it counts")
-        polygon = [[corner.lat_deg, corner.lon_deg] for corner in corners]
-        polygons.append({"inclusion": inclusion, "polygon": polygon, "version": 1})
-        k += len(corners)
     return {"circles": circles, "polygons": polygons, "version": 2}
 
 

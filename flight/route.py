@@ -1,6 +1,6 @@
 """A mission as the aircraft flies it: world-frame waypoints with speeds, jumps unrolled."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +14,9 @@ class Route:
 
     waypoints: (w, 3) world m.  airspeed: (w - 1,) m/s on each leg.  acceptance: (w,) m, 0 where the mission states
     none (advisory: the verdict has its own rule).  fly_over: (w,) bool.  items: (w,) the mission item's seq, -1 for a
-    point that is no item.  started: a sentence: where and how the flight starts.  notes: what cannot be flown as
-    written, with item numbers.
+    point that is no item.  arcs: (w,) m, the radius that the path turns with there, 0 for the bank limit's; a loiter is
+    the corners of a polygon around its circle, all of one item, each with the circle's radius.  started: a sentence:
+    where and how the flight starts.  notes: what cannot be flown as written, with item numbers.
     """
 
     waypoints: Floats
@@ -25,10 +26,13 @@ class Route:
     items: NDArray[np.int64]
     started: str
     notes: tuple[str, ...] = ()
+    arcs: Floats = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
-        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items"):
+        if not len(self.arcs):
+            object.__setattr__(self, "arcs", np.zeros(len(self.waypoints)))
+        for name in ("waypoints", "airspeed", "acceptance", "fly_over", "items", "arcs"):
             array = np.array(getattr(self, name))
             array.setflags(write=False)
             object.__setattr__(self, name, array)

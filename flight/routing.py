@@ -5,12 +5,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.circles import PLAIN_SLOPE, OwnRadius, SpiralSlopes, lay_circles
 from flight.itinerary import Itinerary, Notes, Stop, plan_stops
 from flight.mission import AMSL, OVER_HOME, TAKEOFFS, Home, Mission, command_name
 from flight.route import Route
 from world.errors import MissionError
-from world.frames import GeoOrigin, to_map
+from world.frames import GeoOrigin, to_geo, to_map
 from world.geometry import leg_courses
+from world.limits import Limits
 from world.scenario_file import MAP_REACH
 from world.terrain import Terrain
 
@@ -20,18 +22,29 @@ Floats = NDArray[np.float64]
 SAME_PLACE = 1.0
 # Heights (m AMSL) that a flight may be asked to keep.
 LOWEST, HIGHEST = -500.0, 9000.0
+# Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.
+DEFAULT_RADIUS = 80.0
+OVER_TIGHTEST = 1.1
+# A spiral climbs and sinks with this share of what the aircraft can in straight flight.
+SPIRAL_SHARE = 0.6
 # A home that is further than this (m) from the ground at its place is worth a note.
 _HOME_ERROR = 30.0
 
 
 def make_route(
-    mission: Mission, origin: GeoOrigin, terrain: Terrain | None, default_airspeed: float, fly_over: bool
+    mission: Mission,
+    origin: GeoOrigin,
+    terrain: Terrain | None,
+    default_airspeed: float,
+    fly_over: bool,
+    limits: Limits | None = None,
 ) -> Route:
     """Route of a mission in the map about ``origin``.
 
     terrain: None where none is known; heights above terrain are then an error.  default_airspeed: m/s until the
     mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and sets none).  fly_over: whether
-    waypoints are flown through instead of by.
+    waypoints are flown through instead of by.  limits: the aircraft's, for the radius of a loiter that states none and
+    the slope of a spiral; None takes 80 m and 5 %.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `SAME_PLACE`.  Raises MissionError, naming the item, for what cannot be placed,
@@ -45,14 +58,17 @@ def make_route(
     for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
         last = float(kept[-1][1][2]) if kept else math.nan
         point = np.array([east, north, heights.amsl(stop, float(east), float(north), last)])
-        if kept and math.dist(kept[-1][1][:2], point[:2]) < SAME_PLACE:
+        circles = stop.loiter is not None or bool(kept and kept[-1][0].loiter is not None)
+        if kept and not circles and math.dist(kept[-1][1][:2], point[:2]) < SAME_PLACE:
             kept[-1] = (_merge(mission.source, kept[-1], (stop, point), notes), kept[-1][1])
         else:
             kept.append((stop, point))
-    if len(kept) < 2:
-        raise MissionError(f"{mission.source}: {len(kept)} place to fly to: at least two different ones are expected")
-    stops = [stop for stop, _ in kept]
-    waypoints = np.array([point for _, point in kept])
+    points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
+    if len(points) < 2:
+        raise MissionError(f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected")
+    stops = [point.stop for point in points]
+    waypoints = np.array([point.place for point in points])
+    arcs = np.array([point.arc for point in points])
     if mission.cruise_speed not in (None, default_airspeed) and stops[1].airspeed == default_airspeed:
         notes.add(
             f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
@@ -62,11 +78,43 @@ def make_route(
         waypoints=waypoints,
         airspeed=np.array([stop.airspeed for stop in stops[1:]]),
         acceptance=np.array([stop.acceptance for stop in stops]),
-        fly_over=np.full(len(stops), fly_over),
+        fly_over=np.where(arcs > 0.0, False, fly_over),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
-        started=_started(itinerary, stops[0], waypoints),
+        started=_started(itinerary, stops[0], origin, waypoints),
         notes=itinerary.notes + notes.lines(),
+        arcs=arcs,
     )
+
+
+def _own_radius(limits: Limits | None) -> OwnRadius:
+    """Radius of a loiter that states none: a tenth over the bank limit's in this wind, in whole tens of metres."""
+
+    def radius(airspeed: float, up: float) -> float:
+        if limits is None:
+            return DEFAULT_RADIUS
+        tightest = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
+        if not math.isfinite(tightest):
+            return DEFAULT_RADIUS
+        return max(DEFAULT_RADIUS, math.ceil(OVER_TIGHTEST * tightest / 10.0) * 10.0)
+
+    return radius
+
+
+def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
+    """Slopes of a spiral: a share of what the aircraft can on the worst course around it."""
+
+    def slopes(airspeed: float, up: float) -> tuple[float, float]:
+        if limits is None:
+            return PLAIN_SLOPE, PLAIN_SLOPE
+        found = []
+        for k, most in enumerate((limits.max_climb, limits.max_dive)):
+            can = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
+            least = min(can, math.inf if most is None else most)
+            # An aircraft that cannot climb at all gets a plain spiral, and the slope rule says so.
+            found.append(SPIRAL_SHARE * math.tan(least) if 0.0 < least < 1.5 else PLAIN_SLOPE)
+        return found[0], found[1]
+
+    return slopes
 
 
 def _name(stop: Stop) -> str:
@@ -161,7 +209,7 @@ def _merge(source: str, kept: tuple[Stop, Floats], new: tuple[Stop, Floats], not
     climb = float(new[1][2] - kept[1][2])
     if abs(climb) >= SAME_PLACE:
         side = "above" if climb > 0.0 else "below"
-        if not (before.loiters or after.loiters or after.command in TAKEOFFS):
+        if after.command not in TAKEOFFS:
             raise MissionError(
                 f"{source}: {_name(after)}: {abs(climb):.1f} m straight {side} {_name(before)}:"
                 " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing"
@@ -172,12 +220,17 @@ def _merge(source: str, kept: tuple[Stop, Floats], new: tuple[Stop, Floats], not
     return before if before.item >= 0 else after
 
 
-def _started(itinerary: Itinerary, first: Stop, waypoints: Floats) -> str:
+def _started(itinerary: Itinerary, first: Stop, origin: GeoOrigin, waypoints: Floats) -> str:
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
-    where = f"{first.lat_deg:.7f}, {first.lon_deg:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
+    lat, lon = first.lat_deg, first.lon_deg
+    if first.loiter is not None:
+        lat, lon = (float(value) for value in to_geo(origin, waypoints[0, 0], waypoints[0, 1]))
+    where = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
     item = itinerary.takeoff
+    name = "no TAKEOFF" if item is None else f"{command_name(item.command)} (item {item.seq})"
+    if first.loiter is not None:
+        return f"{name}: starts trimmed in the air on the circle of item {first.item}: {where}"
     if item is not None:
-        name = command_name(item.command)
         over = "home" if itinerary.has_home else "the first position, as there is no home,"
-        return f"{name} (item {item.seq}): starts trimmed in the air over {over} at that item's height: {where}"
-    return f"no TAKEOFF: starts trimmed at the first position, item {first.item}: {where}"
+        return f"{name}: starts trimmed in the air over {over} at that item's height: {where}"
+    return f"{name}: starts trimmed at the first position, item {first.item}: {where}"

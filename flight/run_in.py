@@ -46,6 +46,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
         acceptance=np.pad(route.acceptance, (head, tail)),
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
+        arcs=np.pad(route.arcs, (head, tail)),
         started=started,
     )
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from decimal import Decimal
 from itertools import pairwise
 
+from flight.fences import fence_shapes, numbered
 from flight.mission import (
     FENCES,
     LANDINGS,
@@ -30,6 +31,8 @@ from flight.mission import (
 from world.errors import MissionError
 
 HEADER = "QGC WPL 110"
+# Lines of a file, comments and empty ones included: ten an item.
+MOST_LINES = 10 * MOST_ITEMS
 
 _COLUMNS = (
     "seq",
@@ -66,6 +69,9 @@ def parse_waypoints(text: str, source: str) -> Mission:
     decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Raises MissionError with file, line, field,
     value and what is allowed.
     """
+    breaks = max(text.count("\n"), text.count("\r"))
+    if breaks > MOST_LINES:
+        raise MissionError(f"{source}: {breaks:,} lines: at most {MOST_LINES:,} are read")
     lines = [
         (number, line.strip())
         for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
@@ -87,11 +93,13 @@ def parse_waypoints(text: str, source: str) -> Mission:
         if after.item.seq <= before.item.seq:
             raise MissionError(f"{after.place}: seq {after.item.seq}: must be above the one before, {before.item.seq}")
     home, body = _split_home(rows)
+    fences = numbered([row.item for row in body if row.item.command in FENCES])
+    fence_shapes(fences, source)
     return Mission(
         home=home,
         items=tuple(row.item for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}),
-        fences=tuple(row.item for row in body if row.item.command in FENCES),
-        rally=tuple(row.item for row in body if row.item.command == Command.NAV_RALLY_POINT),
+        fences=fences,
+        rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
         warnings=tuple(_warnings(rows, body)),
         source=source,
     )
@@ -142,7 +150,11 @@ def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
 
 
 def _warnings(rows: list[_Row], body: list[_Row]) -> list[str]:
-    found = []
+    found: list[str] = []
+    plain = [row for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}]
+    if not plain:
+        # A fence or rally file: no home line, as MAVProxy has it, or one, as Mission Planner does.
+        return found
     if not any(row.current for row in rows):
         found.append("no current item: flown from the first")
     if len(body) == len(rows):
@@ -172,13 +184,17 @@ def waypoints_text(mission: Mission) -> str:
 
 
 def fence_text(mission: Mission) -> str:
-    """Fences of a mission as a WPL file of their own."""
-    return _text(mission.home, mission.fences)
+    """Fences of a mission as a WPL file of their own: numbered from 0, and no home line (MAVProxy's `fence load`)."""
+    return _lines(mission.fences)
 
 
 def rally_text(mission: Mission) -> str:
-    """Rally points of a mission as a WPL file of their own."""
-    return _text(mission.home, mission.rally)
+    """Rally points of a mission as a WPL file of their own, as `fence_text`."""
+    return _lines(mission.rally)
+
+
+def _lines(items: tuple[MissionItem, ...]) -> str:
+    return "\n".join([HEADER, *(_line(item, current=False) for item in items)]) + "\n"
 
 
 def _text(home: Home | None, items: tuple[MissionItem, ...]) -> str:

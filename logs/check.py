@@ -16,6 +16,7 @@ from logs.rules_flight import (
     speed_findings,
     waypoint_findings,
 )
+from logs.rules_loiter import fold_loiters
 from logs.rules_slope import slope_findings
 from logs.rules_turn import turn_findings
 from logs.rules_world import bounds_findings, clearance_findings, threat_findings
@@ -35,7 +36,7 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     """
     shape = route_shape(setup, envelope=envelope)
     flown = lay_track(shape, track)
-    findings = (
+    findings: tuple[Finding, ...] = (
         *turn_findings(shape, flown),
         *slope_findings(shape, flown),
         *clearance_findings(shape, flown),
@@ -47,6 +48,7 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
         *departure_findings(shape, flown),
         *completion_findings(shape, flown, ended, whole),
     )
+    findings = fold_loiters(shape, flown, findings)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
     findings = with_suggestions(shape, flown, findings)

@@ -5,6 +5,8 @@ import math
 from flight.setup import FlightSetup
 from logs.route_shape import RouteShape, route_shape
 from logs.rules_flight import energy_findings, speed_findings
+from logs.rules_loiter import fold_loiters
+from logs.rules_mission import mission_findings
 from logs.rules_slope import slope_findings
 from logs.rules_turn import turn_findings
 from logs.rules_world import bounds_findings, clearance_findings, threat_findings
@@ -16,7 +18,7 @@ from planner.plan import Plan, Violation
 
 def geometric_findings(shape: RouteShape) -> tuple[Finding, ...]:
     """Findings of a route's geometry against the aircraft's envelope."""
-    return (
+    findings: tuple[Finding, ...] = (
         *turn_findings(shape, None, geometric=True),
         *slope_findings(shape, None, geometric=True),
         *clearance_findings(shape, None, geometric=True),
@@ -25,12 +27,14 @@ def geometric_findings(shape: RouteShape) -> tuple[Finding, ...]:
         *speed_findings(shape, None, geometric=True),
         *energy_findings(shape, None, geometric=True),
     )
+    return fold_loiters(shape, None, findings)
 
 
 def judge_geometry(setup: FlightSetup) -> Verdict:
     """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
     shape = route_shape(setup)
     findings = (
+        *mission_findings(setup),
         *with_suggestions(shape, None, geometric_findings(shape)),
         *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )

@@ -121,6 +121,14 @@ class Recorder:
         if self._last_ns // SECOND_NS > before // SECOND_NS:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
 
+    def flush(self) -> None:
+        """Hand every row received to the operating system now, by the caller's clock.
+
+        For a live flight, so that a killed process loses no whole second: chunks then end where the caller says,
+        and the file's bytes (not its rows) depend on when that was.
+        """
+        self._emit(self._last_ns + 1)
+
     def event(self, time: float, text: str, level: str = "info") -> None:
         """Record what happened at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
         if level not in scene.LEVELS:

@@ -7,7 +7,7 @@ read.  Nothing is printed here.
 import itertools
 import math
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,16 @@ def _stretches(track: Track, route: Route) -> list[_Stretch]:
     return [stretch for stretch in cut if 0 <= stretch.leg < route.legs]
 
 
+def _grouped(stretches: list[_Stretch], route: Route) -> list[list[_Stretch]]:
+    """Stretches, those around one circle together."""
+    first: list[int] = []
+    for leg in range(route.legs):
+        around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
+        goes_on = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
+        first.append(first[-1] if goes_on else leg)
+    return [list(group) for _, group in itertools.groupby(stretches, key=lambda stretch: first[stretch.leg])]
+
+
 def _waypoint(route: Route, index: int) -> str:
     item = int(route.items[index])
     return f"waypoint {index}" if item < 0 else f"waypoint {index} (item {item})"
@@ -108,8 +118,14 @@ def _legs(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
     route = log.setup.route
     courses, runs, slopes = leg_courses(route.waypoints), leg_runs(route.waypoints), leg_slopes(route.waypoints)
     entries = []
-    for stretch in stretches:
+    for group in _grouped(stretches, route):
+        stretch = group[0]
         leg = stretch.leg
+        if len(group) > 1:
+            item, radius = int(route.items[leg]), route.arcs[leg]
+            text = f"loiter of item {item}: legs {leg} to {group[-1].leg} around its circle, radius {radius:.0f} m"
+            entries.append(TimelineEntry(float(log.track.time[stretch.first]), "leg", text))
+            continue
         course = round(math.degrees(courses[leg])) % 360
         text = (
             f"leg {leg} to {_waypoint(route, leg + 1)}: course {course:03d}°, {runs[leg]:.0f} m, "
@@ -126,7 +142,9 @@ def _turns(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
     bank = np.abs(track.attitude[:, 0].astype(np.float64))
     entries = []
     for before, after in itertools.pairwise(stretches):
-        if after.leg != before.leg + 1:
+        # The corners of a circle are told as its loiter; a loiter that is left at once has one.
+        same = route.items[max(0, after.leg - 1) : after.leg + 2] == route.items[after.leg]
+        if after.leg != before.leg + 1 or (route.arcs[after.leg] > 0.0 and same.sum() > 1):
             continue
         angle = math.degrees(turns[before.leg])
         way = "right" if angle > 0.0 else "left"
@@ -144,18 +162,21 @@ def _clearances(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry
     low, at = segment_clearances(terrain, track.position)
     required = log.setup.scenario.limits.min_clearance_m
     entries = []
-    for stretch in stretches:
+    for group in _grouped(stretches, log.setup.route):
+        stretch, name = replace(group[0], last=group[-1].last), f"leg {group[0].leg}"
+        if len(group) > 1:
+            name = f"legs {group[0].leg} to {group[-1].leg}"
         # Segment k goes from row k to row k + 1; the one that leads into the next leg belongs to this one.
         here = low[stretch.first : stretch.last + 1]
         if not np.isfinite(here).any():
             time = float(track.time[stretch.first])
-            entries.append(TimelineEntry(time, "ground", f"leg {stretch.leg}: no terrain data under it"))
+            entries.append(TimelineEntry(time, "ground", f"{name}: no terrain data under it"))
             continue
         k = stretch.first + int(np.nanargmin(here))
         time = float(track.time[k] + at[k] * (track.time[k + 1] - track.time[k]))
         short = "" if low[k] >= required else f", under the required {required:.0f} m"
         part = "" if np.isfinite(here).all() else ", where there is terrain data"
-        text = f"lowest of leg {stretch.leg}: {low[k]:.1f} m above ground{short}{part}"
+        text = f"lowest of {name}: {low[k]:.1f} m above ground{short}{part}"
         entries.append(TimelineEntry(time, "ground", text))
     return entries
 

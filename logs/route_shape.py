@@ -23,8 +23,9 @@ class RouteShape:
     """A route's turns and legs in numbers, and the aircraft's limits at each.
 
     For w waypoints: points (w, 3) m; runs (w - 1,) horizontal m; courses, slopes (w - 1,) rad; turns (w,) rad,
-    positive to the right, 0 at the ends; radius (w,) m of the arc at the bank limit; before, after (w,) m of leg that
-    the turn uses on either side, inf for a U-turn; blend (w,) m of leg beyond them on which the slope still changes;
+    positive to the right, 0 at the ends; radius (w,) m of the arc, at the bank limit or of a loiter's circle; tightest
+    (w,) m, the arc at the bank limit; before, after (w,) m of leg that the turn uses on either side, inf for a U-turn;
+    blend (w,) m of leg beyond them on which the slope still changes;
     sag (w,) m by which such a blend may pass above or below its corner; cut (w,) m by which the fly-by passes the
     waypoint; turn_limit (w,) rad, the sharpest turn there that fits both legs
     beside the neighbouring turns, inf where the envelope is left out;
@@ -45,6 +46,7 @@ class RouteShape:
     blend: Floats
     sag: Floats
     cut: Floats
+    tightest: Floats
     turn_limit: Floats
     climb: Floats
     dive: Floats
@@ -87,10 +89,11 @@ def route_shape(setup: FlightSetup, *, envelope: bool = True) -> RouteShape:
     turns = np.zeros(count)
     if count > 2:
         turns[1:-1] = signed_turns(points)
-    radius, before, after = np.zeros(count), np.zeros(count), np.zeros(count)
+    tightest, radius, before, after = (np.zeros(count) for _ in range(4))
     for i in range(1, count - 1):
         speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
-        radius[i] = turn_radius_between(packed[speed], courses[i - 1], courses[i], points[i, 2])
+        tightest[i] = turn_radius_between(packed[speed], courses[i - 1], courses[i], points[i, 2])
+        radius[i] = route.arcs[i] or tightest[i]
         before[i], after[i] = turn_room(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
     climb, dive, speeds = np.full(legs, math.inf), np.full(legs, math.inf), np.zeros(legs)
     for leg in range(legs):
@@ -119,7 +122,8 @@ def route_shape(setup: FlightSetup, *, envelope: bool = True) -> RouteShape:
         blend=blend,
         sag=sag,
         cut=cut,
-        turn_limit=_turn_limits(setup, runs, radius, before, after) if envelope else np.full(count, math.inf),
+        tightest=tightest,
+        turn_limit=_turn_limits(setup, runs, tightest, before, after) if envelope else np.full(count, math.inf),
         climb=climb,
         dive=dive,
         ground_speed=speeds,

@@ -33,7 +33,8 @@ def turn_limit(shape: RouteShape, i: int) -> tuple[float, str]:
     """Tighter of the scenario's and the aircraft's limit at a waypoint, rad, and whose it is."""
     fixed = shape.limits.max_turn
     aircraft = float(shape.turn_limit[i])
-    if fixed is not None and fixed <= aircraft:
+    # A circle has no angle: its corners are of our making.
+    if fixed is not None and fixed <= aircraft and shape.setup.route.arcs[i] == 0.0:
         return fixed, "scenario"
     return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
 
@@ -85,6 +86,12 @@ def _too_sharp(shape: RouteShape, i: int, planned: float, limit: float, source: 
     speed = float(max(shape.setup.route.airspeed[i - 1 : i + 1]))
     if not math.isfinite(shape.radius[i]):
         return f"{sharp} where the wind leaves no way along a leg at {speed:.0f} m/s"
+    if shape.setup.route.arcs[i] > 0.0:
+        bank = math.degrees(shape.limits.max_bank)
+        return (
+            f"circles with radius {shape.radius[i]:.0f} m; at {speed:.0f} m/s and {bank:.0f}° bank the aircraft turns"
+            f" with {shape.tightest[i]:.0f} m on these courses in this wind"
+        )
     takes = "no length of leg is enough"
     if math.isfinite(shape.after[i]):
         takes = f"that takes {shape.after[i]:.0f} m of each leg"

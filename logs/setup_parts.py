@@ -68,6 +68,7 @@ class RouteFile(SetupModel):
     items: list[int]
     started: str
     notes: list[str]
+    arcs_m: Column = []
 
 
 class EnvelopeFile(SetupModel):
@@ -142,6 +143,7 @@ def route_file(route: Route) -> RouteFile:
         items=route.items.tolist(),
         started=route.started,
         notes=list(route.notes),
+        arcs_m=route.arcs.tolist(),
     )
 
 
@@ -149,6 +151,8 @@ def read_route(file: RouteFile, source: str) -> Route:
     """Return the route of a table.  Raises LogError for arrays that do not fit each other."""
     count = len(file.waypoints_east_north_amsl_m)
     wanted = {"airspeed_mps": count - 1, "acceptance_m": count, "fly_over": count, "items": count}
+    if file.arcs_m:
+        wanted["arcs_m"] = count
     for name, length in wanted.items():
         if len(getattr(file, name)) != length:
             raise LogError(f"{source}: route.{name}: {len(getattr(file, name))} values: {length} are expected")
@@ -160,6 +164,7 @@ def read_route(file: RouteFile, source: str) -> Route:
         items=np.array(file.items, dtype=np.int64),
         started=file.started,
         notes=tuple(file.notes),
+        arcs=np.array(file.arcs_m, dtype=np.float64),
     )
 
 

@@ -9,7 +9,20 @@ from logs.verdict import Finding, Prediction
 _NAMED = 4
 _UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
 # What ends a flight, then what a plan may be mended by.
-_ORDER = ("departure", "completion", "slope", "turn", "clearance", "threat", "bounds", "waypoint", "speed", "energy")
+_ORDER = (
+    "departure",
+    "completion",
+    "mission",
+    "slope",
+    "turn",
+    "loiter",
+    "clearance",
+    "threat",
+    "bounds",
+    "waypoint",
+    "speed",
+    "energy",
+)
 
 
 def headline(findings: Sequence[Finding], flyable: bool) -> str:
@@ -61,6 +74,8 @@ def _numbers(item: Finding) -> str:
         return _clause(item.reason)
     values = [value for value in (item.flown, item.planned) if value is not None]
     unit = _UNITS.get(item.unit, "")
+    if item.rule == "loiter" and item.planned is not None and item.planned < item.limit:
+        return f"radius {item.planned:.0f}{unit} < {item.limit:.0f}{unit}"
     if item.rule in ("clearance", "bounds"):
         low = min(values, default=None)
         if item.flown is not None:
@@ -85,7 +100,7 @@ def summary_text(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
     if setup.route.notes:

@@ -7,7 +7,20 @@ from typing import Any
 
 SCHEMA = "planfly.verdict/1"
 
-RULES = ("turn", "slope", "clearance", "threat", "bounds", "waypoint", "speed", "energy", "departure", "completion")
+RULES = (
+    "mission",
+    "turn",
+    "loiter",
+    "slope",
+    "clearance",
+    "threat",
+    "bounds",
+    "waypoint",
+    "speed",
+    "energy",
+    "departure",
+    "completion",
+)
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,16 @@ def _positive(text: str) -> float:
     return value
 
 
+def _speedup(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.1 <= value <= 100.0:
+        raise argparse.ArgumentTypeError(f"{text!r}: a number from 0.1 to 100 is expected")
+    return value
+
+
 def _wind(text: str) -> tuple[float, float]:
     try:
         speed, source = (float(part) for part in text.split(","))
@@ -82,6 +92,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run_and_plan(command)
     _add_export_and_fly(command)
     _add_log_commands(command)
+    _add_serve(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser
 
@@ -96,6 +107,13 @@ def _overwrite(parser: argparse.ArgumentParser) -> None:
 def _world(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
+
+
+def _flown_by(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--aircraft", metavar="A", help="the aircraft, in place of the scenario's (default: aerosonde)")
+    parser.add_argument(
+        "--airspeed", metavar="M/S", type=_positive, help="until the mission sets one (default: the aircraft's cruise)"
+    )
 
 
 def _add_run_and_plan(command: _Command) -> None:
@@ -133,11 +151,16 @@ def _add_run_and_plan(command: _Command) -> None:
 
 def _add_export_and_fly(command: _Command) -> None:
     export = command(
-        "export", "write a plan as mission files, by suffix: .waypoints, .plan",
-        "planfly export plan.json mission.waypoints mission.plan",
+        "export",
+        "write a plan, mission or log by suffix: .waypoints, .plan, .fence, .rally, .kml, .gpx",
+        "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
     )  # fmt: skip
-    export.add_argument("plan", metavar="PLAN.json", help="a plan that planfly made")
-    export.add_argument("files", metavar="FILE", nargs="+", help="mission files to write (.waypoints, .plan)")
+    export.add_argument(
+        "plan", metavar="PLAN.json|MISSION|LOG.mcap", help="a plan that planfly made, a mission file, or a flight log"
+    )
+    export.add_argument(
+        "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
+    )
     _overwrite(export)
     fly = command(
         "fly", "fly a plan or any mission file, write the log, end with the verdict",
@@ -145,6 +168,7 @@ def _add_export_and_fly(command: _Command) -> None:
     )  # fmt: skip
     fly.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan")
     _world(fly)
+    _flown_by(fly)
     fly.add_argument(
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
@@ -161,6 +185,7 @@ def _add_log_commands(command: _Command) -> None:
     )  # fmt: skip
     check.add_argument("file", metavar="LOG.mcap|MISSION", help="a flight log, or plan.json, .waypoints, .plan")
     _world(check)
+    _flown_by(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     _overwrite(check)
     replay = command(
@@ -169,7 +194,13 @@ def _add_log_commands(command: _Command) -> None:
         "planfly replay flight.mcap --speed 20",
     )
     replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
-    replay.add_argument("--speed", metavar="X", type=_positive, help="at X times real time (default: at once)")
+    replay.add_argument(
+        "--speed", metavar="X", type=_positive, help="at X times real time (default: at once; with --to, 1)"
+    )
+    _link(replay, to=None, bind="127.0.0.1:0")
+    replay.add_argument(
+        "--wait", metavar="S", type=_positive, default=10.0, help="with --to: wait S seconds for a ground station (10)"
+    )
     report = command(
         "report", "draw the figures and write report.html from a log alone", "planfly report flight.mcap --out report"
     )
@@ -178,6 +209,34 @@ def _add_log_commands(command: _Command) -> None:
         "--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)"
     )
     _overwrite(report)
+
+
+def _link(parser: argparse.ArgumentParser, *, to: str | None, bind: str) -> None:
+    parser.add_argument(
+        "--to", metavar="IP:PORT,...", default=to,
+        help="where ground stations listen" + (f" (default: {to})" if to else ": play the log into them"),
+    )  # fmt: skip
+    parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
+    parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
+    parser.add_argument(
+        "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
+    )
+
+
+def _add_serve(command: _Command) -> None:
+    serve = command(
+        "serve", "be a MAVLink vehicle that a ground station uploads to, arms, starts and watches",
+        "planfly serve mission.waypoints --terrain jacksboro",
+    )  # fmt: skip
+    serve.add_argument("mission", metavar="MISSION", nargs="?", help="plan.json, .waypoints or .plan to begin with")
+    _world(serve)
+    _link(serve, to="127.0.0.1:14550", bind="127.0.0.1:14580")
+    serve.add_argument(
+        "--speed", metavar="X", type=_speedup, default=1.0, help="fly at X times real time, 0.1 to 100 (default: 1)"
+    )
+    serve.add_argument(
+        "--log", metavar="DIR", default="runs/serve", help="folder of the flight logs (default: runs/serve)"
+    )
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -5,13 +5,17 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import default_folder, prepare_folder, refuse_existing, refuse_folder
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, over_terrain, with_wind
+from world.scenario import Scenario, embedded_scenarios, load_scenario, over_terrain, with_flight, with_wind
+
+if TYPE_CHECKING:
+    from logs.reader import FlightLog
 
 MCAP_MAGIC = b"\x89MCAP"
 
@@ -51,23 +55,9 @@ def plan(args: argparse.Namespace) -> int:
 
 def export(args: argparse.Namespace) -> int:
     """``planfly export``."""
-    from flight.export import plan_mission
-    from flight.mission_files import mission_kind
-    from planfly.pipeline import load_vehicle
-    from planfly.results import write_missions
-    from planner.plan import read_plan
+    from planfly.exporting import export as export_files
 
-    targets = [Path(name) for name in args.files]
-    for target in targets:
-        mission_kind(target)
-        refuse_existing(target, args.overwrite, Path(args.plan))
-    made = read_plan(Path(args.plan))
-    vehicle = load_vehicle(made.scenario)
-    mission = plan_mission(made, vehicle.airspeed, vehicle.max_bank, source=args.plan)
-    write_missions(mission, targets)
-    for target in targets:
-        print(f"mission   {target} ({len(mission.items)} items)")
-    return FLYABLE
+    return export_files(args, log=Path(args.plan).is_file() and is_log(Path(args.plan)))
 
 
 def fly(args: argparse.Namespace) -> int:
@@ -76,7 +66,7 @@ def fly(args: argparse.Namespace) -> int:
     from planfly.pipeline import fly as fly_setup
     from planfly.results import print_verdict, print_warnings
 
-    opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, wind=_wind(args))
+    opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, change=_change(args))
     default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
     target = _target(args.log, default, args, Path(args.mission))
     print_warnings(opened.setup.mission.warnings)
@@ -101,7 +91,7 @@ def check(args: argparse.Namespace) -> int:
         refuse_existing(target, args.overwrite, source)
     if is_log(source):
         return _check_log(source, args, target)
-    opened = open_mission(source, args.scenario, args.terrain)
+    opened = open_mission(source, args.scenario, args.terrain, change=_change(args))
     print_warnings(opened.setup.mission.warnings)
     verdict = judge_geometry(opened.setup)
     if target:
@@ -115,6 +105,11 @@ def _check_log(source: Path, args: argparse.Namespace, target: Path | None) -> i
     from logs.reader import read_log
     from planfly.results import print_verdict, print_warnings, write_verdict
 
+    given = [name for name in ("aircraft", "airspeed") if getattr(args, name) is not None]
+    if given:
+        raise ScenarioError(
+            f"{source}: --{given[0]}: a log is judged with the aircraft and the speeds it was flown with"
+        )
     if args.scenario:
         raise ScenarioError(
             f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces it"
@@ -140,18 +135,35 @@ def replay(args: argparse.Namespace) -> int:
 
     from logs.reader import read_log
     from logs.replay import entry_lines, timeline
-    from planfly.results import print_warnings
 
     log = read_log(Path(args.log))
+    if args.to:
+        from planfly.play import play
+
+        play(log, args)
+        return _replayed(args, log)
     started = time.monotonic()
     for entry in timeline(log):
         if args.speed:
             time.sleep(max(0.0, entry.time / args.speed - (time.monotonic() - started)))
         print("\n".join(entry_lines(entry)), flush=bool(args.speed))
+    return _replayed(args, log)
+
+
+def _replayed(args: argparse.Namespace, log: "FlightLog") -> int:
+    from planfly.results import print_warnings
+
     if not log.complete:
         print_warnings([f"{args.log}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
         return LOSS
     return FLYABLE
+
+
+def serve(args: argparse.Namespace) -> int:
+    """``planfly serve``."""
+    from planfly.serve import serve as serve_vehicle
+
+    return serve_vehicle(args)
 
 
 def report(args: argparse.Namespace) -> int:
@@ -197,10 +209,14 @@ def _target(named: str | None, default: Path, args: argparse.Namespace, source: 
     return target
 
 
-def _wind(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
+def _change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
+    """What the command's options change in a scenario: aircraft, airspeed, and for a flight the wind."""
+
     def change(scenario: Scenario) -> Scenario:
-        speed, source = args.wind if args.wind else (None, None)
-        return with_wind(scenario, speed, None if source is None else math.radians(source), args.turbulence)
+        flown = with_flight(scenario, args.aircraft, args.airspeed)
+        speed, source = getattr(args, "wind", None) or (None, None)
+        turbulence = getattr(args, "turbulence", None)
+        return with_wind(flown, speed, None if source is None else math.radians(source), turbulence)
 
     return change
 
@@ -213,5 +229,6 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "check": check,
     "replay": replay,
     "report": report,
+    "serve": serve,
     "scenarios": scenarios,
 }

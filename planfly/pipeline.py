@@ -113,8 +113,8 @@ def make_setup(
     scenario: Scenario, vehicle: Vehicle, mission: Mission, seed: int, *, plan: Plan | None = None
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario."""
-    route = make_route(mission, scenario.origin, scenario.terrain, vehicle.airspeed, scenario.flight.fly_over)
     limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+    route = make_route(mission, scenario.origin, scenario.terrain, vehicle.airspeed, scenario.flight.fly_over, limits)
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
         scenario=scenario,

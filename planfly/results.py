@@ -15,7 +15,9 @@ from world.files import write_whole
 
 # Findings of a passing rule are many; the terminal shows the closest one of each.
 _RULE_TITLES = {
+    "mission": "mission",
     "turn": "turns",
+    "loiter": "loiters",
     "slope": "slopes",
     "clearance": "clearance",
     "threat": "threats",

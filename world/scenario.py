@@ -292,6 +292,23 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     return replace(scenario, spec=spec, wind=wind)
 
 
+def with_flight(scenario: Scenario, aircraft: str | None, airspeed: float | None) -> Scenario:
+    """Make the same scenario with another aircraft or airspeed (m/s); None keeps what it has.
+
+    Raises ScenarioError for values that a scenario file may not have either.
+    """
+    changes: dict[str, Any] = {}
+    if aircraft is not None:
+        changes["aircraft"] = aircraft
+    if airspeed is not None:
+        changes["airspeed_mps"] = airspeed
+    if not changes:
+        return scenario
+    table = scenario.spec.flight.model_dump() | changes
+    flight = _checked(lambda: FlightTable(**table), f"{scenario.name}: flight")
+    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": flight}), flight=flight)
+
+
 def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
     if table.kind == "flat":
         return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * MARGIN)

@@ -12,11 +12,11 @@ MISSIONS = Path(__file__).parents[1] / "flight" / "missions"
 LEGS = {
     "by_hand.waypoints": 3,
     "endless.waypoints": 7,
-    "mavproxy.txt": 4,
+    "mavproxy.txt": 21,
     "mavproxy_terrain.txt": 3,
     "mission_planner.waypoints": 10,
-    "mission_planner_land.waypoints": 4,
-    "qgc.waypoints": 5,
+    "mission_planner_land.waypoints": 5,
+    "qgc.waypoints": 14,
     "qgc_amsl.plan": 4,
     "qgc_takeoff.plan": 7,
 }
@@ -62,7 +62,11 @@ def test_heights_above_terrain_need_terrain(name: str, tmp_path: Path, capsys: p
 
 @pytest.mark.parametrize("name", LEGS)
 def test_the_geometric_level_agrees(name: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", str(MISSIONS / name), "--terrain", "jacksboro"]) == 0, capsys.readouterr().out
+    code = main(["check", str(MISSIONS / name), "--terrain", "jacksboro"])
+    out = capsys.readouterr().out
+    # A spline, and a landing that PX4 finds too steep: flown all the same, by ArduPlane.
+    assert code == (4 if name == "mission_planner_land.waypoints" else 0), out
+    assert all("  failed  mission " in line for line in out.splitlines() if line.startswith("  failed"))
 
 
 def test_wind_turns_a_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,90 @@
+"""A person's MAVSDK script: python mavsdk_session.py PORT ITEMS.json fly|upload|plan.  Prints one JSON object.
+
+Run as a subprocess, because the library is native and starts threads.  ITEMS.json:
+[[frame, command, p1, p2, x, y, z]], or for "plan" [[latitude, longitude, height over home]].
+"""
+
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from mavsdk import ComponentType, Configuration, Mavsdk, System
+from mavsdk.plugins.action import Action
+from mavsdk.plugins.mission import Mission, MissionPlan
+from mavsdk.plugins.mission import MissionItem as PlanItem
+from mavsdk.plugins.mission_raw import MissionItem, MissionRaw
+from mavsdk.plugins.telemetry import Telemetry
+
+
+def main() -> None:
+    port, name, task = sys.argv[1:]
+    rows = json.loads(Path(name).read_text(encoding="utf-8"))
+    sdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+    print(sdk.add_any_connection(f"udpin://127.0.0.1:{port}"), file=sys.stderr)
+    system = sdk.first_autopilot(20.0)
+    if system is None:
+        raise SystemExit("no vehicle")
+    found = by_plan(system, rows) if task == "plan" else by_items(system, rows, task == "fly")
+    print(json.dumps(found))
+
+
+def by_items(system: System, rows: list[list[float]], flown: bool) -> dict[str, object]:
+    """Upload items as they are, download them, and fly them if asked."""
+    raw = MissionRaw(system)
+    items = [
+        MissionItem(k, frame, command, int(k == 0), 1, p1, p2, 0.0, 0.0, x, y, z, 0)
+        for k, (frame, command, p1, p2, x, y, z) in enumerate(rows)
+    ]
+    begun = time.monotonic()
+    raw.upload_mission(items)
+    found: dict[str, object] = {"upload_s": time.monotonic() - begun}
+    back = raw.download_mission()
+    found["back"] = [[i.frame, i.command, i.param1, i.param2, i.x, i.y, i.z] for i in back]
+    if flown:
+        found |= fly(system, raw.start_mission, raw.is_mission_finished)
+    return found
+
+
+def by_plan(system: System, rows: list[list[float]]) -> dict[str, object]:
+    """Fly latitudes, longitudes and heights over home through the `mission` plugin."""
+    mission = Mission(system)
+    mission.upload_mission(MissionPlan([PlanItem(y, x, z, 25.0, True) for y, x, z in rows]))
+    found = fly(system, mission.start_mission, mission.is_mission_finished)
+    progress = mission.mission_progress()
+    return found | {"progress": [progress.current, progress.total]}
+
+
+def fly(system: System, start: Callable[[], object], is_finished: Callable[[], bool]) -> dict[str, object]:
+    """Arm, start, and watch until the mission is finished."""
+    telemetry, action = Telemetry(system), Action(system)
+    healthy = wait(telemetry.health_all_ok)
+    action.arm()
+    armed = wait(telemetry.armed)
+    early = is_finished()
+    start()
+    begun = time.monotonic()
+    seen: set[float] = set()
+    while not is_finished() and time.monotonic() < begun + 90.0:
+        time.sleep(0.02)
+        seen.add(telemetry.position().longitude_deg)
+    return {
+        "healthy": healthy,
+        "armed": armed,
+        "early": early,
+        "finished": is_finished(),
+        "flown_s": time.monotonic() - begun,
+        "places": len(seen),
+    }
+
+
+def wait(condition: Callable[[], bool]) -> bool:
+    """Whether a condition comes true within 20 s."""
+    end = time.monotonic() + 20.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return condition()
+
+
+main()

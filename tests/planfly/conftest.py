@@ -1,0 +1,126 @@
+"""A served vehicle, as a person starts it."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+FIELD = """name = "field"
+[terrain]
+kind = "flat"
+amsl_m = 0
+[area]
+east_m = [-3000, 3000]
+north_m = [-3000, 3000]
+ceiling_amsl_m = 600
+[start]
+east_m = 0
+north_m = 0
+height_m = 100
+[destination]
+east_m = 500
+north_m = 0
+height_m = 100
+[wind]
+speed_mps = 3
+from_deg = 250
+turbulence = "light"
+"""
+
+
+class Served:
+    """``planfly serve`` in a process of its own."""
+
+    def __init__(self, folder: Path, *argv: str, to: int = 9) -> None:
+        command = [sys.executable, "-m", "planfly", "serve", "--log", "logs", "--bind", "127.0.0.1:0"]
+        self.folder = folder
+        self.lines: list[str] = []
+        self.process = subprocess.Popen(
+            [*command, "--to", f"127.0.0.1:{to}", *argv],
+            cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+        )  # fmt: skip
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+        try:
+            first = self.wait(lambda line: line.startswith("vehicle "))
+            self.port = int(first.split(",")[0].rsplit(":", 1)[1])
+            self.wait(lambda line: line.endswith(" ready"), 300.0)
+        except AssertionError:
+            self.kill()
+            raise
+
+    def _read(self) -> None:
+        for line in self.process.stdout:
+            self.lines.append(line.rstrip("\n"))
+
+    def wait(self, condition: Callable[[str], bool], limit: float = 60.0) -> str:
+        """The first line that meets a condition."""
+        end = time.monotonic() + limit
+        while time.monotonic() < end:
+            for line in list(self.lines):
+                if condition(line):
+                    return line
+            time.sleep(0.02)
+        raise AssertionError("\n".join(self.lines))
+
+    def children(self) -> list[int]:
+        """Process ids of the whole family."""
+        found = []
+        for entry in Path("/proc").iterdir():
+            if entry.name.isdigit():
+                try:
+                    fields = (entry / "stat").read_text(encoding="ascii", errors="replace").rsplit(")", 1)[1].split()
+                except OSError:
+                    continue
+                if int(fields[3]) == self.process.pid:
+                    found.append(int(entry.name))
+        return found
+
+    def cpu(self) -> float:
+        """Seconds of processor time that the family has used."""
+        ticks = 0
+        for number in self.children():
+            fields = (
+                Path(f"/proc/{number}/stat").read_text(encoding="ascii", errors="replace").rsplit(")", 1)[1].split()
+            )
+            ticks += int(fields[11]) + int(fields[12])
+        return ticks / os.sysconf("SC_CLK_TCK")
+
+    def stop(self) -> int:
+        """End it as Ctrl-C does, and give its exit code."""
+        if self.process.poll() is None:
+            os.kill(self.process.pid, signal.SIGINT)
+        code = self.process.wait(30.0)
+        self._reader.join(5.0)
+        self.process.stdout.close()
+        return code
+
+    def kill(self) -> None:
+        """End the whole family at once, as a power cut does."""
+        for number in self.children():
+            os.kill(number, signal.SIGKILL)
+        self.process.wait(10.0)
+        self._reader.join(5.0)
+        self.process.stdout.close()
+
+
+@pytest.fixture
+def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
+    """Start vehicles in a folder that has ``field.toml``; what still runs at the end is killed."""
+    (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
+    started: list[Served] = []
+
+    def start(*argv: str, to: int = 9) -> Served:
+        started.append(Served(tmp_path, *argv, to=to))
+        return started[-1]
+
+    yield start
+    for one in started:
+        if one.process.poll() is None:
+            one.kill()
