@@ -12,6 +12,9 @@ RUN_FILES = (
     "verdict.json",
     "map.png",
     "profile.png",
+    "scene.png",
+    "turns.png",
+    "envelope.png",
     "report.html",
 )
 
