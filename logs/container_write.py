@@ -4,8 +4,11 @@ mcap's own `Writer` takes one message at a time, at some 6 us each; here a chunk
 come as arrays.  The records around them are mcap's own classes.  Every CRC that the format has is written.
 """
 
+import contextlib
+import struct
 import zlib
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -29,9 +32,10 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from logs.container import FRAME, MAGIC
+from logs.container import FRAME, MAGIC, records, stream
 
 Index = NDArray[np.uint64]
+_MESSAGE = struct.Struct("<HIQ")
 _PAIRS_HEAD = 6  # channel and length, before a message index's pairs
 
 
@@ -87,13 +91,35 @@ class ContainerWriter:
         """Write a chunk of at least one message and hand it to the operating system."""
         front = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
-        data = front + content.records
-        times = np.concatenate([pairs[:, 0] for pairs in content.index.values()])
+        moved = np.array([0, len(front)], dtype=np.uint64)
+        self._chunk(front + content.records, {channel: pairs + moved for channel, pairs in content.index.items()})
+
+    def copy(self, data: bytes) -> None:
+        """Write a chunk as it stood in another file, from its records.  Raises ValueError and what mcap's classes do.
+
+        Its schemas and channels count as this file's.
+        """
+        index: dict[int, list[tuple[int, int]]] = {}
+        for opcode, at, content in records(data):
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream(content))
+                self._schemas.setdefault(f"{schema.id}", schema)
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream(content))
+                if all(channel.id != known.id for known in self._channels):
+                    self._channels.append(channel)
+            elif opcode == Opcode.MESSAGE:
+                number, _, log_time = _MESSAGE.unpack_from(content)
+                index.setdefault(number, []).append((log_time, at))
+        self._chunk(data, {number: np.array(pairs, dtype=np.uint64) for number, pairs in index.items()})
+
+    def _chunk(self, data: bytes, index: dict[int, Index]) -> None:
+        times = np.concatenate([np.zeros(0, dtype=np.uint64), *(pairs[:, 0] for pairs in index.values())])
         chunk = Chunk(
             compression="zstd",
             data=self._compressor.compress(data),
-            message_start_time=int(times.min()),
-            message_end_time=int(times.max()),
+            message_start_time=int(times.min()) if times.size else 0,
+            message_end_time=int(times.max(initial=0)),
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
@@ -102,9 +128,9 @@ class ContainerWriter:
         self._put(record)
         offsets = {}
         index_start = self._at
-        for channel, pairs in sorted(content.index.items()):
+        for channel, pairs in sorted(index.items()):
             offsets[channel] = self._at
-            self._put(_message_index(channel, pairs + np.array([0, len(front)], dtype=np.uint64)))
+            self._put(_message_index(channel, pairs))
             self._counts[channel] += len(pairs)
         self._chunks.append(
             ChunkIndex(
@@ -119,7 +145,12 @@ class ContainerWriter:
                 uncompressed_size=chunk.uncompressed_size,
             )
         )
-        self._file.flush()
+        self._flush()
+
+    @property
+    def last_time(self) -> int:
+        """log_time of the newest message, ns; 0 before the first chunk."""
+        return max((index.message_end_time for index in self._chunks), default=0)
 
     def finish(self) -> None:
         """Write the end of the data and the summary; the file stays open."""
@@ -134,8 +165,8 @@ class ContainerWriter:
         ]
         summary = b""
         offsets = b""
-        for opcode, records in groups:
-            group = b"".join(_bytes(record) for record in records)
+        for opcode, members in groups:
+            group = b"".join(_bytes(record) for record in members)
             if group:
                 offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
@@ -157,10 +188,24 @@ class ContainerWriter:
             schema_count=len(self._schemas),
         )
 
+    def _flush(self) -> None:
+        with _named(self._file):
+            self._file.flush()
+
     def _put(self, data: bytes) -> None:
-        self._file.write(data)
+        with _named(self._file):
+            self._file.write(data)
         self._crc = zlib.crc32(data, self._crc)
         self._at += len(data)
+
+
+@contextlib.contextmanager
+def _named(file: BinaryIO) -> Iterator[None]:
+    """Give an error while writing (a full disk) the name of the file, which a write does not know."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, getattr(file, "name", None)) from error
 
 
 def _bytes(record: McapRecord) -> bytes:

@@ -97,7 +97,14 @@ def _draw(axes: Any, panel: Panel, along: Floats) -> None:
     seen = [value for _, value in panel.limits]
     for line in panel.lines:
         rows = style.outline_rows(line.values, _RUNS)
-        axes.plot(along[rows], line.values[rows], line.dashes, color=line.color, linewidth=line.width, label=line.label)
+        axes.plot(
+            along[rows],
+            line.values[rows],
+            linestyle=line.dashes,
+            color=line.color,
+            linewidth=line.width,
+            label=line.label,
+        )
         if line.filled:
             axes.fill_between(along[rows], 0.0, line.values[rows], color=line.color, alpha=0.25, linewidth=0)
         finite = line.values[np.isfinite(line.values)]

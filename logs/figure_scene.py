@@ -32,7 +32,7 @@ _MOST_NUMBERS, _MOST_NAMES = 40, 30
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """A parallel view: azimuth (rad) of the horizontal direction from the middle to the eye, and the stretch of heights."""
+    """A parallel view: azimuth (rad) of the direction from the middle to the eye, and how heights are stretched."""
 
     azimuth: float
     middle: Floats
@@ -151,7 +151,7 @@ def _ground(axes: Any, eye: Eye, grid: GroundGrid | None, bounds: Floats) -> lis
     # Edges in the cells' own colour close the seams that antialiasing leaves.
     axes.add_collection(
         PolyCollection(
-            cells[order][:, :, :2],
+            list(cells[order][:, :, :2]),
             facecolor=faces[order],
             edgecolor=faces[order],
             linewidth=0.4,
@@ -213,7 +213,7 @@ def _paths(
         under = terrain.height(route[:, 0], route[:, 1])
         feet = np.column_stack([route[:, :2], np.where(np.isfinite(under), under, route[:, 2])])
         poles = np.stack([eye.project(route)[:, :2], eye.project(feet)[:, :2]], axis=1)
-        axes.add_collection(LineCollection(poles, colors="#555555", linewidths=0.7, zorder=4))
+        axes.add_collection(LineCollection(list(poles), colors="#555555", linewidths=0.7, zorder=4))
     for leg in failed.legs:
         ends = eye.project(route[leg : leg + 2])
         axes.plot(ends[:, 0], ends[:, 1], color=style.FAIL, linewidth=9.0, alpha=0.9, zorder=4.5, solid_capstyle="butt")

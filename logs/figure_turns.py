@@ -44,13 +44,15 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
     for finding in findings:
         place = _PLACE.match(finding.where)
         if finding.rule == rule and place is not None:
-            values = (math.nan if v is None else v for v in (finding.planned, finding.flown, finding.limit))
-            found.append(PlaceValue(int(place.group(1)), *values, finding.ok))
+            planned, flown, limit = (
+                math.nan if value is None else value for value in (finding.planned, finding.flown, finding.limit)
+            )
+            found.append(PlaceValue(int(place.group(1)), planned, flown, limit, finding.ok))
     return sorted(found, key=lambda value: value.number)
 
 
 def draw_turns(name: str, verdict: Verdict) -> Figure:
-    """Panels of turns, slopes, clearances and waypoints: a bar for the plan, a dot for the flight, a dash for the limit.
+    """Panels of turns, slopes, clearances and waypoints: bars for the plan, dots for the flight, dashes for limits.
 
     What fails is ringed and its number is written in the same colour.
     """

@@ -44,7 +44,7 @@ from logs.verdict import Verdict, verdict_json
 from world.frames import to_geo
 
 CHUNK_SIZE = 64 * 1024
-RESULT, VERDICT = "result.json", "verdict.json"
+RESULT, VERDICT, RECOVERY = "result.json", "verdict.json", "recovery.json"
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
 LONGEST = 1e7  # s

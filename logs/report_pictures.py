@@ -61,13 +61,13 @@ def _words(setup: FlightSetup, flown: bool) -> dict[str, tuple[str, str, str]]:
         "scene": (
             "3-D view",
             f"View from aside: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
-            "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. What "
-            "a ridge hides shows faintly.",
+            "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
+            "What a ridge hides shows faintly.",
         ),
         "turns": (
             "Turn by turn, leg by leg",
             "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground and waypoint.",
-            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's. Ringed: fails a rule.",
+            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's. Ringed: fails.",
         ),
         "time": (
             "Over time",

@@ -276,7 +276,7 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
     if track is None or len(track) < 2:
         return []
     lasts = np.append(np.diff(track.time), 0.0)
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
         low = 0.0 if name == "throttle" else -limit
         held = float(lasts[held_at_limit(track, k, low, limit)].sum())

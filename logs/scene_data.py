@@ -43,7 +43,10 @@ def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGri
         return None
     spans = np.ptp(bounds, axis=1)
     pitch = max(float(spans.max()) / (most - 1), terrain.spacing, 1.0)
-    axes = [np.linspace(*side, int(np.clip(np.ceil(np.ptp(side) / pitch) + 1, 2, most))) for side in bounds]
+    axes = [
+        np.linspace(float(low), float(high), int(np.clip(np.ceil((high - low) / pitch) + 1, 2, most)))
+        for low, high in bounds
+    ]
     heights = np.asarray(terrain.height(axes[0][None, :], axes[1][:, None]), dtype=np.float64)
     return GroundGrid(axes[0], axes[1], heights) if np.isfinite(heights).any() else None
 

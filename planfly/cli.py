@@ -40,6 +40,16 @@ def _positive(text: str) -> float:
     return value
 
 
+def _moment(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value <= 1e7:
+        raise argparse.ArgumentTypeError(f"{text!r}: seconds, from 0 to 10,000,000, are expected")
+    return value
+
+
 def _wind(text: str) -> tuple[float, float]:
     try:
         speed, source = (float(part) for part in text.split(","))
@@ -150,21 +160,52 @@ def _add_log_commands(command: _Command) -> None:
     _world(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     _overwrite(check)
-    replay = command(
-        "replay",
-        "tell a flight again from its log alone: legs, turns, clearances, events",
-        "planfly replay flight.mcap --speed 20",
-    )
-    replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
-    replay.add_argument("--speed", metavar="X", type=_positive, help="at X times real time (default: at once)")
+    _add_replay_and_recover(command)
     report = command(
-        "report", "draw the figures and write report.html from a log alone", "planfly report flight.mcap --out report"
+        "report",
+        "draw the figures and write report.html from a log alone, or write the layout for Foxglove",
+        "planfly report flight.mcap --out report --svg",
     )
-    report.add_argument("log", metavar="LOG.mcap", help="a flight log")
+    report.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log")
     report.add_argument(
         "--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)"
     )
+    report.add_argument("--svg", action="store_true", help="write the figures as SVG, too")
+    report.add_argument("--layout", metavar="FILE", help="write the layout file for Foxglove there, and nothing else")
     _overwrite(report)
+    compare = command(
+        "compare", "lay two flights over each other: a table of differences, and pictures",
+        "planfly compare calm.mcap windy.mcap --out both",
+    )  # fmt: skip
+    compare.add_argument("first", metavar="A.mcap", help="a flight log")
+    compare.add_argument("second", metavar="B.mcap", help="another")
+    compare.add_argument(
+        "--out", metavar="DIR", help="write pictures and compare.html there (default: the table alone)"
+    )
+    compare.add_argument("--svg", action="store_true", help="write the pictures as SVG, too")
+    _overwrite(compare)
+
+
+def _add_replay_and_recover(command: _Command) -> None:
+    replay = command(
+        "replay",
+        "tell a flight again from its log alone: on a terminal as instruments, elsewhere as a timeline",
+        "planfly replay flight.mcap --speed 20 --from 60",
+    )
+    replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
+    replay.add_argument(
+        "--speed", metavar="X", type=_positive, help="at X times real time (default: 1 on a terminal, else at once)"
+    )
+    replay.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
+    replay.add_argument("--from", dest="start", metavar="S", type=_moment, help="from this time of the flight, s")
+    replay.add_argument("--to", dest="end", metavar="S", type=_moment, help="to this time of the flight, s")
+    recover = command(
+        "recover", "make an unfinished or damaged log whole again, as far as it can be read",
+        "planfly recover flight.mcap --out whole.mcap",
+    )  # fmt: skip
+    recover.add_argument("log", metavar="LOG.mcap", help="a flight log")
+    recover.add_argument("--out", metavar="FILE", help="the new log (default: <log>-recovered.mcap beside it)")
+    _overwrite(recover)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

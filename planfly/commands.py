@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from planfly import log_commands
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import prepare_folder, refuse_existing
 from planfly.progress import progress
@@ -55,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     with progress("drawing"):
         write_pictures(folder, setup, track, verdict, ended, f"planfly run {args.scenario} --seed {seed}")
     print_verdict(verdict, setup.route.notes)
-    print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
+    print(f"results   {folder}/ (report.html, figures, flight.mcap, verdict.json, plan.json, missions)")
     return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
@@ -167,49 +168,6 @@ def _check_log(source: Path, args: argparse.Namespace, target: Path | None) -> i
     return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
-def replay(args: argparse.Namespace) -> int:
-    """``planfly replay``."""
-    import time
-
-    from logs.reader import read_log
-    from logs.replay import entry_lines, timeline
-    from planfly.results import print_warnings
-
-    log = read_log(Path(args.log))
-    started = time.monotonic()
-    for entry in timeline(log):
-        if args.speed:
-            time.sleep(max(0.0, entry.time / args.speed - (time.monotonic() - started)))
-        print("\n".join(entry_lines(entry)), flush=bool(args.speed))
-    if not log.complete:
-        print_warnings([f"{args.log}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
-        return LOSS
-    return FLYABLE
-
-
-def report(args: argparse.Namespace) -> int:
-    """``planfly report``."""
-    from logs.check import judge_flight
-    from logs.reader import read_log
-    from planfly.results import print_warnings, write_pictures
-
-    source = Path(args.log)
-    log = read_log(source)
-    folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-report")
-    verdict = judge_flight(log.setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
-    prepare_folder(folder, named=bool(args.out), overwrite=args.overwrite)
-    with progress("drawing"):
-        files = write_pictures(
-            folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions, log.events
-        )
-    for file in files:
-        print(f"report    {file}")
-    if not log.complete:
-        print_warnings([f"{source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
-        return LOSS
-    return FLYABLE if verdict.flyable else NOT_FLYABLE
-
-
 def is_log(path: Path) -> bool:
     """Whether a file is a flight log, by its first bytes or, failing those, its name."""
     try:
@@ -247,7 +205,9 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "export": export,
     "fly": fly,
     "check": check,
-    "replay": replay,
-    "report": report,
+    "replay": log_commands.replay,
+    "recover": log_commands.recover,
+    "report": log_commands.report,
+    "compare": log_commands.compare,
     "scenarios": scenarios,
 }

@@ -19,6 +19,15 @@ RUN_FILES = (
 )
 
 
+_FIGURES = ("map", "profile", "scene", "turns", "envelope")
+# What `report` and `compare` may write, figures as SVG included.
+LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
+COMPARE_FILES = (
+    "compare.html",
+    *(f"compare-{name}.{kind}" for name in ("map", "profile") for kind in ("png", "svg")),
+)
+
+
 def refuse_existing(path: Path, overwrite: bool) -> None:
     """Refuse a named target file that exists, is a folder, or cannot be made.  Raises PlanflyError."""
     if path.is_dir():
@@ -29,15 +38,15 @@ def refuse_existing(path: Path, overwrite: bool) -> None:
         raise PlanflyError(f"{path}: its folder {path.parent} does not exist")
 
 
-def prepare_folder(folder: Path, *, named: bool, overwrite: bool) -> None:
+def prepare_folder(folder: Path, *, named: bool, overwrite: bool, files: tuple[str, ...] = RUN_FILES) -> None:
     """Make a run's folder ready: refuse a named one that holds anything, and clear old results of ours.
 
-    Only files that a run writes are removed, never anything else that lies there.  Raises PlanflyError.
+    files: what the command writes.  Only these are removed, never anything else that lies there.  Raises PlanflyError.
     """
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected")
     if named and not overwrite and folder.is_dir() and any(folder.iterdir()):
         raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
     folder.mkdir(parents=True, exist_ok=True)
-    for name in RUN_FILES:
+    for name in files:
         (folder / name).unlink(missing_ok=True)

@@ -96,7 +96,8 @@ def test_narrow_page_fits_a_phone(page: Path, tmp_path: Path) -> None:
         assert browser.value("document.documentElement.scrollWidth") <= 420
         assert spread(browser.picture("#view3d")) > 40
         small = browser.value(
-            "[...document.querySelectorAll('button, nav a')].map(b => b.getBoundingClientRect().height).filter(h => h < 24)"
+            "[...document.querySelectorAll('button, nav a')]"
+            ".map(b => b.getBoundingClientRect().height).filter(h => h < 24)"
         )
         assert small == []
         assert own_problems(browser) == []
