@@ -20,7 +20,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from flight.setup import FlightSetup
-from flight.track import Track
+from flight.track import COLUMNS, Track
 from logs import scene
 from logs.container_write import ChunkContent, ContainerWriter
 from logs.schema import (
@@ -50,7 +50,7 @@ PROFILE = "planfly"
 LONGEST = 1e7  # s
 
 _ROWS_A_CHUNK = CHUNK_SIZE // RECORD.itemsize
-_SLOT_NS = 200_000_000  # one transform and one fix in each: 5 Hz
+_SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
 _HEAD = struct.Struct("<BQHIQQ")
 _CHANNELS: dict[str, Any] = {
     "/tf": FrameTransform,
@@ -70,8 +70,14 @@ class Recorder:
     process loses at most the last one.
     """
 
-    def __init__(self, path: Path, setup: FlightSetup) -> None:
-        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError."""
+    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1) -> None:
+        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
+
+        every: one row in so many is recorded, and the flight's last.
+        """
+        self._every = every
+        self._skipped: Track | None = None  # the newest row, if it was not recorded
+        self._seen = 0  # rows, recorded or not
         pieces = pack_setup(setup)
         self._setup = setup
         self._pending: list[Rows] = []
@@ -108,6 +114,21 @@ class Recorder:
 
     def write(self, block: Track) -> None:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
+        if self._every > 1:
+            block = self._thinned(block)
+        self._take(block)
+
+    def _thinned(self, block: Track) -> Track:
+        """Keep one row in ``every``, counted from the flight's first."""
+        if len(block):
+            kept = np.arange(-self._seen % self._every, len(block), self._every)
+            self._seen += len(block)
+            whole = kept.size > 0 and kept[-1] == len(block) - 1
+            self._skipped = None if whole else block.rows(len(block) - 1, len(block))
+            block = Track(*(getattr(block, name)[kept] for name in COLUMNS))
+        return block
+
+    def _take(self, block: Track) -> None:
         if not len(block):
             return
         if not (np.isfinite(block.time).all() and block.time[0] >= 0.0 and block.time[-1] < LONGEST):
@@ -133,6 +154,9 @@ class Recorder:
 
     def finish(self, ended: str, verdict: Verdict | None = None) -> None:
         """Write how the flight ended and its verdict, and close the file."""
+        if self._skipped is not None:
+            self._take(self._skipped)
+            self._skipped = None
         self._emit(None)
         stamp = max(self._last_ns, EPOCH_NS)
         final = scene.track_scene(stamp, np.array([*self._path, *self._tail]).reshape(-1, 3))
@@ -223,7 +247,10 @@ class Recorder:
         self._writer.chunk(ChunkContent(b"".join(pieces), pairs))
 
     def _poses(self, rows: Rows, stamps: NDArray[np.int64]) -> Iterator[_Extra]:
-        """Give a transform and a fix for the first good row in each slot, and now and then the track so far."""
+        """Give a transform for the first good row in each slot, one fix, and now and then the track so far.
+
+        rows: of one second.
+        """
         state = rows["state"]
         place = np.stack([state[name] for name in ("east_m", "north_m", "up_amsl_m")], axis=1)
         angles = np.stack([state[name] for name in ("roll_rad", "pitch_rad", "yaw_rad")], axis=1)
@@ -235,19 +262,24 @@ class Recorder:
         self._slot = int(slots[-1])
         self._path.append(place[chosen[0]])
         self._tail = [place[good[-1]]]
-        lat, lon = to_geo(self._setup.scenario.origin, place[chosen, 0], place[chosen, 1])
-        for k, lat_deg, lon_deg in zip(chosen.tolist(), lat.tolist(), lon.tolist(), strict=True):
-            stamp = int(stamps[k])
-            yield (
-                stamp,
-                "/tf",
-                scene.transform_message(stamp, place[k], angles[k]).SerializeToString(deterministic=True),
-            )
-            fix = scene.fix_message(stamp, lat_deg, lon_deg, float(place[k, 2]))
-            yield stamp, "/fix", fix.SerializeToString(deterministic=True)
-        # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
+        transforms = scene.transform_messages(stamps[chosen], place[chosen], angles[chosen])
+        for stamp, message in zip(stamps[chosen].tolist(), transforms, strict=True):
+            yield stamp, "/tf", message
+        first = place[chosen[0]]
         stamp = int(stamps[chosen[0]])
+        lat, lon = to_geo(self._setup.scenario.origin, *first[:2].tolist())
+        fix = scene.fix_message(stamp, float(lat), float(lon), float(first[2]))
+        yield stamp, "/fix", fix.SerializeToString(deterministic=True)
+        # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
         if stamp - EPOCH_NS >= self._next_track_scene * SECOND_NS:
             self._next_track_scene *= 2
             path = scene.track_scene(stamp, np.array(self._path))
             yield stamp, "/scene/track", path.SerializeToString(deterministic=True)
+
+
+def thin_track(track: Track, every: int) -> Track:
+    """The rows of a whole flight that a `Recorder` with this ``every`` keeps."""
+    if every <= 1 or not len(track):
+        return track
+    kept = np.union1d(np.arange(0, len(track), every), [len(track) - 1])
+    return Track(*(getattr(track, name)[kept] for name in COLUMNS))

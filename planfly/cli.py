@@ -148,6 +148,10 @@ def _add_export_and_fly(command: _Command) -> None:
     fly.add_argument("--wind", metavar="SPEED,FROM", type=_wind, help="steady wind, m/s and degrees it blows from")
     fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=_seed, help="of the turbulence (default: the plan's, or 1)")
+    fly.add_argument(
+        "--log-hz", metavar="HZ", type=int, choices=(60, 30, 20, 10), default=60,
+        help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is that of these rows",
+    )  # fmt: skip
     _overwrite(fly)
 
 

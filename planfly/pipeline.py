@@ -16,7 +16,7 @@ from flight.setup import FlightSetup, make_limits
 from flight.simulate import simulate
 from flight.track import Track
 from logs.check import judge_flight, judge_plan_only
-from logs.recorder import Recorder
+from logs.recorder import Recorder, thin_track
 from logs.verdict import Verdict
 from planner.plan import Plan
 from planner.search import plan_path
@@ -128,9 +128,12 @@ def make_setup(
 
 
 def fly(
-    setup: FlightSetup, vehicle: Vehicle, log: Path | None, advance: Advance | None = None
+    setup: FlightSetup, vehicle: Vehicle, log: Path | None, advance: Advance | None = None, *, every: int = 1
 ) -> tuple[Track, str, Verdict]:
-    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict."""
+    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict.
+
+    every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
+    """
 
     def tell(done: float, whole: float) -> None:
         if advance is not None:
@@ -139,10 +142,11 @@ def fly(
     if log is None:
         flown = simulate(setup, vehicle.aircraft, progress=tell)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
-    with Recorder(log, setup) as recorder:
+    with Recorder(log, setup, every=every) as recorder:
         flown = simulate(setup, vehicle.aircraft, sink=recorder.write, progress=tell)
-        verdict = judge_flight(setup, flown.track, flown.ended)
-        end = float(flown.track.time[-1]) if len(flown.track) else 0.0
+        track = thin_track(flown.track, every)
+        verdict = judge_flight(setup, track, flown.ended)
+        end = float(track.time[-1]) if len(track) else 0.0
         recorder.event(end, f"flight ended: {flown.ended}", "info" if flown.ended == "completed" else "error")
         recorder.finish(flown.ended, verdict)
-    return flown.track, flown.ended, verdict
+    return track, flown.ended, verdict

@@ -1,5 +1,6 @@
 """The commands that start from a log, in processes of their own: replay, recover, compare, and a full disk."""
 
+import json
 import os
 import pty
 import resource
@@ -125,6 +126,16 @@ def test_replay_of_a_part(flight: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert whole[first : first + len(part)] == part
     assert main(["replay", log, "--from", "60", "--to", "20"]) == 2
     assert main(["replay", log, "--from", "5000"]) == 2
+
+
+def test_a_thinner_log_is_judged_as_it_is(flight: Path, tmp_path: Path) -> None:
+    log = tmp_path / "thin.mcap"
+    code = main(["fly", str(flight / "plan.json"), "--log", str(log), "--log-hz", "20"])
+    thin, full = read_log(log), read_log(flight / "flight.mcap")
+    assert len(thin.track) in (len(full.track) // 3 + 1, len(full.track) // 3 + 2)
+    assert thin.track.time[-1] == full.track.time[-1]
+    assert main(["check", str(log), "--json", str(tmp_path / "v.json")]) == code
+    assert json.loads((tmp_path / "v.json").read_text(encoding="utf-8")) == thin.recorded_verdict
 
 
 def test_compare(flight: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
