@@ -125,13 +125,15 @@ class ContainerWriter:
         )
         record = _bytes(chunk)
         start = self._at
-        self._put(record)
         offsets = {}
-        index_start = self._at
+        index_start = at = start + len(record)
+        pieces = [record]
         for channel, pairs in sorted(index.items()):
-            offsets[channel] = self._at
-            self._put(_message_index(channel, pairs))
+            offsets[channel] = at
+            pieces.append(_message_index(channel, pairs))
+            at += len(pieces[-1])
             self._counts[channel] += len(pairs)
+        self._put(b"".join(pieces))
         self._chunks.append(
             ChunkIndex(
                 chunk_length=len(record),

@@ -4,6 +4,7 @@ The same setup and rows give the same bytes, in whatever blocks the rows arrive:
 `logs.schema.EPOCH_NS`), a chunk ends at 64 KiB or at a whole second of it, and nothing reads a clock.
 """
 
+import bisect
 import contextlib
 import json
 import struct
@@ -70,11 +71,14 @@ class Recorder:
     process loses at most the last one.
     """
 
-    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1) -> None:
+    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
         """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
 
-        every: one row in so many is recorded, and the flight's last.
+        every: one row in so many is recorded, and the flight's last.  batch: whole seconds of flight that are written
+        at a time, each in chunks of its own: more costs less, and a killed process loses as much; the bytes are the
+        same.
         """
+        self._batch_ns = batch * SECOND_NS
         self._every = every
         self._skipped: Track | None = None  # the newest row, if it was not recorded
         self._seen = 0  # rows, recorded or not
@@ -83,7 +87,8 @@ class Recorder:
         self._pending: list[Rows] = []
         self._events: list[_Extra] = []
         self._received = 0  # rows
-        self._last_ns = EPOCH_NS - 1  # of the rows received
+        self._last_ns = EPOCH_NS - 1  # of the rows recorded
+        self._newest_ns = EPOCH_NS - 1  # of the rows received
         self._slot = -1
         self._path: list[Floats] = []  # one position a second
         self._tail: list[Floats] = []  # the newest position
@@ -114,19 +119,7 @@ class Recorder:
 
     def write(self, block: Track) -> None:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
-        if self._every > 1:
-            block = self._thinned(block)
         self._take(block)
-
-    def _thinned(self, block: Track) -> Track:
-        """Keep one row in ``every``, counted from the flight's first."""
-        if len(block):
-            kept = np.arange(-self._seen % self._every, len(block), self._every)
-            self._seen += len(block)
-            whole = kept.size > 0 and kept[-1] == len(block) - 1
-            self._skipped = None if whole else block.rows(len(block) - 1, len(block))
-            block = Track(*(getattr(block, name)[kept] for name in COLUMNS))
-        return block
 
     def _take(self, block: Track) -> None:
         if not len(block):
@@ -134,13 +127,32 @@ class Recorder:
         if not (np.isfinite(block.time).all() and block.time[0] >= 0.0 and block.time[-1] < LONGEST):
             raise ValueError(f"time {block.time[0]}..{block.time[-1]} s: 0..{LONGEST:g} is expected")
         stamps = times_ns(block)
-        if stamps[0] <= self._last_ns or (np.diff(stamps) <= 0).any():
+        if stamps[0] <= self._newest_ns or (np.diff(stamps) <= 0).any():
             raise ValueError(f"rows from {block.time[0]} s on: times must increase by at least 1 ns a row")
-        self._pending.append(encode_rows(block, self._received, self._channels[STATE_TOPIC]))
-        self._received += len(block)
-        before, self._last_ns = self._last_ns, int(stamps[-1])
-        if self._last_ns // SECOND_NS > before // SECOND_NS:
+        rows = encode_rows(block, self._received, self._channels[STATE_TOPIC])
+        self._newest_ns = int(stamps[-1])
+        if self._every > 1:
+            rows = self._thinned(block, rows)
+            if not len(rows):
+                return
+        self._append(rows)
+
+    def _append(self, rows: Rows) -> None:
+        self._pending.append(rows)
+        self._received += len(rows)
+        before, self._last_ns = self._last_ns, int(rows["log_time"][-1])
+        if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
+
+    def _thinned(self, block: Track, rows: Rows) -> Rows:
+        """Keep one row in ``every``, counted from the flight's first, and number them anew."""
+        first = -self._seen % self._every
+        self._seen += len(rows)
+        kept: Rows = rows[first :: self._every].copy()
+        whole = len(kept) > 0 and (len(rows) - 1 - first) % self._every == 0
+        self._skipped = None if whole else block.rows(len(block) - 1, len(block))
+        kept["sequence"] = kept["state"]["row"] = np.arange(self._received, self._received + len(kept))
+        return kept
 
     def event(self, time: float, text: str, level: str = "info") -> None:
         """Record what happened at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
@@ -155,7 +167,7 @@ class Recorder:
     def finish(self, ended: str, verdict: Verdict | None = None) -> None:
         """Write how the flight ended and its verdict, and close the file."""
         if self._skipped is not None:
-            self._take(self._skipped)
+            self._append(encode_rows(self._skipped, self._received, self._channels[STATE_TOPIC]))
             self._skipped = None
         self._emit(None)
         stamp = max(self._last_ns, EPOCH_NS)
@@ -206,17 +218,20 @@ class Recorder:
         self._pending = [rows[stop:]] if stop < len(rows) else []
         events = sorted((item for item in self._events if until is None or item[0] < until), key=lambda item: item[0])
         self._events = [item for item in self._events if until is not None and item[0] >= until]
-        stamps = rows["log_time"][:stop].astype(np.int64)
-        seconds = np.unique(
-            np.concatenate([stamps, np.array([item[0] for item in events], dtype=np.int64)]) // SECOND_NS
-        )
-        for second in seconds.tolist():
-            first, last = np.searchsorted(stamps, [second * SECOND_NS, (second + 1) * SECOND_NS]).tolist()
-            here = [item for item in events if item[0] // SECOND_NS == second]
-            self._emit_second(rows[first:last], stamps[first:last], here)
-
-    def _emit_second(self, rows: Rows, stamps: NDArray[np.int64], events: list[_Extra]) -> None:
+        rows = rows[:stop]
+        stamps = rows["log_time"].astype(np.int64)
         extras = sorted([*self._poses(rows, stamps), *events], key=lambda item: item[0])
+        moments = [item[0] for item in extras]
+        seconds = np.unique(np.concatenate([stamps, np.array(moments, dtype=np.int64)]) // SECOND_NS)
+        firsts = np.searchsorted(stamps, seconds * SECOND_NS).tolist()
+        lasts = np.searchsorted(stamps, (seconds + 1) * SECOND_NS).tolist()
+        at = 0
+        for second, first, last in zip(seconds.tolist(), firsts, lasts, strict=True):
+            to = bisect.bisect_left(moments, (second + 1) * SECOND_NS, at)
+            self._emit_second(rows[first:last], stamps[first:last], extras[at:to])
+            at = to
+
+    def _emit_second(self, rows: Rows, stamps: NDArray[np.int64], extras: list[_Extra]) -> None:
         for first in range(0, max(1, len(rows)), _ROWS_A_CHUNK):
             stop = first + _ROWS_A_CHUNK
             # Before the next block's first row; the last block takes what is left.
@@ -247,9 +262,9 @@ class Recorder:
         self._writer.chunk(ChunkContent(b"".join(pieces), pairs))
 
     def _poses(self, rows: Rows, stamps: NDArray[np.int64]) -> Iterator[_Extra]:
-        """Give a transform for the first good row in each slot, one fix, and now and then the track so far.
+        """Give a transform for the first good row in each slot, one fix a second, and now and then the track so far.
 
-        rows: of one second.
+        rows: of whole seconds.
         """
         state = rows["state"]
         place = np.stack([state[name] for name in ("east_m", "north_m", "up_amsl_m")], axis=1)
@@ -260,21 +275,24 @@ class Recorder:
         if not chosen.size:
             return
         self._slot = int(slots[-1])
-        self._path.append(place[chosen[0]])
-        self._tail = [place[good[-1]]]
-        transforms = scene.transform_messages(stamps[chosen], place[chosen], angles[chosen])
-        for stamp, message in zip(stamps[chosen].tolist(), transforms, strict=True):
+        when = stamps[chosen]
+        for stamp, message in zip(
+            when.tolist(), scene.transform_messages(when, place[chosen], angles[chosen]), strict=True
+        ):
             yield stamp, "/tf", message
-        first = place[chosen[0]]
-        stamp = int(stamps[chosen[0]])
-        lat, lon = to_geo(self._setup.scenario.origin, *first[:2].tolist())
-        fix = scene.fix_message(stamp, float(lat), float(lon), float(first[2]))
-        yield stamp, "/fix", fix.SerializeToString(deterministic=True)
-        # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
-        if stamp - EPOCH_NS >= self._next_track_scene * SECOND_NS:
-            self._next_track_scene *= 2
-            path = scene.track_scene(stamp, np.array(self._path))
-            yield stamp, "/scene/track", path.SerializeToString(deterministic=True)
+        _, starts = np.unique(when // SECOND_NS, return_index=True)
+        firsts = place[chosen[starts]]
+        lat, lon = to_geo(self._setup.scenario.origin, firsts[:, 0], firsts[:, 1])
+        for stamp, first, *where in zip(when[starts].tolist(), firsts, lat.tolist(), lon.tolist(), strict=True):
+            fix = scene.fix_message(stamp, *where, float(first[2]))
+            yield stamp, "/fix", fix.SerializeToString(deterministic=True)
+            self._path.append(first)
+            # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
+            if stamp - EPOCH_NS >= self._next_track_scene * SECOND_NS:
+                self._next_track_scene *= 2
+                path = scene.track_scene(stamp, np.array(self._path))
+                yield stamp, "/scene/track", path.SerializeToString(deterministic=True)
+        self._tail = [place[good[-1]]]
 
 
 def thin_track(track: Track, every: int) -> Track:

@@ -75,7 +75,8 @@ def transform_messages(times_ns: NDArray[np.int64], position: Floats, attitude: 
     position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which no viewer shows and which halves
     their room in the log; the state's own message is exact.
     """
-    places = np.round(position * 1024.0) / 1024.0
+    with np.errstate(over="ignore", invalid="ignore"):
+        places = np.round(position * 1024.0) / 1024.0
     turns = np.round(body_rotation(attitude) * 2.0**20) / 2.0**20
     found = []
     for stamp, place, turn in zip(times_ns.tolist(), places.tolist(), turns.tolist(), strict=True):

@@ -23,6 +23,9 @@ from planner.search import plan_path
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
 
+# Seconds of flight that are written at a time: some milliseconds of a simulated flight.
+_BATCH = 10
+
 Advance = Callable[[float, float, str], None]
 
 
@@ -142,7 +145,7 @@ def fly(
     if log is None:
         flown = simulate(setup, vehicle.aircraft, progress=tell)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
-    with Recorder(log, setup, every=every) as recorder:
+    with Recorder(log, setup, every=every, batch=_BATCH) as recorder:
         flown = simulate(setup, vehicle.aircraft, sink=recorder.write, progress=tell)
         track = thin_track(flown.track, every)
         verdict = judge_flight(setup, track, flown.ended)
