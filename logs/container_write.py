@@ -36,6 +36,7 @@ from logs.container import FRAME, MAGIC, records, stream
 
 Index = NDArray[np.uint64]
 _MESSAGE = struct.Struct("<HIQ")
+_CHUNK = struct.Struct("<QQQI")
 _PAIRS_HEAD = 6  # channel and length, before a message index's pairs
 
 
@@ -88,7 +89,10 @@ class ContainerWriter:
         return channel.id
 
     def chunk(self, content: ChunkContent) -> None:
-        """Write a chunk of at least one message and hand it to the operating system."""
+        """Write a chunk of at least one message."""
+        if not self._unwritten:
+            self._chunk(content.records, content.index)
+            return
         front = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
         moved = np.array([0, len(front)], dtype=np.uint64)
@@ -123,7 +127,7 @@ class ContainerWriter:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        record = _bytes(chunk)
+        record = _chunk_record(chunk)
         start = self._at
         offsets = {}
         index_start = at = start + len(record)
@@ -147,7 +151,6 @@ class ContainerWriter:
                 uncompressed_size=chunk.uncompressed_size,
             )
         )
-        self._flush()
 
     @property
     def last_time(self) -> int:
@@ -190,7 +193,8 @@ class ContainerWriter:
             schema_count=len(self._schemas),
         )
 
-    def _flush(self) -> None:
+    def flush(self) -> None:
+        """Hand what was written to the operating system.  Raises OSError."""
         with _named(self._file):
             self._file.flush()
 
@@ -214,6 +218,16 @@ def _bytes(record: McapRecord) -> bytes:
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
+
+
+def _chunk_record(chunk: Chunk) -> bytes:
+    """Chunk.write, which copies its data through a record builder, takes as long as the compression."""
+    name = chunk.compression.encode()
+    head = _CHUNK.pack(
+        chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size, chunk.uncompressed_crc
+    )
+    content = head + len(name).to_bytes(4, "little") + name + len(chunk.data).to_bytes(8, "little")
+    return b"".join([FRAME.pack(Opcode.CHUNK, len(content) + len(chunk.data)), content, chunk.data])
 
 
 def _message_index(channel: int, pairs: Index) -> bytes:

@@ -50,6 +50,8 @@ RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
 LONGEST = 1e7  # s
 
+_BUFFER = 2**20
+_NO_ROWS = join_rows([])
 _ROWS_A_CHUNK = CHUNK_SIZE // RECORD.itemsize
 _SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
 _HEAD = struct.Struct("<BQHIQQ")
@@ -80,7 +82,7 @@ class Recorder:
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
-        self._skipped: Track | None = None  # the newest row, if it was not recorded
+        self._skipped: Track | None = None  # the newest block, if its last row was not recorded
         self._seen = 0  # rows, recorded or not
         pieces = pack_setup(setup)
         self._setup = setup
@@ -94,7 +96,7 @@ class Recorder:
         self._tail: list[Floats] = []  # the newest position
         self._next_track_scene = 10  # s
         self._channels: dict[str, int] = {}
-        self._file = path.open("wb")
+        self._file = path.open("wb", buffering=_BUFFER)
         self._open = True
         try:
             self._writer = ContainerWriter(self._file, PROFILE)
@@ -129,13 +131,15 @@ class Recorder:
         stamps = times_ns(block)
         if stamps[0] <= self._newest_ns or (np.diff(stamps) <= 0).any():
             raise ValueError(f"rows from {block.time[0]} s on: times must increase by at least 1 ns a row")
-        rows = encode_rows(block, self._received, self._channels[STATE_TOPIC])
         self._newest_ns = int(stamps[-1])
-        if self._every > 1:
-            rows = self._thinned(block, rows)
-            if not len(rows):
-                return
-        self._append(rows)
+        # One row in `every`, counted from the flight's first.
+        first = -self._seen % self._every
+        self._seen += len(block)
+        whole = first < len(block) and (len(block) - 1 - first) % self._every == 0
+        self._skipped = None if whole else block
+        if first < len(block):
+            kept = slice(first, None, self._every)
+            self._append(encode_rows(block, self._received, self._channels[STATE_TOPIC], kept))
 
     def _append(self, rows: Rows) -> None:
         self._pending.append(rows)
@@ -143,16 +147,6 @@ class Recorder:
         before, self._last_ns = self._last_ns, int(rows["log_time"][-1])
         if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
-
-    def _thinned(self, block: Track, rows: Rows) -> Rows:
-        """Keep one row in ``every``, counted from the flight's first, and number them anew."""
-        first = -self._seen % self._every
-        self._seen += len(rows)
-        kept: Rows = rows[first :: self._every].copy()
-        whole = len(kept) > 0 and (len(rows) - 1 - first) % self._every == 0
-        self._skipped = None if whole else block.rows(len(block) - 1, len(block))
-        kept["sequence"] = kept["state"]["row"] = np.arange(self._received, self._received + len(kept))
-        return kept
 
     def event(self, time: float, text: str, level: str = "info") -> None:
         """Record what happened at ``time`` (s); level: debug, info, warning, error or fatal.  Raises ValueError."""
@@ -167,7 +161,7 @@ class Recorder:
     def finish(self, ended: str, verdict: Verdict | None = None) -> None:
         """Write how the flight ended and its verdict, and close the file."""
         if self._skipped is not None:
-            self._append(encode_rows(self._skipped, self._received, self._channels[STATE_TOPIC]))
+            self._append(encode_rows(self._skipped, self._received, self._channels[STATE_TOPIC], slice(-1, None)))
             self._skipped = None
         self._emit(None)
         stamp = max(self._last_ns, EPOCH_NS)
@@ -198,6 +192,7 @@ class Recorder:
             "/scene/plan": scene.plan_scene(EPOCH_NS, self._setup.route.waypoints),
         }
         self._chunk([(EPOCH_NS, name, update.SerializeToString(deterministic=True)) for name, update in scenes.items()])
+        self._writer.flush()
 
     def _close(self) -> None:
         """Write what is pending, the summary and the end of the file."""
@@ -230,6 +225,7 @@ class Recorder:
             to = bisect.bisect_left(moments, (second + 1) * SECOND_NS, at)
             self._emit_second(rows[first:last], stamps[first:last], extras[at:to])
             at = to
+        self._writer.flush()
 
     def _emit_second(self, rows: Rows, stamps: NDArray[np.int64], extras: list[_Extra]) -> None:
         for first in range(0, max(1, len(rows)), _ROWS_A_CHUNK):
@@ -241,7 +237,7 @@ class Recorder:
 
     def _chunk(self, extras: list[_Extra], rows: Rows | None = None) -> None:
         """Write one chunk of rows and other messages, both in order of time; at one time the row comes last."""
-        rows = join_rows([]) if rows is None else rows
+        rows = _NO_ROWS if rows is None else rows
         data = rows.tobytes()
         places = np.searchsorted(rows["log_time"], np.array([item[0] for item in extras], dtype=np.uint64))
         offsets = np.arange(len(rows), dtype=np.uint64) * np.uint64(RECORD.itemsize)
@@ -258,7 +254,9 @@ class Recorder:
         pieces.append(data[at * RECORD.itemsize :])
         pairs = {channel: np.array(entries, dtype=np.uint64) for channel, entries in index.items()}
         if len(rows):
-            pairs[self._channels[STATE_TOPIC]] = np.stack([rows["log_time"], offsets], axis=1)
+            own = np.empty((len(rows), 2), dtype=np.uint64)
+            own[:, 0], own[:, 1] = rows["log_time"], offsets
+            pairs[self._channels[STATE_TOPIC]] = own
         self._writer.chunk(ChunkContent(b"".join(pieces), pairs))
 
     def _poses(self, rows: Rows, stamps: NDArray[np.int64]) -> Iterator[_Extra]:
@@ -283,8 +281,10 @@ class Recorder:
         _, starts = np.unique(when // SECOND_NS, return_index=True)
         firsts = place[chosen[starts]]
         lat, lon = to_geo(self._setup.scenario.origin, firsts[:, 0], firsts[:, 1])
-        for stamp, first, *where in zip(when[starts].tolist(), firsts, lat.tolist(), lon.tolist(), strict=True):
-            fix = scene.fix_message(stamp, *where, float(first[2]))
+        for stamp, first, lat_deg, lon_deg in zip(
+            when[starts].tolist(), firsts, lat.tolist(), lon.tolist(), strict=True
+        ):
+            fix = scene.fix_message(stamp, lat_deg, lon_deg, float(first[2]))
             yield stamp, "/fix", fix.SerializeToString(deterministic=True)
             self._path.append(first)
             # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.

@@ -79,11 +79,15 @@ def transform_messages(times_ns: NDArray[np.int64], position: Floats, attitude: 
         places = np.round(position * 1024.0) / 1024.0
     turns = np.round(body_rotation(attitude) * 2.0**20) / 2.0**20
     found = []
+    last, head = -1, b""
     for stamp, place, turn in zip(times_ns.tolist(), places.tolist(), turns.tolist(), strict=True):
-        when = b"\x08" + _varint(stamp // 1_000_000_000) + b"\x10" + _varint(stamp % 1_000_000_000)
+        seconds, nanos = divmod(stamp, 1_000_000_000)
+        if seconds != last:
+            last, head = seconds, b"\x08" + _varint(seconds) + b"\x10"
+        when = head + _varint(nanos)
         moved = _PLACE.pack(0x22, 27, 0x09, place[0], 0x11, place[1], 0x19, place[2])
         turned = _TURN.pack(0x2A, 36, 0x09, turn[0], 0x11, turn[1], 0x19, turn[2], 0x21, turn[3])
-        found.append(b"\x0a" + _varint(len(when)) + when + _FRAMES + moved + turned)
+        found.append(b"\x0a" + bytes([len(when)]) + when + _FRAMES + moved + turned)
     return found
 
 
