@@ -19,7 +19,8 @@
     // Seen across the way from start to destination, from its southern side.
     var across = Math.atan2(b[1] - a[1], b[0] - a[0]) - Math.PI / 2;
     if (Math.sin(across) > 0) across += Math.PI;
-    view = { az: across, el: 0.62, far: 1.34, e: 0, n: 0, stretch: scene.stretch };
+    var narrow = Math.min(E1 - E0, N1 - N0) / size, near = 0.9 + 0.44 * Math.min(1, narrow / 0.7);
+    view = { az: across, el: 0.62, far: near, e: 0, n: 0, stretch: scene.stretch };
     home = JSON.stringify(view);
   }
 
