@@ -5,12 +5,12 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test bench soak setup clean
+.PHONY: demo test bench soak setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
-test: setup
+test: setup clients
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
@@ -19,7 +19,7 @@ test: setup
 bench: setup
 	$(BIN)/python -m tests.bench
 
-soak: setup
+soak: setup clients
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest -n 2
 
 setup: $(READY)
@@ -30,5 +30,13 @@ $(READY): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test]'
 	touch $(READY)
 
+# Other people's MCAP readers for Node, for the tests alone; without npm their tests say so.
+clients: .node/.ready
+
+.node/.ready: Makefile
+	@if command -v npm >/dev/null; then \
+	npm install --silent --no-audit --no-fund --no-package-lock --no-save --prefix .node @mcap/core@2.2.2 @mcap/support@1.1.0 \
+	&& touch $@; else echo "npm is not installed: the tests with Node's MCAP reader will be skipped"; fi
+
 clean:
-	rm -rf $(VENV) runs build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) .node runs build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -35,10 +35,11 @@ class _Damage(Exception):
 class Container:
     """What was found in a file up to its end, or up to its first damage.
 
-    attachments: by name.  problem: empty if the file is whole.
+    attachments: by name.  media: the type and log_time (ns) of each.  problem: empty if the file is whole.
     """
 
     attachments: dict[str, bytes] = field(default_factory=dict)
+    media: dict[str, tuple[str, int]] = field(default_factory=dict)
     problem: str = ""
 
 
@@ -94,6 +95,20 @@ def _record(file: BinaryIO, at: int) -> tuple[bytes, bytes]:
     return head, content
 
 
+def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    """Give opcode, offset and content of each record in a chunk's bytes.  Raises ValueError where one does not fit."""
+    at = 0
+    while at < len(data):
+        if at + FRAME.size > len(data):
+            raise ValueError("a record reaches beyond its chunk")
+        opcode, length = FRAME.unpack_from(data, at)
+        end = at + FRAME.size + length
+        if end > len(data):
+            raise ValueError("a record reaches beyond its chunk")
+        yield opcode, at, data[at + FRAME.size : end]
+        at = end
+
+
 def stream(content: bytes) -> ReadDataStream:
     """Wrap one record's content as what mcap's record classes read from."""
     return ReadDataStream(BytesIO(content))
@@ -137,6 +152,7 @@ def _attachment(content: bytes, at: int, found: Container) -> None:
     if attachment.name in found.attachments:
         raise _Damage(f"the attachment at byte {at:,} has the name of an earlier one")
     found.attachments[attachment.name] = attachment.data
+    found.media[attachment.name] = (attachment.media_type, attachment.log_time)
 
 
 def _data_end(content: bytes, at: int, crc: int) -> None:

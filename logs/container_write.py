@@ -4,8 +4,11 @@ mcap's own `Writer` takes one message at a time, at some 6 us each; here a chunk
 come as arrays.  The records around them are mcap's own classes.  Every CRC that the format has is written.
 """
 
+import contextlib
+import struct
 import zlib
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, BinaryIO
 
@@ -29,9 +32,11 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from logs.container import FRAME, MAGIC
+from logs.container import FRAME, MAGIC, records, stream
 
 Index = NDArray[np.uint64]
+_MESSAGE = struct.Struct("<HIQ")
+_CHUNK = struct.Struct("<QQQI")
 _PAIRS_HEAD = 6  # channel and length, before a message index's pairs
 
 
@@ -84,28 +89,55 @@ class ContainerWriter:
         return channel.id
 
     def chunk(self, content: ChunkContent) -> None:
-        """Write a chunk of at least one message and hand it to the operating system."""
+        """Write a chunk of at least one message."""
+        if not self._unwritten:
+            self._chunk(content.records, content.index)
+            return
         front = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
-        data = front + content.records
-        times = np.concatenate([pairs[:, 0] for pairs in content.index.values()])
+        moved = np.array([0, len(front)], dtype=np.uint64)
+        self._chunk(front + content.records, {channel: pairs + moved for channel, pairs in content.index.items()})
+
+    def copy(self, data: bytes) -> None:
+        """Write a chunk as it stood in another file, from its records.  Raises ValueError and what mcap's classes do.
+
+        Its schemas and channels count as this file's.
+        """
+        index: dict[int, list[tuple[int, int]]] = {}
+        for opcode, at, content in records(data):
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream(content))
+                self._schemas.setdefault(f"{schema.id}", schema)
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream(content))
+                if all(channel.id != known.id for known in self._channels):
+                    self._channels.append(channel)
+            elif opcode == Opcode.MESSAGE:
+                number, _, log_time = _MESSAGE.unpack_from(content)
+                index.setdefault(number, []).append((log_time, at))
+        self._chunk(data, {number: np.array(pairs, dtype=np.uint64) for number, pairs in index.items()})
+
+    def _chunk(self, data: bytes, index: dict[int, Index]) -> None:
+        times = np.concatenate([np.zeros(0, dtype=np.uint64), *(pairs[:, 0] for pairs in index.values())])
         chunk = Chunk(
             compression="zstd",
             data=self._compressor.compress(data),
-            message_start_time=int(times.min()),
-            message_end_time=int(times.max()),
+            message_start_time=int(times.min()) if times.size else 0,
+            message_end_time=int(times.max(initial=0)),
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        record = _bytes(chunk)
+        record = _chunk_record(chunk)
         start = self._at
-        self._put(record)
         offsets = {}
-        index_start = self._at
-        for channel, pairs in sorted(content.index.items()):
-            offsets[channel] = self._at
-            self._put(_message_index(channel, pairs + np.array([0, len(front)], dtype=np.uint64)))
+        index_start = at = start + len(record)
+        pieces = [record]
+        for channel, pairs in sorted(index.items()):
+            offsets[channel] = at
+            pieces.append(_message_index(channel, pairs))
+            at += len(pieces[-1])
             self._counts[channel] += len(pairs)
+        self._put(b"".join(pieces))
         self._chunks.append(
             ChunkIndex(
                 chunk_length=len(record),
@@ -119,7 +151,11 @@ class ContainerWriter:
                 uncompressed_size=chunk.uncompressed_size,
             )
         )
-        self._file.flush()
+
+    @property
+    def last_time(self) -> int:
+        """log_time of the newest message, ns; 0 before the first chunk."""
+        return max((index.message_end_time for index in self._chunks), default=0)
 
     def finish(self) -> None:
         """Write the end of the data and the summary; the file stays open."""
@@ -134,8 +170,8 @@ class ContainerWriter:
         ]
         summary = b""
         offsets = b""
-        for opcode, records in groups:
-            group = b"".join(_bytes(record) for record in records)
+        for opcode, members in groups:
+            group = b"".join(_bytes(record) for record in members)
             if group:
                 offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
@@ -157,16 +193,41 @@ class ContainerWriter:
             schema_count=len(self._schemas),
         )
 
+    def flush(self) -> None:
+        """Hand what was written to the operating system.  Raises OSError."""
+        with _named(self._file):
+            self._file.flush()
+
     def _put(self, data: bytes) -> None:
-        self._file.write(data)
+        with _named(self._file):
+            self._file.write(data)
         self._crc = zlib.crc32(data, self._crc)
         self._at += len(data)
+
+
+@contextlib.contextmanager
+def _named(file: BinaryIO) -> Iterator[None]:
+    """Give an error while writing (a full disk) the name of the file, which a write does not know."""
+    try:
+        yield
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, getattr(file, "name", None)) from error
 
 
 def _bytes(record: McapRecord) -> bytes:
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
+
+
+def _chunk_record(chunk: Chunk) -> bytes:
+    """Chunk.write, which copies its data through a record builder, takes as long as the compression."""
+    name = chunk.compression.encode()
+    head = _CHUNK.pack(
+        chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size, chunk.uncompressed_crc
+    )
+    content = head + len(name).to_bytes(4, "little") + name + len(chunk.data).to_bytes(8, "little")
+    return b"".join([FRAME.pack(Opcode.CHUNK, len(content) + len(chunk.data)), content, chunk.data])
 
 
 def _message_index(channel: int, pairs: Index) -> bytes:

@@ -56,6 +56,8 @@ _SETTINGS: Any = {
     "legend.fontsize": 8.0,
     "legend.frameon": False,
     "path.simplify": True,
+    # Names inside an SVG would be random.
+    "svg.hashsalt": "planfly",
 }
 
 
@@ -80,11 +82,20 @@ def new_figure(height: float) -> Figure:
 
 def png_bytes(figure: Figure) -> bytes:
     """Render the figure as a PNG; the same figure gives the same bytes (no date, no version inside)."""
+    return _rendered(figure, "png", {"Software": None})
+
+
+def svg_bytes(figure: Figure) -> bytes:
+    """Render the figure as an SVG, its letters as outlines; the same figure gives the same bytes."""
+    return _rendered(figure, "svg", {"Date": None, "Creator": None})
+
+
+def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:
     buffer = io.BytesIO()
     with clean_style(), warnings.catch_warnings():
         # A name in a script that the font lacks shows as boxes; that is no reason to stop or to talk.
         warnings.filterwarnings("ignore", message="Glyph .* missing from font", category=UserWarning)
-        figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
+        figure.savefig(buffer, format=kind, dpi=DPI, metadata=metadata)
     return buffer.getvalue()
 
 

@@ -1,10 +1,9 @@
 """The pictures of a plan and its flight, ready for a file or a page.
 
-`logs.figure_map`, `logs.figure_profile` and `logs.figure_time` draw them.  Importing this module imports matplotlib
-(most of a second): commands import it when they draw.
+`logs.figure_map` and its sisters draw them.  Importing this module imports matplotlib (most of a second): commands
+import it when they draw.
 """
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,35 +11,57 @@ from matplotlib.figure import Figure
 
 from flight.setup import FlightSetup
 from flight.track import Track
+from logs.figure_envelope import draw_envelope
+from logs.figure_exposure import draw_exposure
 from logs.figure_map import draw_map
 from logs.figure_profile import draw_profile
-from logs.figure_style import png_bytes
-from logs.figure_time import draw_time_plots
+from logs.figure_scene import draw_scene
+from logs.figure_style import png_bytes, svg_bytes
+from logs.figure_time import draw_controls, draw_energy, draw_time_plots
+from logs.figure_turns import draw_turns
 from logs.verdict import Verdict
 from world.files import write_whole
 
-__all__ = ["Pictures", "draw_map", "draw_pictures", "draw_profile", "draw_time_plots", "write_png"]
+__all__ = [
+    "FIGURE_FILES", "draw_figures", "draw_map", "draw_pictures", "draw_profile", "draw_time_plots", "write_png",
+]  # fmt: skip
+
+# Those that are files too, beside the page; the others are in the page alone.
+FIGURE_FILES = ("map", "profile", "scene", "turns", "envelope")
 
 
-@dataclass(frozen=True, slots=True)
-class Pictures:
-    """The pictures as PNG bytes, each 1500 px wide; time_plots is None where nothing was flown."""
-
-    map: bytes
-    profile: bytes
-    time_plots: bytes | None
-
-
-def draw_pictures(setup: FlightSetup, track: Track | None, verdict: Verdict | None) -> Pictures:
-    """Draw all pictures of a flight, or of a plan that was not flown."""
+def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Figure]:
+    """Draw all pictures of a flight, or of a plan that was not flown, by name; what has no data is left out."""
     plan = setup.plan.waypoints if setup.plan is not None else None
     paths: dict[str, Any] = {"plan_waypoints": plan, "route_waypoints": setup.route.waypoints}
     flown = track if track is not None and len(track) else None
-    return Pictures(
-        map=png_bytes(draw_map(setup.scenario, **paths, track=flown, verdict=verdict)),
-        profile=png_bytes(draw_profile(setup.scenario, **paths, track=flown, verdict=verdict)),
-        time_plots=png_bytes(draw_time_plots(setup, flown)) if flown is not None else None,
-    )
+    found: dict[str, Figure | None] = {
+        "map": draw_map(setup.scenario, **paths, track=flown, verdict=verdict),
+        "profile": draw_profile(setup.scenario, **paths, track=flown, verdict=verdict),
+        "scene": draw_scene(setup, flown, verdict),
+        "turns": draw_turns(setup.scenario.name, verdict),
+        "envelope": draw_envelope(setup, flown),
+    }
+    if flown is not None:
+        found |= {
+            "time": draw_time_plots(setup, flown),
+            "exposure": draw_exposure(setup, flown),
+            "controls": draw_controls(setup, flown),
+            "energy": draw_energy(setup, flown),
+        }
+    return {name: figure for name, figure in found.items() if figure is not None}
+
+
+def draw_pictures(setup: FlightSetup, track: Track | None, verdict: Verdict, *, svg: bool = False) -> dict[str, bytes]:
+    """Render the pictures, each 1500 px wide: file names (`map.png`) and bytes.
+
+    svg: those of `FIGURE_FILES` as `map.svg` and so on, too.
+    """
+    figures = draw_figures(setup, track, verdict)
+    found = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
+    if svg:
+        found |= {f"{name}.svg": svg_bytes(figures[name]) for name in FIGURE_FILES if name in figures}
+    return found
 
 
 def write_png(figure: Figure, path: Path) -> None:

@@ -18,7 +18,7 @@ from mcap.records import Channel, Schema
 from flight.setup import FlightSetup
 from flight.track import Track
 from logs.container import MAGIC, PARSE_ERRORS, Container, read_chunks, stream
-from logs.recorder import LONGEST, RESULT, VERDICT
+from logs.recorder import LONGEST, RECOVERY, RESULT, VERDICT
 from logs.scene import LEVELS
 from logs.schema import (
     EPOCH_NS,
@@ -171,7 +171,7 @@ def read_log(path: Path) -> FlightLog:
         raise LogError(f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}")
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
-    problem = fault or found.problem or wrong or garbled
+    problem = fault or found.problem or _recovery(found.attachments) or wrong or garbled
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
@@ -224,6 +224,14 @@ def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
     if data.get("rows") != rows:
         return ended, f"{rows} of {data.get('rows')} rows are there"
     return ended, ""
+
+
+def _recovery(attachments: dict[str, bytes]) -> str:
+    """What was lost before the log was made whole again; empty for a log that never was damaged."""
+    if RECOVERY not in attachments:
+        return ""
+    lost = _object(attachments[RECOVERY]).get("lost")
+    return f"recovered: {lost}" if isinstance(lost, str) and lost else "recovered, and it is not said what was lost"
 
 
 def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:

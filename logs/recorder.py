@@ -4,6 +4,7 @@ The same setup and rows give the same bytes, in whatever blocks the rows arrive:
 `logs.schema.EPOCH_NS`), a chunk ends at 64 KiB or at a whole second of it, and nothing reads a clock.
 """
 
+import bisect
 import contextlib
 import json
 import struct
@@ -20,7 +21,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from flight.setup import FlightSetup
-from flight.track import Track
+from flight.track import COLUMNS, Track
 from logs import scene
 from logs.container_write import ChunkContent, ContainerWriter
 from logs.schema import (
@@ -44,13 +45,15 @@ from logs.verdict import Verdict, verdict_json
 from world.frames import to_geo
 
 CHUNK_SIZE = 64 * 1024
-RESULT, VERDICT = "result.json", "verdict.json"
+RESULT, VERDICT, RECOVERY = "result.json", "verdict.json", "recovery.json"
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
 LONGEST = 1e7  # s
 
+_BUFFER = 2**20
+_NO_ROWS = join_rows([])
 _ROWS_A_CHUNK = CHUNK_SIZE // RECORD.itemsize
-_SLOT_NS = 200_000_000  # one transform and one fix in each: 5 Hz
+_SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
 _HEAD = struct.Struct("<BQHIQQ")
 _CHANNELS: dict[str, Any] = {
     "/tf": FrameTransform,
@@ -70,20 +73,30 @@ class Recorder:
     process loses at most the last one.
     """
 
-    def __init__(self, path: Path, setup: FlightSetup) -> None:
-        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError."""
+    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
+        """Open ``path`` for writing (replacing it) and write the setup.  Raises OSError.
+
+        every: one row in so many is recorded, and the flight's last.  batch: whole seconds of flight that are written
+        at a time, each in chunks of its own: more costs less, and a killed process loses as much; the bytes are the
+        same.
+        """
+        self._batch_ns = batch * SECOND_NS
+        self._every = every
+        self._skipped: Track | None = None  # the newest block, if its last row was not recorded
+        self._seen = 0  # rows, recorded or not
         pieces = pack_setup(setup)
         self._setup = setup
         self._pending: list[Rows] = []
         self._events: list[_Extra] = []
         self._received = 0  # rows
-        self._last_ns = EPOCH_NS - 1  # of the rows received
+        self._last_ns = EPOCH_NS - 1  # of the rows recorded
+        self._newest_ns = EPOCH_NS - 1  # of the rows received
         self._slot = -1
         self._path: list[Floats] = []  # one position a second
         self._tail: list[Floats] = []  # the newest position
         self._next_track_scene = 10  # s
         self._channels: dict[str, int] = {}
-        self._file = path.open("wb")
+        self._file = path.open("wb", buffering=_BUFFER)
         self._open = True
         try:
             self._writer = ContainerWriter(self._file, PROFILE)
@@ -108,17 +121,31 @@ class Recorder:
 
     def write(self, block: Track) -> None:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
+        self._take(block)
+
+    def _take(self, block: Track) -> None:
         if not len(block):
             return
         if not (np.isfinite(block.time).all() and block.time[0] >= 0.0 and block.time[-1] < LONGEST):
             raise ValueError(f"time {block.time[0]}..{block.time[-1]} s: 0..{LONGEST:g} is expected")
         stamps = times_ns(block)
-        if stamps[0] <= self._last_ns or (np.diff(stamps) <= 0).any():
+        if stamps[0] <= self._newest_ns or (np.diff(stamps) <= 0).any():
             raise ValueError(f"rows from {block.time[0]} s on: times must increase by at least 1 ns a row")
-        self._pending.append(encode_rows(block, self._received, self._channels[STATE_TOPIC]))
-        self._received += len(block)
-        before, self._last_ns = self._last_ns, int(stamps[-1])
-        if self._last_ns // SECOND_NS > before // SECOND_NS:
+        self._newest_ns = int(stamps[-1])
+        # One row in `every`, counted from the flight's first.
+        first = -self._seen % self._every
+        self._seen += len(block)
+        whole = first < len(block) and (len(block) - 1 - first) % self._every == 0
+        self._skipped = None if whole else block
+        if first < len(block):
+            kept = slice(first, None, self._every)
+            self._append(encode_rows(block, self._received, self._channels[STATE_TOPIC], kept))
+
+    def _append(self, rows: Rows) -> None:
+        self._pending.append(rows)
+        self._received += len(rows)
+        before, self._last_ns = self._last_ns, int(rows["log_time"][-1])
+        if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
 
     def flush(self) -> None:
@@ -141,6 +168,9 @@ class Recorder:
 
     def finish(self, ended: str, verdict: Verdict | None = None) -> None:
         """Write how the flight ended and its verdict, and close the file."""
+        if self._skipped is not None:
+            self._append(encode_rows(self._skipped, self._received, self._channels[STATE_TOPIC], slice(-1, None)))
+            self._skipped = None
         self._emit(None)
         stamp = max(self._last_ns, EPOCH_NS)
         final = scene.track_scene(stamp, np.array([*self._path, *self._tail]).reshape(-1, 3))
@@ -170,6 +200,7 @@ class Recorder:
             "/scene/plan": scene.plan_scene(EPOCH_NS, self._setup.route.waypoints),
         }
         self._chunk([(EPOCH_NS, name, update.SerializeToString(deterministic=True)) for name, update in scenes.items()])
+        self._writer.flush()
 
     def _close(self) -> None:
         """Write what is pending, the summary and the end of the file."""
@@ -190,17 +221,21 @@ class Recorder:
         self._pending = [rows[stop:]] if stop < len(rows) else []
         events = sorted((item for item in self._events if until is None or item[0] < until), key=lambda item: item[0])
         self._events = [item for item in self._events if until is not None and item[0] >= until]
-        stamps = rows["log_time"][:stop].astype(np.int64)
-        seconds = np.unique(
-            np.concatenate([stamps, np.array([item[0] for item in events], dtype=np.int64)]) // SECOND_NS
-        )
-        for second in seconds.tolist():
-            first, last = np.searchsorted(stamps, [second * SECOND_NS, (second + 1) * SECOND_NS]).tolist()
-            here = [item for item in events if item[0] // SECOND_NS == second]
-            self._emit_second(rows[first:last], stamps[first:last], here)
-
-    def _emit_second(self, rows: Rows, stamps: NDArray[np.int64], events: list[_Extra]) -> None:
+        rows = rows[:stop]
+        stamps = rows["log_time"].astype(np.int64)
         extras = sorted([*self._poses(rows, stamps), *events], key=lambda item: item[0])
+        moments = [item[0] for item in extras]
+        seconds = np.unique(np.concatenate([stamps, np.array(moments, dtype=np.int64)]) // SECOND_NS)
+        firsts = np.searchsorted(stamps, seconds * SECOND_NS).tolist()
+        lasts = np.searchsorted(stamps, (seconds + 1) * SECOND_NS).tolist()
+        at = 0
+        for second, first, last in zip(seconds.tolist(), firsts, lasts, strict=True):
+            to = bisect.bisect_left(moments, (second + 1) * SECOND_NS, at)
+            self._emit_second(rows[first:last], stamps[first:last], extras[at:to])
+            at = to
+        self._writer.flush()
+
+    def _emit_second(self, rows: Rows, stamps: NDArray[np.int64], extras: list[_Extra]) -> None:
         for first in range(0, max(1, len(rows)), _ROWS_A_CHUNK):
             stop = first + _ROWS_A_CHUNK
             # Before the next block's first row; the last block takes what is left.
@@ -210,7 +245,7 @@ class Recorder:
 
     def _chunk(self, extras: list[_Extra], rows: Rows | None = None) -> None:
         """Write one chunk of rows and other messages, both in order of time; at one time the row comes last."""
-        rows = join_rows([]) if rows is None else rows
+        rows = _NO_ROWS if rows is None else rows
         data = rows.tobytes()
         places = np.searchsorted(rows["log_time"], np.array([item[0] for item in extras], dtype=np.uint64))
         offsets = np.arange(len(rows), dtype=np.uint64) * np.uint64(RECORD.itemsize)
@@ -227,11 +262,16 @@ class Recorder:
         pieces.append(data[at * RECORD.itemsize :])
         pairs = {channel: np.array(entries, dtype=np.uint64) for channel, entries in index.items()}
         if len(rows):
-            pairs[self._channels[STATE_TOPIC]] = np.stack([rows["log_time"], offsets], axis=1)
+            own = np.empty((len(rows), 2), dtype=np.uint64)
+            own[:, 0], own[:, 1] = rows["log_time"], offsets
+            pairs[self._channels[STATE_TOPIC]] = own
         self._writer.chunk(ChunkContent(b"".join(pieces), pairs))
 
     def _poses(self, rows: Rows, stamps: NDArray[np.int64]) -> Iterator[_Extra]:
-        """Give a transform and a fix for the first good row in each slot, and now and then the track so far."""
+        """Give a transform for the first good row in each slot, one fix a second, and now and then the track so far.
+
+        rows: of whole seconds.
+        """
         state = rows["state"]
         place = np.stack([state[name] for name in ("east_m", "north_m", "up_amsl_m")], axis=1)
         angles = np.stack([state[name] for name in ("roll_rad", "pitch_rad", "yaw_rad")], axis=1)
@@ -241,21 +281,31 @@ class Recorder:
         if not chosen.size:
             return
         self._slot = int(slots[-1])
-        self._path.append(place[chosen[0]])
-        self._tail = [place[good[-1]]]
-        lat, lon = to_geo(self._setup.scenario.origin, place[chosen, 0], place[chosen, 1])
-        for k, lat_deg, lon_deg in zip(chosen.tolist(), lat.tolist(), lon.tolist(), strict=True):
-            stamp = int(stamps[k])
-            yield (
-                stamp,
-                "/tf",
-                scene.transform_message(stamp, place[k], angles[k]).SerializeToString(deterministic=True),
-            )
-            fix = scene.fix_message(stamp, lat_deg, lon_deg, float(place[k, 2]))
+        when = stamps[chosen]
+        for stamp, message in zip(
+            when.tolist(), scene.transform_messages(when, place[chosen], angles[chosen]), strict=True
+        ):
+            yield stamp, "/tf", message
+        _, starts = np.unique(when // SECOND_NS, return_index=True)
+        firsts = place[chosen[starts]]
+        lat, lon = to_geo(self._setup.scenario.origin, firsts[:, 0], firsts[:, 1])
+        for stamp, first, lat_deg, lon_deg in zip(
+            when[starts].tolist(), firsts, lat.tolist(), lon.tolist(), strict=True
+        ):
+            fix = scene.fix_message(stamp, lat_deg, lon_deg, float(first[2]))
             yield stamp, "/fix", fix.SerializeToString(deterministic=True)
-        # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
-        stamp = int(stamps[chosen[0]])
-        if stamp - EPOCH_NS >= self._next_track_scene * SECOND_NS:
-            self._next_track_scene *= 2
-            path = scene.track_scene(stamp, np.array(self._path))
-            yield stamp, "/scene/track", path.SerializeToString(deterministic=True)
+            self._path.append(first)
+            # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
+            if stamp - EPOCH_NS >= self._next_track_scene * SECOND_NS:
+                self._next_track_scene *= 2
+                path = scene.track_scene(stamp, np.array(self._path))
+                yield stamp, "/scene/track", path.SerializeToString(deterministic=True)
+        self._tail = [place[good[-1]]]
+
+
+def thin_track(track: Track, every: int) -> Track:
+    """The rows of a whole flight that a `Recorder` with this ``every`` keeps."""
+    if every <= 1 or not len(track):
+        return track
+    kept = np.union1d(np.arange(0, len(track), every), [len(track) - 1])
+    return Track(*(getattr(track, name)[kept] for name in COLUMNS))

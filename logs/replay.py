@@ -97,7 +97,8 @@ def _grouped(stretches: list[_Stretch], route: Route) -> list[list[_Stretch]]:
     return [list(group) for _, group in itertools.groupby(stretches, key=lambda stretch: first[stretch.leg])]
 
 
-def _waypoint(route: Route, index: int) -> str:
+def waypoint_name(route: Route, index: int) -> str:
+    """Name a waypoint by its number and, where it has one, its mission item."""
     item = int(route.items[index])
     return f"waypoint {index}" if item < 0 else f"waypoint {index} (item {item})"
 
@@ -128,7 +129,7 @@ def _legs(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
             continue
         course = round(math.degrees(courses[leg])) % 360
         text = (
-            f"leg {leg} to {_waypoint(route, leg + 1)}: course {course:03d}°, {runs[leg]:.0f} m, "
+            f"leg {leg} to {waypoint_name(route, leg + 1)}: course {course:03d}°, {runs[leg]:.0f} m, "
             f"slope {math.degrees(slopes[leg]):+.1f}°, {route.airspeed[leg]:.1f} m/s"
         )
         entries.append(TimelineEntry(float(log.track.time[stretch.first]), "leg", text))
@@ -150,7 +151,7 @@ def _turns(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
         way = "right" if angle > 0.0 else "left"
         window = bank[(before.first + before.last) // 2 : (after.first + after.last) // 2 + 1]
         peak = math.degrees(float(np.nanmax(window))) if np.isfinite(window).any() else math.nan
-        text = f"turn {way} {abs(angle):.1f}° at {_waypoint(route, after.leg)}, peak bank {peak:.1f}°"
+        text = f"turn {way} {abs(angle):.1f}° at {waypoint_name(route, after.leg)}, peak bank {peak:.1f}°"
         entries.append(TimelineEntry(float(track.time[after.first]), "turn", text))
     return entries
 

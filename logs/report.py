@@ -1,25 +1,30 @@
 """The report of a flight: one HTML page that needs nothing else, and its pictures as files.
 
-The page holds its pictures, its style and no script; it asks no network for anything.
+The page holds its pictures, its style and one script, that of the 3-D view, which its policy names by hash; it asks
+no network for anything, and without the script a still picture stands in the view's place.
 """
 
 import base64
+import hashlib
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from flight.setup import FlightSetup
 from flight.track import Track
 from logs import report_tables as tables
 from logs.figure_marks import failures
+from logs.report_pictures import report_pictures
 from logs.report_text import badge_of, count_sentence, finding_rows, rule_rows
+from logs.scene_data import scene_json
 from logs.verdict import Verdict
 from world.files import write_whole
 
 if TYPE_CHECKING:
-    from logs.figures import Pictures
     from logs.reader import LogEvent
 
 
@@ -33,18 +38,22 @@ def write_report(
     versions: Mapping[str, str],
     command: str,
     events: Sequence["LogEvent"] = (),
+    svg: bool = False,
 ) -> list[Path]:
-    """Write ``map.png``, ``profile.png`` and ``report.html`` into a folder, which is made if it is missing.
+    """Write the figures of `logs.figures.FIGURE_FILES` and ``report.html`` into a folder, made if it is missing.
+
+    svg: the figures as SVG, too.
 
     Everything is drawn before the first file is written; each file is written whole or not at all.
     Returns the paths written.  Raises OSError.
     """
-    from logs.figures import draw_pictures
+    from logs.figures import FIGURE_FILES, draw_pictures
 
-    pictures = draw_pictures(setup, track, verdict)
+    pictures = draw_pictures(setup, track, verdict, svg=svg)
     page = _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)
-    files = {"map.png": pictures.map, "profile.png": pictures.profile, "report.html": page.encode("utf-8")}
+    files = {name: data for name, data in pictures.items() if name.partition(".")[0] in FIGURE_FILES}
+    files["report.html"] = page.encode("utf-8")
     for name, data in files.items():
         write_whole(out_dir / name, data)
     return [out_dir / name for name in files]
@@ -76,7 +85,7 @@ def _page(
     setup: FlightSetup,
     track: Track | None,
     verdict: Verdict,
-    pictures: "Pictures",
+    pictures: Mapping[str, bytes],
     *,
     ended: str | None,
     versions: Mapping[str, str],
@@ -89,6 +98,7 @@ def _page(
     environment = Environment(
         loader=PackageLoader("logs"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    script = "\n" + _script()
     return environment.get_template("report.html").render(
         name=setup.scenario.name,
         badge=badge_of(verdict),
@@ -99,9 +109,12 @@ def _page(
         rules=rule_rows(verdict.findings),
         findings=rows,
         notes=[note for note in tables.notes_of(setup) if note not in verdict.summary],
-        pictures=_pictures(setup, track is not None, pictures),
+        pictures=report_pictures(setup, track is not None, pictures),
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
+        passage_columns=tables.PASSAGE_COLUMNS,
+        passages=tables.passage_rows(setup, track),
+        saturation=tables.saturation_rows(setup, track),
         scenario=tables.scenario_facts(setup),
         flight=tables.flight_facts(setup, track, ended or ""),
         events=tables.event_rows(events),
@@ -109,55 +122,12 @@ def _page(
         energy=tables.energy_facts(setup, track),
         command=command,
         origin=tables.origin_facts(setup, versions),
+        # Both are made safe for where they stand: the scene by `scene_json`, the script is ours.
+        scene=Markup(scene_json(setup, track, failed)),
+        script=Markup(script),
+        script_hash=base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii"),
     )
 
 
-def _pictures(setup: FlightSetup, flown: bool, pictures: "Pictures") -> list[dict[str, str]]:
-    """List identifier, heading, alternative text, caption and data address of each picture, in the page's order."""
-    legs, threats = setup.route.legs, len(setup.scenario.threats)
-    ground = "shaded terrain" if setup.scenario.terrain is not None else "no terrain"
-    track = " and the flown track" if flown else ""
-    heights = "planned and flown heights" if flown else "planned heights"
-    progress = "Flown heights stand at the flight's progress along the planned path. " if flown else ""
-    shown = [
-        (
-            "map",
-            "Map",
-            f"Map, north up: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
-            "The broad line is the plan, the thin line on it the flight. Where they part, at corners, the aircraft "
-            "flies an arc inside the waypoint."
-            if flown
-            else "Nothing was flown: the line is the plan.",
-            pictures.map,
-        ),
-        (
-            "profile",
-            "Profile",
-            f"Heights along the path: terrain, required clearance, {heights}, the ceiling, and the missile and radar "
-            "spheres that stand over the path.",
-            f"{progress}A sphere is cut where the path runs through its column of air; the path is within reach only "
-            "where its line lies inside the cut.",
-            pictures.profile,
-        ),
-    ]
-    if pictures.time_plots is not None:
-        shown.append(
-            (
-                "time",
-                "Over time",
-                "Plots over time: airspeed, bank, throttle, cross-track error, height error, height above ground.",
-                "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
-                "above ground is computed from track and terrain.",
-                pictures.time_plots,
-            )
-        )
-    return [
-        {
-            "id": identifier,
-            "title": title,
-            "alt": alternative,
-            "caption": caption,
-            "data": "data:image/png;base64," + base64.b64encode(data).decode("ascii"),
-        }
-        for identifier, title, alternative, caption, data in shown
-    ]
+def _script() -> str:
+    return resources.files("logs").joinpath("templates", "view3d.js").read_text(encoding="utf-8")

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from flight.setup import FlightSetup
 from flight.track import Track
+from logs.along_track import passages
+from logs.controls import control_limits, held_at_limit
 from logs.report_text import NOTHING, number, quantity
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import geographic
@@ -239,3 +241,55 @@ def origin_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
     if terrain is not None and terrain.sha256:
         facts.append(("Terrain file, SHA-256", terrain.sha256))
     return facts
+
+
+PASSAGE_COLUMNS = ("unit", "reach", "entered (s)", "left (s)", "inside (s)", "closest (m)", "radius (m)")
+
+
+def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
+    """List the stays inside missiles' and radars' reach, in order of time, in the columns of `PASSAGE_COLUMNS`."""
+    if track is None or len(track) == 0:
+        return []
+    threats = setup.scenario.threats
+    stays = [
+        (stay, name, reach, float(radii[k]))
+        for k, name in enumerate(threats.names)
+        for reach, radii in (("missile", threats.kill_radius), ("radar", threats.detection_radius))
+        for stay in passages(track.time, track.position, threats.position[k], float(radii[k]))
+    ]
+    return [
+        (
+            name,
+            reach,
+            number(stay.start, digits=1),
+            number(stay.end, digits=1) if stay.whole else "still inside",
+            number(stay.end - stay.start, digits=1),
+            number(stay.closest, digits=0),
+            number(radius, digits=0),
+        )
+        for stay, name, reach, radius in sorted(stays, key=lambda item: item[0].start)
+    ]
+
+
+def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
+    """List each control: its limit, its largest command, and for how long that stood at the limit (s, %)."""
+    if track is None or len(track) < 2:
+        return []
+    lasts = np.append(np.diff(track.time), 0.0)
+    rows: list[tuple[str, ...]] = []
+    for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
+        low = 0.0 if name == "throttle" else -limit
+        held = float(lasts[held_at_limit(track, k, low, limit)].sum())
+        scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
+        peak = number(scale * _peak(track.commands[:, k]), digits=1)
+        shown = number(scale * limit, digits=1)
+        rows.append(
+            (
+                name,
+                shown if shown == NOTHING else shown + unit,
+                peak + unit,
+                number(held, digits=1) if math.isfinite(limit) else NOTHING,
+                number(100.0 * held / max(float(lasts.sum()), 1e-9), digits=1) if math.isfinite(limit) else NOTHING,
+            )
+        )
+    return rows

@@ -163,14 +163,14 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def encode_rows(track: Track, first_row: int, channel: int) -> Rows:
+def encode_rows(track: Track, first_row: int, channel: int, kept: slice = slice(None)) -> Rows:
     """Encode rows as MCAP message records, (t,) of `RECORD`.
 
-    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
+    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.  kept: the rows to encode.
     """
-    records: Rows = np.repeat(_TEMPLATE, len(track))
-    stamps = times_ns(track)
-    numbers = np.arange(first_row, first_row + len(track)).astype(np.uint32)
+    stamps = times_ns(track)[kept]
+    records: Rows = np.repeat(_TEMPLATE, len(stamps))
+    numbers = np.arange(first_row, first_row + len(stamps)).astype(np.uint32)
     records["channel"] = channel
     records["sequence"] = numbers
     records["log_time"] = stamps
@@ -179,7 +179,7 @@ def encode_rows(track: Track, first_row: int, channel: int) -> Rows:
     rows["row"] = numbers
     for name, _, field, column in FIELDS:
         values = getattr(track, field)
-        rows[name] = values if values.ndim == 1 else values[:, column]
+        rows[name] = values[kept] if values.ndim == 1 else values[kept, column]
     return records
 
 

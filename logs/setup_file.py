@@ -4,6 +4,7 @@
 written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
 """
 
+import functools
 import hashlib
 import json
 import math
@@ -79,8 +80,17 @@ class StoredSetup:
     versions: dict[str, str]
 
 
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    return tuple(_find_versions().items())
+
+
 def package_versions() -> dict[str, str]:
     """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed."""
+    return dict(_versions())
+
+
+def _find_versions() -> dict[str, str]:
     found = {"python": platform.python_version()}
     for name in _PACKAGES:
         try:

@@ -68,6 +68,21 @@ def _wind(text: str) -> tuple[float, float]:
     return speed, source
 
 
+def _moment(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value <= 1e7:
+        raise argparse.ArgumentTypeError(f"{text!r}: seconds, from 0 to 10,000,000, are expected")
+    return value
+
+
+def _moment_or_stations(text: str) -> float | str:
+    """A time of the flight, or where ground stations listen: an address has a colon."""
+    return text if ":" in text else _moment(text)
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     parser = _Parser(
@@ -175,6 +190,10 @@ def _add_export_and_fly(command: _Command) -> None:
     fly.add_argument("--wind", metavar="SPEED,FROM", type=_wind, help="steady wind, m/s and degrees it blows from")
     fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=_seed, help="of the turbulence (default: the plan's, or 1)")
+    fly.add_argument(
+        "--log-hz", metavar="HZ", type=int, choices=(60, 30, 20, 10), default=60,
+        help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is that of these rows",
+    )  # fmt: skip
     _overwrite(fly)
 
 
@@ -188,34 +207,64 @@ def _add_log_commands(command: _Command) -> None:
     _flown_by(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     _overwrite(check)
-    replay = command(
-        "replay",
-        "tell a flight again from its log alone: legs, turns, clearances, events",
-        "planfly replay flight.mcap --speed 20",
-    )
-    replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
-    replay.add_argument(
-        "--speed", metavar="X", type=_positive, help="at X times real time (default: at once; with --to, 1)"
-    )
-    _link(replay, to=None, bind="127.0.0.1:0")
-    replay.add_argument(
-        "--wait", metavar="S", type=_positive, default=10.0, help="with --to: wait S seconds for a ground station (10)"
-    )
+    _add_replay_and_recover(command)
     report = command(
-        "report", "draw the figures and write report.html from a log alone", "planfly report flight.mcap --out report"
+        "report",
+        "draw the figures and write report.html from a log alone, or write the layout for Foxglove",
+        "planfly report flight.mcap --out report --svg",
     )
-    report.add_argument("log", metavar="LOG.mcap", help="a flight log")
+    report.add_argument("log", metavar="LOG.mcap", nargs="?", help="a flight log")
     report.add_argument(
         "--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)"
     )
+    report.add_argument("--svg", action="store_true", help="write the figures as SVG, too")
+    report.add_argument("--layout", metavar="FILE", help="write the layout file for Foxglove there, and nothing else")
     _overwrite(report)
-
-
-def _link(parser: argparse.ArgumentParser, *, to: str | None, bind: str) -> None:
-    parser.add_argument(
-        "--to", metavar="IP:PORT,...", default=to,
-        help="where ground stations listen" + (f" (default: {to})" if to else ": play the log into them"),
+    compare = command(
+        "compare", "lay two flights over each other: a table of differences, and pictures",
+        "planfly compare calm.mcap windy.mcap --out both",
     )  # fmt: skip
+    compare.add_argument("first", metavar="A.mcap", help="a flight log")
+    compare.add_argument("second", metavar="B.mcap", help="another")
+    compare.add_argument(
+        "--out", metavar="DIR", help="write pictures and compare.html there (default: the table alone)"
+    )
+    compare.add_argument("--svg", action="store_true", help="write the pictures as SVG, too")
+    _overwrite(compare)
+
+
+def _add_replay_and_recover(command: _Command) -> None:
+    replay = command(
+        "replay",
+        "tell a flight again from its log alone: on a terminal as instruments, elsewhere as a timeline",
+        "planfly replay flight.mcap --speed 20 --from 60",
+    )
+    replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
+    replay.add_argument(
+        "--speed", metavar="X", type=_positive, help="at X times real time (default: 1 on a terminal, else at once)"
+    )
+    replay.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
+    replay.add_argument("--from", dest="start", metavar="S", type=_moment, help="from this time of the flight, s")
+    replay.add_argument(
+        "--to",
+        metavar="S|IP:PORT,...",
+        type=_moment_or_stations,
+        help="to this time of the flight, s; or play the log into the ground stations that listen there",
+    )
+    _own_link(replay, bind="127.0.0.1:0")
+    replay.add_argument(
+        "--wait", metavar="S", type=_positive, default=10.0, help="wait S seconds for a ground station (10)"
+    )
+    recover = command(
+        "recover", "make an unfinished or damaged log whole again, as far as it can be read",
+        "planfly recover flight.mcap --out whole.mcap",
+    )  # fmt: skip
+    recover.add_argument("log", metavar="LOG.mcap", help="a flight log")
+    recover.add_argument("--out", metavar="FILE", help="the new log (default: <log>-recovered.mcap beside it)")
+    _overwrite(recover)
+
+
+def _own_link(parser: argparse.ArgumentParser, *, bind: str) -> None:
     parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
     parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
     parser.add_argument(
@@ -230,7 +279,11 @@ def _add_serve(command: _Command) -> None:
     )  # fmt: skip
     serve.add_argument("mission", metavar="MISSION", nargs="?", help="plan.json, .waypoints or .plan to begin with")
     _world(serve)
-    _link(serve, to="127.0.0.1:14550", bind="127.0.0.1:14580")
+    serve.add_argument(
+        "--to", metavar="IP:PORT,...", default="127.0.0.1:14550",
+        help="where ground stations listen (default: 127.0.0.1:14550)",
+    )  # fmt: skip
+    _own_link(serve, bind="127.0.0.1:14580")
     serve.add_argument(
         "--speed", metavar="X", type=_speedup, default=1.0, help="fly at X times real time, 0.1 to 100 (default: 1)"
     )

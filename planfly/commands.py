@@ -7,15 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from planfly import log_commands
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.files import default_folder, prepare_folder, refuse_existing, refuse_folder
+from planfly.files import default_folder, refuse_existing
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
 from world.scenario import Scenario, embedded_scenarios, load_scenario, over_terrain, with_flight, with_wind
 
 if TYPE_CHECKING:
-    from logs.reader import FlightLog
+    pass
 
 MCAP_MAGIC = b"\x89MCAP"
 
@@ -72,7 +73,7 @@ def fly(args: argparse.Namespace) -> int:
     print_warnings(opened.setup.mission.warnings)
     target.parent.mkdir(parents=True, exist_ok=True)
     with progress("flying") as advance:
-        _, _, verdict = fly_setup(opened.setup, opened.vehicle, target, advance)
+        _, _, verdict = fly_setup(opened.setup, opened.vehicle, target, advance, every=60 // args.log_hz)
     print_verdict(verdict, opened.setup.route.notes)
     print(f"log       {target}")
     return FLYABLE if verdict.flyable else NOT_FLYABLE
@@ -129,66 +130,11 @@ def _check_log(source: Path, args: argparse.Namespace, target: Path | None) -> i
     return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
-def replay(args: argparse.Namespace) -> int:
-    """``planfly replay``."""
-    import time
-
-    from logs.reader import read_log
-    from logs.replay import entry_lines, timeline
-
-    log = read_log(Path(args.log))
-    if args.to:
-        from planfly.play import play
-
-        play(log, args)
-        return _replayed(args, log)
-    started = time.monotonic()
-    for entry in timeline(log):
-        if args.speed:
-            time.sleep(max(0.0, entry.time / args.speed - (time.monotonic() - started)))
-        print("\n".join(entry_lines(entry)), flush=bool(args.speed))
-    return _replayed(args, log)
-
-
-def _replayed(args: argparse.Namespace, log: "FlightLog") -> int:
-    from planfly.results import print_warnings
-
-    if not log.complete:
-        print_warnings([f"{args.log}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
-        return LOSS
-    return FLYABLE
-
-
 def serve(args: argparse.Namespace) -> int:
     """``planfly serve``."""
     from planfly.serve import serve as serve_vehicle
 
     return serve_vehicle(args)
-
-
-def report(args: argparse.Namespace) -> int:
-    """``planfly report``."""
-    from logs.check import judge_flight
-    from logs.reader import read_log
-    from planfly.results import print_warnings, write_pictures
-
-    source = Path(args.log)
-    log = read_log(source)
-    folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-report")
-    if args.out:
-        refuse_folder(folder, args.overwrite)
-    verdict = judge_flight(log.setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
-    prepare_folder(folder)
-    with progress("drawing"):
-        files = write_pictures(
-            folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions, log.events
-        )
-    for file in files:
-        print(f"report    {file}")
-    if not log.complete:
-        print_warnings([f"{source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"])
-        return LOSS
-    return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
 def is_log(path: Path) -> bool:
@@ -227,8 +173,10 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "export": export,
     "fly": fly,
     "check": check,
-    "replay": replay,
-    "report": report,
     "serve": serve,
+    "replay": log_commands.replay,
+    "recover": log_commands.recover,
+    "report": log_commands.report,
+    "compare": log_commands.compare,
     "scenarios": scenarios,
 }

@@ -13,7 +13,19 @@ RUN_FILES = (
     "verdict.json",
     "map.png",
     "profile.png",
+    "scene.png",
+    "turns.png",
+    "envelope.png",
     "report.html",
+)
+
+
+_FIGURES = ("map", "profile", "scene", "turns", "envelope")
+# What `report` and `compare` may write, figures as SVG included.
+LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
+COMPARE_FILES = (
+    "compare.html",
+    *(f"compare-{name}.{kind}" for name in ("map", "profile") for kind in ("png", "svg")),
 )
 
 
@@ -37,12 +49,14 @@ def refuse_folder(folder: Path, overwrite: bool) -> None:
         raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
 
 
-def prepare_folder(folder: Path) -> None:
-    """Make a folder and clear old results of ours: files that a run writes, never anything else that lies there."""
+def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
+    """Make a folder and clear old results of ours: what the command writes, never anything else that lies there."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "rounds.json").unlink(missing_ok=True)
-    for place in (folder, *sorted(folder.glob("round-[0-9]*"))):
-        for name in RUN_FILES:
+    rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
+    if files is RUN_FILES:
+        (folder / "rounds.json").unlink(missing_ok=True)
+    for place in (folder, *rounds):
+        for name in files:
             (place / name).unlink(missing_ok=True)
         if place != folder and not any(place.iterdir()):
             place.rmdir()

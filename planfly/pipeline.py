@@ -18,12 +18,15 @@ from flight.simulate import simulate
 from flight.track import Track
 from logs.check import judge_flight, judge_plan_only
 from logs.reader import LogEvent
-from logs.recorder import Recorder
+from logs.recorder import Recorder, thin_track
 from logs.verdict import Verdict
 from planner.plan import Plan
 from planner.search import plan_path
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
+
+# Seconds of flight that are written at a time: some milliseconds of a simulated flight.
+_BATCH = 10
 
 Advance = Callable[[float, float, str], None]
 
@@ -138,9 +141,12 @@ def flight_events(track: Track, ended: str) -> list[LogEvent]:
 
 
 def fly(
-    setup: FlightSetup, vehicle: Vehicle, log: Path | None, advance: Advance | None = None
+    setup: FlightSetup, vehicle: Vehicle, log: Path | None, advance: Advance | None = None, *, every: int = 1
 ) -> tuple[Track, str, Verdict]:
-    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict."""
+    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict.
+
+    every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
+    """
 
     def tell(done: float, whole: float) -> None:
         if advance is not None:
@@ -149,10 +155,11 @@ def fly(
     if log is None:
         flown = simulate(setup, vehicle.aircraft, progress=tell)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
-    with Recorder(log, setup) as recorder:
+    with Recorder(log, setup, every=every, batch=_BATCH) as recorder:
         flown = simulate(setup, vehicle.aircraft, sink=recorder.write, progress=tell)
-        verdict = judge_flight(setup, flown.track, flown.ended)
-        for event in flight_events(flown.track, flown.ended):
+        track = thin_track(flown.track, every)
+        verdict = judge_flight(setup, track, flown.ended)
+        for event in flight_events(track, flown.ended):
             recorder.event(event.time, event.text, event.level)
         recorder.finish(flown.ended, verdict)
-    return flown.track, flown.ended, verdict
+    return track, flown.ended, verdict

@@ -102,10 +102,14 @@ def write_pictures(
     command: str,
     versions: Mapping[str, str] | None = None,
     events: Sequence[LogEvent] = (),
+    *,
+    svg: bool = False,
 ) -> list[Path]:
-    """map.png, profile.png and report.html."""
+    """The figures and report.html; svg: the figures as SVG, too."""
     from logs.report import write_report
     from logs.setup_file import package_versions
 
     flown_with = package_versions() if versions is None else versions
-    return write_report(folder, setup, track, verdict, ended=ended, versions=flown_with, command=command, events=events)
+    return write_report(
+        folder, setup, track, verdict, ended=ended, versions=flown_with, command=command, events=events, svg=svg
+    )

@@ -83,9 +83,17 @@ def test_the_viewer_topics(log_file: Path, setup: FlightSetup, track: Track) -> 
         ["/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/plan", "/scene/track"]
     )
     seconds = track.time[-1] - track.time[0]
-    for topic in ("/tf", "/fix"):
-        assert 5 * seconds - 1 <= len(found[topic]) <= 5 * seconds + 1
-    message, fix = found["/fix"][7]
+    for topic, rate in (("/tf", 5), ("/fix", 1)):
+        assert rate * seconds - 1 <= len(found[topic]) <= rate * seconds + 1
+    for message, pose in found["/tf"]:
+        row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
+        assert (pose.parent_frame_id, pose.child_frame_id) == ("map", "aircraft")
+        assert pose.timestamp.seconds * SECOND_NS + pose.timestamp.nanos == message.log_time
+        place = (pose.translation.x, pose.translation.y, pose.translation.z)
+        np.testing.assert_allclose(place, track.position[row], atol=2**-11 + 1e-12)
+        turn = (pose.rotation.x, pose.rotation.y, pose.rotation.z, pose.rotation.w)
+        np.testing.assert_allclose(turn, body_rotation(track.attitude[row]), atol=2**-21 + 1e-12)
+    message, fix = found["/fix"][5]
     row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
     lat, lon = to_geo(setup.scenario.origin, track.position[row, 0], track.position[row, 1])
     assert (fix.latitude, fix.longitude, fix.altitude) == (float(lat), float(lon), track.position[row, 2])
@@ -237,3 +245,18 @@ def test_the_setup_names_every_piece_and_every_package(log_file: Path) -> None:
         "rows": 480,
         "end_time_s": 7.983333333,
     }
+
+
+@pytest.mark.parametrize("every", [2, 3, 7])
+@pytest.mark.parametrize("rows_a_block", [1, 60, 100_000])
+def test_one_row_in_so_many_and_the_last(tmp_path: Path, setup: FlightSetup, every: int, rows_a_block: int) -> None:
+    whole = make_track(3.0)
+    with Recorder(tmp_path / "thin.mcap", setup, every=every) as recorder:
+        for first in range(0, len(whole), rows_a_block):
+            recorder.write(whole.rows(first, min(len(whole), first + rows_a_block)))
+        recorder.finish("completed")
+    log = read_log(tmp_path / "thin.mcap")
+    assert log.complete
+    kept = sorted({*range(0, len(whole), every), len(whole) - 1})
+    np.testing.assert_array_equal(log.track.time, whole.time[kept])
+    np.testing.assert_array_equal(log.track.commands, whole.commands[kept])

@@ -1,12 +1,15 @@
 """The report: whole in one file, safe with hostile names, the verdict first and the numbers those of the data."""
 
 import base64
+import hashlib
+import json
 import math
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -19,9 +22,10 @@ from flight.mission import Mission, MissionItem
 from flight.route import Route
 from flight.setup import FlightSetup
 from flight.track import COLUMNS, Track
-from logs.figures import Pictures
+from logs.figure_exposure import exposure_rates
+from logs.figures import FIGURE_FILES
 from logs.report import report_html, write_report
-from logs.report_tables import LEG_COLUMNS, leg_rows
+from logs.report_tables import LEG_COLUMNS, PASSAGE_COLUMNS, leg_rows, passage_rows, saturation_rows
 from logs.report_text import badge_of, finding_rows, number, quantity, rule_rows
 from logs.verdict import Finding, Verdict
 from world.scenario import from_spec
@@ -35,8 +39,11 @@ PNG = b"\x89PNG\r\n\x1a\nnot drawn here"
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures cost most of a second; most tests here read words."""
 
-    def draw(setup: FlightSetup, track: Track | None, verdict: Verdict | None) -> Pictures:
-        return Pictures(PNG, PNG, PNG if track is not None and len(track) else None)
+    def draw(
+        setup: FlightSetup, track: Track | None, verdict: Verdict | None, *, svg: bool = False
+    ) -> dict[str, bytes]:
+        flown = ("time", "exposure", "controls", "energy") if track is not None and len(track) else ()
+        return {f"{name}.png": PNG for name in (*FIGURE_FILES, *flown)}
 
     monkeypatch.setattr(logs.figures, "draw_pictures", draw)
 
@@ -164,18 +171,24 @@ def test_page_is_whole_and_asks_nobody() -> None:
     html = report_html(make_setup(), make_track(), VERDICT, **ARGUMENTS)
     page = Page(html)
     names = [name for name, _ in page.tags]
-    assert not {"script", "link", "iframe", "object", "form"} & set(names)
+    assert not {"link", "iframe", "object", "form", "base"} & set(names)
+    assert [attributes.get("type") for name, attributes in page.tags if name == "script"] == ["application/json", None]
     assert dict(page.tags)["html"]["lang"] == "en"
     for name, attributes in page.tags:
         for key in ("src", "href", "srcset", "action"):
             value = attributes.get(key)
             assert value is None or value.startswith(("data:image/png;base64,", "#")), (name, value)
         assert not [key for key in attributes if key.startswith("on")]
+    script = html.rpartition("<script>")[2].partition("</script>")[0]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = next(str(a["content"]) for _, a in page.tags if a.get("http-equiv") == "Content-Security-Policy")
+    assert f"script-src 'sha256-{digest}'" in policy
+    assert "default-src 'none'" in policy
     assert "http:" not in html
     assert "https:" not in html
     assert "url(" not in html
     images = [attributes for name, attributes in page.tags if name == "img"]
-    assert [base64.b64decode(str(image["src"]).partition(",")[2]) for image in images] == [PNG] * 3
+    assert [base64.b64decode(str(image["src"]).partition(",")[2]) for image in images] == [PNG] * 9
     assert all(len(str(image["alt"])) > 30 for image in images)
     targets = {attributes.get("id") for _, attributes in page.tags}
     links = [str(attributes["href"]) for name, attributes in page.tags if name == "a"]
@@ -219,8 +232,12 @@ def test_hostile_words_stay_words() -> None:
         (finding("slope", EVIL, False, -1.0, reason=EVIL, method=EVIL, unit=EVIL),), False, False, EVIL, EVIL
     )
     html = report_html(setup, make_track(), verdict, ended=EVIL, versions={EVIL: EVIL}, command=EVIL)
-    assert "<script" not in html
+    assert len(re.findall("<script", html)) == 2
+    assert len(re.findall("</script", html)) == 2
     assert Page(html).text().count("<script>alert('x')</script>") > 8
+    scene = json.loads(html.partition('id="scene-data">')[2].partition("</script>")[0])
+    assert scene["name"] == EVIL
+    assert scene["threats"][0]["name"] == EVIL[:90]
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -234,22 +251,28 @@ def test_a_plan_that_was_not_flown_has_a_report() -> None:
         assert "Nothing was flown" in text
         assert "none was given" in text
         assert "Energy" not in text
-        assert html.count("<img") == 2
+        assert html.count("<img") == 5
 
 
 def test_pictures_are_drawn_into_page_and_files(tmp_path: Path) -> None:
     out = tmp_path / "made" / "here"
     paths = write_report(out, make_setup(), make_track(), VERDICT, **ARGUMENTS)
-    assert [path.name for path in paths] == ["map.png", "profile.png", "report.html"]
-    assert sorted(path.name for path in out.iterdir()) == ["map.png", "profile.png", "report.html"]
-    html = paths[2].read_text(encoding="utf-8")
+    assert [path.name for path in paths] == [*(f"{name}.png" for name in FIGURE_FILES), "report.html"]
+    assert {path.name for path in out.iterdir()} == {path.name for path in paths}
+    html = paths[-1].read_text(encoding="utf-8")
     assert len(html) < 8e6
     assert base64.b64encode(paths[0].read_bytes()).decode() in html
     assert base64.b64encode(paths[1].read_bytes()).decode() in html
-    assert html.count("data:image/png;base64,iVBOR") == 3
+    assert html.count("data:image/png;base64,iVBOR") == 9
     before = {path.name: path.read_bytes() for path in paths}
-    write_report(out, make_setup(), make_track(), VERDICT, **ARGUMENTS)
+    more = write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
     assert {path.name: path.read_bytes() for path in paths} == before
+    drawn = [path for path in more if path.suffix == ".svg"]
+    assert [path.stem for path in drawn] == list(FIGURE_FILES)
+    first = [path.read_bytes() for path in drawn]
+    assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first)
+    write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
+    assert [path.read_bytes() for path in drawn] == first
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -328,3 +351,31 @@ def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) 
         assert findings[int(row.where.removeprefix("leg "))].margin == worst
     states = [item.state for item in finding_rows(findings)]
     assert states == sorted(states, key=["fail", "pass", "unjudged"].index)
+
+
+def test_stays_and_held_controls_are_those_of_the_track() -> None:
+    threat = {"name": "M", "east_m": 100, "north_m": 0, "amsl_m": 360, "kill_radius_m": 250, "kill_scale_m": 50}
+    setup, track = make_setup(threats=[threat]), make_track()
+    (row,) = passage_rows(setup, track)
+    # On the northward leg at 100 m east: in and out where the sphere's surface crosses it.
+    assert dict(zip(PASSAGE_COLUMNS, row, strict=True))["closest (m)"] == "0"
+    assert float(row[4]) == pytest.approx(20.0, abs=0.05)
+    commands = track.commands.copy()
+    commands[10:30, 3] = 1.0
+    commands[50:55, 0] = -2.0
+    held = saturation_rows(setup, replace(track, commands=commands))
+    assert [cells[0] for cells in held] == ["elevator", "aileron", "rudder", "throttle"]
+    assert [cells[3] for cells in held[:3]] == ["5.0", "0.0", "0.0"]
+    # A closed throttle is at a limit, too: the track's is, all the time.
+    assert held[3][3] == number(float(track.time[-1]), digits=1)
+    assert held[0][2] == "114.6°"
+
+
+def test_exposure_is_that_of_the_segments() -> None:
+    # Past a unit at 100 m with scale 100: (100/d)^4 inside 300 m, integrated over s in closed form.
+    position = np.column_stack([np.linspace(-500.0, 500.0, 401), np.full(401, 100.0), np.zeros(401)])
+    rate = exposure_rates(position, np.zeros((1, 3)), np.array([300.0]), np.array([100.0]))
+    far = math.sqrt(300.0**2 - 100.0**2)
+    exact = 100.0**4 * (far / (1e4 * 300.0**2) + math.atan(far / 100.0) / 1e6)
+    assert float(rate.sum() * 2.5) == pytest.approx(exact, rel=1e-9)
+    assert float(rate.max()) == pytest.approx(1.0, rel=1e-3)

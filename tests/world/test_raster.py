@@ -1,6 +1,7 @@
 """Elevation files: every format reads the same heights at the same places, and what is no elevation is refused."""
 
 import math
+import tracemalloc
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -390,3 +391,28 @@ def test_tile_bounds_fill_the_tile() -> None:
     assert np.ptp(box[0]) == pytest.approx(403 * 74.6, rel=0.02)
     assert np.ptp(box[1]) == pytest.approx(344 * 92.5, rel=0.02)
     read_terrain(raster, raster.centre, box, 1000.0)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:32632", "EPSG:4326"])
+def test_a_large_tile_is_read_by_its_window(tmp_path: Path, crs: str) -> None:
+    """10,000 x 10,000 pixels, most of them never written and without data: the window about the area is read alone."""
+    side, path = 10_000, tmp_path / "large.tif"
+    pitch, west, north = (10.0, 376_000.0, 5_149_000.0) if crs == "EPSG:32632" else (1e-4, 7.6, 46.6)
+    east, up = Transformer.from_crs("EPSG:4326", crs, always_xy=True).transform(8.05, 46.065)
+    column, row = int((east - west) / pitch), int((north - up) / pitch)
+    with rasterio.open(
+        path, "w", driver="GTiff", width=side, height=side, count=1, dtype="float32", crs=crs, nodata=-9999.0,
+        transform=from_origin(west, north, pitch, pitch), tiled=True, sparse_ok=True, compress="deflate",
+    ) as out:  # fmt: skip
+        block = np.full((1600, 1600), 321.0, dtype=np.float32)
+        out.write(block, 1, window=rasterio.windows.Window(column - 800, row - 800, 1600, 1600))
+    tracemalloc.start()
+    ground = read_terrain(open_raster(str(path)), GeoOrigin(46.065, 8.05), BOUNDS, 500.0)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert float(ground.height(0.0, 0.0)) == 321.0
+    assert float(ground.height(-2400.0, 2400.0)) == 321.0
+    assert ground.heights.size < 2_000_000
+    assert peak < 60e6
+    with pytest.raises(TerrainError, match=r"no data|nodata|missing"):
+        read_terrain(open_raster(str(path)), GeoOrigin(46.065, 8.05), 6 * BOUNDS, 500.0)
