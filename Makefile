@@ -4,22 +4,23 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+TESTED := $(VENV)/.ready-test
 
 .PHONY: demo test bench soak setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
-test: setup clients
+test: $(TESTED) clients
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/python -m pytest -n 2
 
-bench: setup
+bench: $(TESTED)
 	$(BIN)/python -m tests.bench
 
-soak: setup clients
+soak: $(TESTED) clients
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest -n 2
 
 setup: $(READY)
@@ -27,8 +28,13 @@ setup: $(READY)
 $(READY): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "planfly needs Python 3.11 or newer: make PYTHON=python3.11")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test]'
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
 	touch $(READY)
+
+# The tests' own tools and clients, MAVSDK and MAVProxy among them, are far larger than planfly itself.
+$(TESTED): $(READY)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test]'
+	touch $(TESTED)
 
 # Other people's MCAP readers for Node, for the tests alone; without npm their tests say so.
 clients: .node/.ready
