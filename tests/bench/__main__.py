@@ -23,13 +23,16 @@ from world.scenario import load_scenario
 ROUNDS = 5
 
 
-def best(work: Callable[[], object], rounds: int = ROUNDS) -> float:
-    """The shortest of a few runs, s: the one that the machine disturbed least."""
+def best(work: Callable[[], object], rounds: int = ROUNDS, clock: Callable[[], float] = time.perf_counter) -> float:
+    """The shortest of a few runs, s: the one that the machine disturbed least.
+
+    clock: `time.process_time` for what is compared with a share of something else, on a machine that others use.
+    """
     spent = []
     for _ in range(rounds):
-        started = time.perf_counter()
+        started = clock()
         work()
-        spent.append(time.perf_counter() - started)
+        spent.append(clock() - started)
     return min(spent)
 
 
@@ -64,9 +67,9 @@ def main() -> None:
 
         times = {
             "bare JSBSim": best(bare),
-            "flight": best(lambda: simulate(setup, vehicle.aircraft)),
-            "recording, 20 Hz": best(lambda: record(3)),
-            "recording": best(record),
+            "flight": best(lambda: simulate(setup, vehicle.aircraft), clock=time.process_time),
+            "recording, 20 Hz": best(lambda: record(3), clock=time.process_time),
+            "recording": best(record, clock=time.process_time),
             "reading the log": best(lambda: read_log(log)),
             "judging": best(lambda: judge_flight(setup, flown.track, "completed")),
             "planning": best(lambda: make_plan(scenario, vehicle, 1)),
