@@ -76,6 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run_and_plan(command)
     _add_export_and_fly(command)
     _add_log_commands(command)
+    _add_paper(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser
 
@@ -165,6 +166,40 @@ def _add_log_commands(command: _Command) -> None:
         "--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)"
     )
     _overwrite(report)
+
+
+def _problems(text: str) -> tuple[int, ...]:
+    allowed = (7, 15, 30, 60)
+    parts = [part.strip() for part in text.split(",")]
+    numbers = sorted({int(part) for part in parts if part.isdecimal()})
+    if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(allowed):
+        raise argparse.ArgumentTypeError(f"{text!r}: numbers of threats out of 7,15,30,60 are expected")
+    return tuple(numbers)
+
+
+def _count(text: str) -> int:
+    value = int(text) if text.isdecimal() else 0
+    if not 1 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 1 to 1,000 is expected")
+    return value
+
+
+def _add_paper(command: _Command) -> None:
+    paper = command(
+        "paper",
+        "run the paper's section V again: tables and figures of seeded runs in three encodings",
+        "planfly paper --problems 7,60 --runs 5 --out my-paper",
+    )
+    paper.add_argument(
+        "--problems", metavar="N,...", type=_problems, default=(7, 15, 30, 60), help="threats (default: 7,15,30,60)"
+    )
+    paper.add_argument("--runs", metavar="N", type=_count, default=15, help="seeds 1..N of each (default: 15)")
+    paper.add_argument(
+        "--algorithm", metavar="A", default="umda", help="in place of the paper's umda, beside the two baselines"
+    )
+    paper.add_argument("--jobs", metavar="N", type=_count, help="processes (default: one a core; same results)")
+    paper.add_argument("--out", metavar="DIR", help="where tables and figures go (default: runs/paper, replaced)")
+    _overwrite(paper)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -78,6 +78,27 @@ def plan(args: argparse.Namespace) -> int:
     return FLYABLE if made.feasible else NOT_FLYABLE
 
 
+def paper(args: argparse.Namespace) -> int:
+    """``planfly paper``: a table whatever it says; no path in it is an answer too."""
+    from planfly.files import refuse_folder
+    from planfly.paper import PROBLEMS, run_section, table
+    from planfly.paper_files import file_names, table_text, write_figures, write_tables
+
+    folder = Path(args.out) if args.out else RUNS / "paper"
+    target = {"named": bool(args.out), "overwrite": args.overwrite}
+    refuse_folder(folder, **target)
+    with progress("planning") as advance:
+        done = run_section(args.problems, args.runs, args.algorithm, args.jobs, advance)
+    rows = table(done)
+    prepare_folder(folder, **target, files=file_names(PROBLEMS))
+    write_tables(folder, rows, done)
+    with progress("drawing"):
+        write_figures(folder, done)
+    print(table_text(rows))
+    print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
+    return FLYABLE
+
+
 def export(args: argparse.Namespace) -> int:
     """``planfly export``."""
     from flight.export import plan_mission
@@ -247,6 +268,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "export": export,
     "fly": fly,
     "check": check,
+    "paper": paper,
     "replay": replay,
     "report": report,
     "scenarios": scenarios,

@@ -1,5 +1,6 @@
 """Targets on disk: refused where they exist, cleared where they are ours."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from world.errors import PlanflyError
@@ -26,15 +27,20 @@ def refuse_existing(path: Path, overwrite: bool) -> None:
         raise PlanflyError(f"{path}: its folder {path.parent} does not exist")
 
 
-def prepare_folder(folder: Path, *, named: bool, overwrite: bool) -> None:
-    """Make a run's folder ready: refuse a named one that holds anything, and clear old results of ours.
-
-    Only files that a run writes are removed, never anything else that lies there.  Raises PlanflyError.
-    """
+def refuse_folder(folder: Path, *, named: bool, overwrite: bool) -> None:
+    """Refuse a file, or a named folder that holds anything.  Raises PlanflyError."""
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected")
     if named and not overwrite and folder.is_dir() and any(folder.iterdir()):
         raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
+
+
+def prepare_folder(folder: Path, *, named: bool, overwrite: bool, files: Sequence[str] = RUN_FILES) -> None:
+    """Make a run's folder ready: refuse a named one that holds anything, and clear old results of ours.
+
+    files: those that a run writes; only they are removed, never anything else that lies there.  Raises PlanflyError.
+    """
+    refuse_folder(folder, named=named, overwrite=overwrite)
     folder.mkdir(parents=True, exist_ok=True)
-    for name in RUN_FILES:
+    for name in files:
         (folder / name).unlink(missing_ok=True)

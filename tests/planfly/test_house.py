@@ -10,7 +10,7 @@ import pytest
 from planfly.cli import main
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ["run", "plan", "export", "fly", "check", "replay", "report", "scenarios"]
+COMMANDS = ["run", "plan", "export", "fly", "check", "replay", "report", "paper", "scenarios"]
 
 
 def test_the_import_contracts_hold() -> None:
