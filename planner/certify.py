@@ -6,6 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from planner.corners import corner, corner_radii
 from planner.criteria import RESERVE_GROWTH, extended, settling_room, slope_limits
 from planner.plan import Certificate
@@ -49,13 +50,38 @@ def pieces(rules: Rules, waypoints: Floats) -> Iterator[tuple[str, Floats, Float
 
 def kill_distance(rules: Rules, waypoints: Floats) -> float:
     """Distance from the path to the surface of the nearest missile sphere, m: negative inside, inf without any."""
+    return float(_kill_distance(rules, np.ascontiguousarray(waypoints)))
+
+
+@compiled
+def _kill_distance(rules: Rules, waypoints: Floats) -> float:  # pragma: no cover - compiled
     nearest = math.inf
-    armed = rules.threats[rules.threats[:, 3] > 0.0]
-    for _, a, b in pieces(rules, waypoints):
-        for unit in armed:
-            near, _, _ = sphere_window(a, b, unit[:3], unit[3])
-            nearest = min(nearest, near - unit[3])
-    return float(nearest)
+    last = waypoints.shape[0] - 1
+    for i in range(last):
+        nearest = min(nearest, _segment_distance(rules.threats, waypoints[i], waypoints[i + 1], nearest))
+    radii = corner_radii(rules, waypoints)
+    for i in range(1, last):
+        arc = corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        for k in range(max(1, arc.shape[0] - 1)):
+            nearest = _segment_distance(rules.threats, arc[k], arc[min(k + 1, arc.shape[0] - 1)], nearest)
+    return nearest
+
+
+@compiled
+def _segment_distance(threats: Floats, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
+    """Distance from a-b to the nearest missile sphere's surface, or `nearest` if that is less."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    length2 = dx * dx + dy * dy + dz * dz
+    for k in range(threats.shape[0]):
+        if threats[k, 3] <= 0.0:
+            continue
+        x, y, z = a[0] - threats[k, 0], a[1] - threats[k, 1], a[2] - threats[k, 2]
+        along = dx * x + dy * y + dz * z
+        f = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
+        # From the point itself: differences of squares lose digits.
+        x, y, z = x + f * dx, y + f * dy, z + f * dz
+        nearest = min(nearest, math.sqrt(x * x + y * y + z * z) - threats[k, 3])
+    return nearest
 
 
 def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float, float]:

@@ -1,21 +1,21 @@
 """The paper's four constraints and four objectives, compiled, for many paths at once.
 
-Two judges share the constraints on waypoints and legs.  `paper_scores` looks at the paper's six points a leg
-(eq. 5-11).  `graded_scores` looks along the whole path, the arcs that cut its corners included, and says how far
-a constraint is missed instead of how often.
+`paper_scores` looks at the paper's six points a leg (eq. 5-11).  `planner.graded` looks along the whole path and
+says how far a constraint is missed instead of how often; both share the constraints on waypoints and legs, here.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
-from planner.corners import corner, corner_radii
+from planner.cells import Short, cell_at, grid_of
 from planner.rules import Rules
 from world.frames import polymap
-from world.geometry import CLOSEST, segment_exposure, sphere_window, turning_angle
-from world.limits import aircraft_slopes, turn_tangents
+from world.geometry import CLOSEST
+from world.limits import corner_tangent, downwind, slopes_along, wind_speed_at
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -28,6 +28,64 @@ ROOM_SHARE = 0.05
 ROOM_LENGTH = 20.0
 # Growth of the clearance reserve away from an end that starts without it, m per m.
 RESERVE_GROWTH = 0.05
+
+
+class Gauge(NamedTuple):
+    """What is worked out once for many paths.
+
+    cos_turn: of the largest turn.  wind_east, wind_north: unit vector downwind.  climb, dive: tangents that no leg may
+    exceed, or, where the aircraft limits them, that every leg may use.  straight: m from start to destination.
+    clear: of `pack_clearance`.
+    """
+
+    cos_turn: float
+    wind_east: float
+    wind_north: float
+    climb: float
+    dive: float
+    by_aircraft: bool
+    straight: float
+    clear: Floats
+
+
+@compiled
+def make_gauge(rules: Rules) -> Gauge:  # pragma: no cover - compiled
+    """Work out what holds for all paths under these rules."""
+    east, north = downwind(rules.aircraft)
+    climb, dive = rules.climb, rules.dive
+    by_aircraft = math.isnan(climb) or math.isnan(dive)
+    if math.isnan(climb):
+        climb = _least_slope(rules, 1)
+    if math.isnan(dive):
+        dive = _least_slope(rules, 2)
+    return Gauge(
+        # A turn cannot exceed half a circle, whatever rounding says.
+        math.cos(rules.max_turn) if rules.max_turn < math.pi else -2.0,
+        east,
+        north,
+        math.tan(climb - rules.spare),
+        math.tan(dive - rules.spare),
+        by_aircraft,
+
+        straight(rules),
+        pack_clearance(rules),
+    )
+
+
+@compiled
+def _least_slope(rules: Rules, row: int) -> float:  # pragma: no cover - compiled
+    """Slope (rad) that the aircraft can do on any course between floor and ceiling; -1 for none.
+
+    row: of the packed aircraft, 1 to climb and 2 to sink.  Least with the strongest wind behind.
+    """
+    packed = rules.aircraft
+    wind = max(wind_speed_at(packed, rules.floor), wind_speed_at(packed, rules.ceiling))
+    angle = math.inf
+    for k in range(int(packed[0, 6])):
+        angle = min(angle, packed[row, 8 + k])
+    if not angle > 0.0 or wind >= 0.99 * packed[0, 0] * math.cos(angle):
+        return -1.0
+    return math.atan2(packed[0, 0] * math.sin(angle), packed[0, 0] * math.cos(angle) + wind)
 
 
 @compiled
@@ -53,14 +111,17 @@ def extended(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compil
 
 
 @compiled
-def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, spare taken off."""
+def _leg_limits(
+    rules: Rules, ux: float, uy: float, low: float, high: float, wx: float, wy: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Steepest climb and dive, rad, on the unit course u from one height to another; w: downwind."""
     climb, dive = rules.climb, rules.dive
     if math.isnan(climb) or math.isnan(dive):
-        course = math.atan2(b[0] - a[0], b[1] - a[1])
         up, down = math.inf, math.inf
         for part in (0.0, 0.5, 1.0):
-            one, two = aircraft_slopes(rules.aircraft, course, a[2] + part * (b[2] - a[2]))
+            one, two = slopes_along(
+                rules.aircraft, ux * wx + uy * wy, ux * wy - uy * wx, low + part * (high - low)
+            )
             up, down = min(up, one), min(down, two)
         if math.isnan(climb):
             climb = up
@@ -70,13 +131,29 @@ def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # 
 
 
 @compiled
-def slope_excess(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
-    """How far the leg a-b is too steep, as m of height per m of run; 0 where it is not (eq. 3-4)."""
-    run = math.hypot(b[0] - a[0], b[1] - a[1])
-    rise = b[2] - a[2]
-    climb, dive = slope_limits(rules, a, b)
-    over = max(0.0, rise - math.tan(climb) * run, -rise - math.tan(dive) * run)
-    return float(over / max(run, 1.0))
+def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, spare taken off."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    run = math.sqrt(dx * dx + dy * dy)
+    wx, wy = downwind(rules.aircraft)
+    ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 1.0)
+    return _leg_limits(rules, ux, uy, a[2], b[2], wx, wy)
+
+
+@compiled
+def slope_excess(
+    rules: Rules, gauge: Gauge, ux: float, uy: float, run: float, low: float, high: float
+) -> float:  # pragma: no cover - compiled
+    """How far a leg is too steep, as m of height per m of run; 0 where it is not (eq. 3-4).
+
+    u: its unit course.  run: m.  low, high: heights of its ends.
+    """
+    rise = high - low
+    over = max(0.0, rise - gauge.climb * run, -rise - gauge.dive * run)
+    if gauge.by_aircraft and (over > 0.0 or min(low, high) < rules.floor or max(low, high) > rules.ceiling):
+        climb, dive = _leg_limits(rules, ux, uy, low, high, gauge.wind_east, gauge.wind_north)
+        over = max(0.0, rise - math.tan(climb) * run, -rise - math.tan(dive) * run)
+    return over / max(run, 1.0)
 
 
 @compiled
@@ -86,105 +163,136 @@ def settling_room(need: float, run: float) -> float:  # pragma: no cover - compi
 
 
 @compiled
-def constraints(rules: Rules, path: Floats, counts: Ints, graded: Floats) -> None:  # pragma: no cover - compiled
-    """Add the turn, slope and bounds violations of a path (w, 3) to counts (4,) and graded (4,).
+def measure_legs(paths: Floats, n: int, legs: Floats) -> None:  # pragma: no cover - compiled
+    """Fill legs (w - 1, 4) of path n: unit course (east, north; 0 for none), run and length, m."""
+    for i in range(legs.shape[0]):
+        dx, dy = paths[n, i + 1, 0] - paths[n, i, 0], paths[n, i + 1, 1] - paths[n, i, 1]
+        dz = paths[n, i + 1, 2] - paths[n, i, 2]
+        run = math.sqrt(dx * dx + dy * dy)
+        legs[i, 0] = dx / run if run > 0.0 else 0.0
+        legs[i, 1] = dy / run if run > 0.0 else 0.0
+        legs[i, 2] = run
+        legs[i, 3] = math.sqrt(dx * dx + dy * dy + dz * dz)
 
-    Turn also counts, where room is asked for, each leg that is shorter than its two turns (eq. 1-4, 7).
-    """
-    way = extended(rules, path)
-    last = way.shape[0] - 2
-    for i in range(1, last + 1):
-        turn = turning_angle(way[i - 1, 0], way[i - 1, 1], way[i, 0], way[i, 1], way[i + 1, 0], way[i + 1, 1])
-        if turn > rules.max_turn:
-            counts[0] += 1
-            graded[0] += turn - rules.max_turn
-        over = max(0.0, rules.bounds[0, 0] - way[i, 0], way[i, 0] - rules.bounds[0, 1])
-        over = max(over, rules.bounds[1, 0] - way[i, 1], way[i, 1] - rules.bounds[1, 1])
-        over = max(over, rules.floor - way[i, 2], way[i, 2] - rules.ceiling)
-        if over > 0.0:
-            counts[3] += 1
-            graded[3] += over
-    if rules.room:
-        tangents = turn_tangents(rules.aircraft, way)
-        for i in range(1, last):
-            need = tangents[i] + tangents[i + 1]
-            run = math.hypot(way[i + 1, 0] - way[i, 0], way[i + 1, 1] - way[i, 1])
-            short = need + settling_room(need, run) - run
-            if need > 0.0 and short > 0.0:
-                counts[0] += 1
-                graded[0] += min(10.0, short / 100.0)
+
+@compiled
+def measure_corners(
+    rules: Rules, gauge: Gauge, paths: Floats, n: int, legs: Floats, corners: Floats
+) -> None:  # pragma: no cover - compiled
+    """Fill corners (w, 2) of path n: length of leg that its arc takes on either side and the arc's radius, m."""
+    packed, wx, wy = rules.aircraft, gauge.wind_east, gauge.wind_north
+    last = legs.shape[0]
     for i in range(1, last):
-        over = slope_excess(rules, way[i], way[i + 1])
-        if over > 0.0:
-            counts[1] += 1
-            graded[1] += over
+        ux, uy, vx, vy = legs[i - 1, 0], legs[i - 1, 1], legs[i, 0], legs[i, 1]
+        corners[i, 0], corners[i, 1] = 0.0, 0.0
+        if (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0):
+            corners[i, 0], corners[i, 1] = corner_tangent(packed, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
+    for i, asked in ((0, rules.start_course), (last, rules.destination_course)):
+        corners[i, 0], corners[i, 1] = 0.0, 0.0
+        if not math.isnan(asked) and legs[min(i, last - 1), 2] > 0.0:
+            ux, uy, vx, vy = _courses(rules, legs, i)
+            corners[i, 0], corners[i, 1] = corner_tangent(packed, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
 
 
 @compiled
-def required_clearance(rules: Rules, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Height above ground that a path needs here, m: the reserve grows from what the fixed ends leave of it."""
-    keep = rules.reserve
-    if rules.start_slack < keep:
-        away = math.hypot(east - rules.start[0], north - rules.start[1])
-        keep = min(keep, rules.start_slack + RESERVE_GROWTH * away)
-    if rules.destination_slack < keep:
-        away = math.hypot(east - rules.destination[0], north - rules.destination[1])
-        keep = min(keep, rules.destination_slack + RESERVE_GROWTH * away)
-    return rules.clearance + keep
+def _courses(rules: Rules, legs: Floats, i: int) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
+    """Unit courses before and after waypoint i; at the ends those asked for, else the leg's own."""
+    last = legs.shape[0]
+    after, before = min(i, last - 1), max(i - 1, 0)
+    ux, uy, vx, vy = legs[before, 0], legs[before, 1], legs[after, 0], legs[after, 1]
+    if i == 0 and not math.isnan(rules.start_course):
+        ux, uy = math.sin(rules.start_course), math.cos(rules.start_course)
+    if i == last and not math.isnan(rules.destination_course):
+        vx, vy = math.sin(rules.destination_course), math.cos(rules.destination_course)
+    return ux, uy, vx, vy
 
 
 @compiled
-def _paper_point(
-    units: Floats, east: float, north: float, up: float, ground: float, need: float, counts: Ints, objectives: Floats
+def _over_turn(
+    cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float
 ) -> float:  # pragma: no cover - compiled
-    """Judge one dividing point (eq. 5, 9, 10); return its height above ground, 0 if below."""
-    if not up > ground + need:
-        counts[2] += 1
-    for k in range(units.shape[0]):
-        d2 = (east - units[k, 0]) ** 2 + (north - units[k, 1]) ** 2 + (up - units[k, 2]) ** 2
-        for column in (3, 5):
-            # No missile, or no radar, is a radius of 0.
-            if d2 <= units[k, column] ** 2 and units[k, column] > 0.0:
-                objectives[column // 2] += units[k, column + 1] ** 4 / max(d2, CLOSEST * CLOSEST) ** 2
-    return max(0.0, up - ground) if ground == ground else 0.0
+    """How far the turn between two unit courses exceeds the largest, rad; 0 where it does not (eq. 1-2)."""
+    dot = ux * vx + uy * vy
+    if dot >= cosine or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
+        return 0.0
+    # A hair above zero, so that what is over is counted.
+    return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
 
 
 @compiled
-def paper_scores(rules: Rules, paths: Floats) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
-    """Judge paths (n, w, 3) on six points a leg and the destination: counts (n, 4), objectives (n, 4) (eq. 1-11).
+def constraints(
+    rules: Rules, gauge: Gauge, paths: Floats, n: int, legs: Floats, corners: Floats, graded: bool, missed: Floats
+) -> None:  # pragma: no cover - compiled
+    """Add the turn, slope and bounds violations of path n to missed (N, 4): counts, or how far each is missed.
 
-    A waypoint is taken to the raster once; between waypoints a leg counts as straight in pixels.
+    Turn also takes, where room is asked for, each leg that is shorter than its two turns (eq. 1-4, 7).
+    legs, corners: measured.
     """
-    number, count, _ = paths.shape
-    counts = np.zeros((number, 4), dtype=np.int64)
-    objectives = np.zeros((number, 4))
-    unused = np.zeros(4)
+    last = legs.shape[0]
+    for i in range(1, last):
+        over = _over_turn(gauge.cos_turn, rules.max_turn, legs[i - 1, 0], legs[i - 1, 1], legs[i, 0], legs[i, 1])
+        missed[n, 0] += _weight(over, graded)
+    for i, asked in ((0, rules.start_course), (last, rules.destination_course)):
+        if not math.isnan(asked):
+            ux, uy, vx, vy = _courses(rules, legs, i)
+            missed[n, 0] += _weight(_over_turn(gauge.cos_turn, rules.max_turn, ux, uy, vx, vy), graded)
+    west, east, south, north = rules.bounds[0, 0], rules.bounds[0, 1], rules.bounds[1, 0], rules.bounds[1, 1]
+    floor, ceiling = rules.floor, rules.ceiling
+    for i in range(last + 1):
+        x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
+        missed[n, 3] += _weight(max(0.0, west - x, x - east, south - y, y - north, floor - z, z - ceiling), graded)
+    if rules.room:
+        for i in range(last):
+            need, run = corners[i, 0] + corners[i + 1, 0], legs[i, 2]
+            short = need + settling_room(need, run) - run if need > 0.0 else 0.0
+            missed[n, 0] += _weight(min(10.0, max(0.0, short / 100.0)), graded)
+    for i in range(last):
+        rise, run = paths[n, i + 1, 2] - paths[n, i, 2], legs[i, 2]
+        over = max(0.0, rise - gauge.climb * run, -rise - gauge.dive * run) / max(run, 1.0)
+        if gauge.by_aircraft:
+            over = slope_excess(rules, gauge, legs[i, 0], legs[i, 1], run, paths[n, i, 2], paths[n, i + 1, 2])
+        missed[n, 1] += _weight(over, graded)
+
+
+@compiled
+def _weight(over: float, graded: bool) -> float:  # pragma: no cover - compiled
+    """What a constraint missed by `over` adds: that, or one."""
+    if graded:
+        return over
+    return 1.0 if over > 0.0 else 0.0
+
+
+@compiled
+def pack_clearance(rules: Rules) -> Floats:  # pragma: no cover - compiled
+    """What the terrain is judged with, (12,): clearance, reserve; east, north, slack of both ends; and steps.
+
+    The last four: pitch of samples (m), the steepest loss of height above the required clearance (m per m), whether
+    the reserve is the same everywhere (1 or 0), and nothing.
+    """
+    out = np.zeros(12)
+    out[0], out[1] = rules.clearance, rules.reserve
+    out[2], out[3], out[4] = rules.start[0], rules.start[1], rules.start_slack
+    out[5], out[6], out[7] = rules.destination[0], rules.destination[1], rules.destination_slack
     whole = min(rules.start_slack, rules.destination_slack) >= rules.reserve
-    need = rules.clearance + rules.reserve
-    units, heights = rules.threats, rules.heights
-    shortest = straight(rules)
-    for n in range(number):
-        path = paths[n]
-        constraints(rules, path, counts[n], unused)
-        length = 0.0
-        col1, row1 = polymap(rules.to_pixel, path[0, 0], path[0, 1])
-        for i in range(count - 1):
-            a, b = path[i], path[i + 1]
-            col0, row0 = col1, row1
-            col1, row1 = polymap(rules.to_pixel, b[0], b[1])
-            length += math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            # A departure: eq. 6 never reaches the destination, which is the seventh point of the last leg.
-            for j in range(POINTS + (i == count - 2)):
-                f = j / POINTS
-                east, north, up = a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]), a[2] + f * (b[2] - a[2])
-                ground = pixel_height(heights, col0 + f * (col1 - col0), row0 + f * (row1 - row0))
-                if not whole:
-                    need = required_clearance(rules, east, north)
-                above = _paper_point(units, east, north, up, ground, need, counts[n], objectives[n])
-                if j < POINTS:
-                    objectives[n, 3] += above / POINTS
-        objectives[n, 0] = length / shortest
-    return counts, objectives
+    out[8], out[9] = rules.pitch, rules.steepest + (0.0 if whole else RESERVE_GROWTH)
+    out[10] = 1.0 if whole else 0.0
+    return out
+
+
+@compiled
+def required_clearance(clear: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
+    """Height above ground that a path needs here, m: the reserve grows from what the fixed ends leave of it.
+
+    clear: of `pack_clearance`.
+    """
+    keep = clear[1]
+    if clear[4] < keep:
+        away = math.sqrt((east - clear[2]) ** 2 + (north - clear[3]) ** 2)
+        keep = min(keep, clear[4] + RESERVE_GROWTH * away)
+    if clear[7] < keep:
+        away = math.sqrt((east - clear[5]) ** 2 + (north - clear[6]) ** 2)
+        keep = min(keep, clear[7] + RESERVE_GROWTH * away)
+    return clear[0] + keep
 
 
 @compiled
@@ -197,100 +305,95 @@ def straight(rules: Rules) -> float:  # pragma: no cover - compiled
 
 
 @compiled
-def terrain_excess(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Depth below the required clearance along a-b, summed over samples (m x km), and the mean height."""
-    col0, row0 = polymap(rules.to_pixel, a[0], a[1])
-    col1, row1 = polymap(rules.to_pixel, b[0], b[1])
-    run = math.hypot(b[0] - a[0], b[1] - a[1])
-    pieces = max(1, math.ceil(run / rules.pitch))
-    depth = 0.0
-    total = 0.0
-    heights = rules.heights
-    need = rules.clearance + rules.reserve
-    whole = min(rules.start_slack, rules.destination_slack) >= rules.reserve
-    up, rise, across, down = a[2], b[2] - a[2], col1 - col0, row1 - row0
-    for k in range(pieces + 1):
-        f = k / pieces
-        ground = pixel_height(heights, col0 + f * across, row0 + f * down)
-        if math.isnan(ground):
-            depth += 1000.0
-            continue
-        above = up + f * rise - ground
-        if not whole:
-            need = required_clearance(rules, a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1]))
-        depth += max(0.0, need - above)
-        total += max(0.0, above)
-    return depth * max(run, 1.0) / pieces / 1000.0, total / (pieces + 1)
+def _squared(threats: Floats) -> Floats:  # pragma: no cover - compiled
+    """Threats (m, 7) as a point is compared with them, (m, 7): position, r^2 and scale^4 of missile and radar."""
+    out = threats.copy()
+    for k in range(out.shape[0]):
+        for column in (3, 5):
+            radius, scale = threats[k, column], threats[k, column + 1]
+            # A radius of 0 is no weapon, and no square is below this.
+            out[k, column] = radius * radius if radius > 0.0 else -1.0
+            out[k, column + 1] = scale * scale * scale * scale
+    return out
 
 
 @compiled
-def exposures(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Mean over the segment a-b of the kill and detection densities; kill radii grow by the margin."""
-    kill = 0.0
-    seen = 0.0
-    for k in range(rules.threats.shape[0]):
-        unit = rules.threats[k]
-        if unit[3] > 0.0:
-            _, dose = segment_exposure(a, b, unit[:3], unit[3] + rules.kill_margin, unit[4])
-            kill += dose
-        if unit[5] > 0.0:
-            _, dose = segment_exposure(a, b, unit[:3], unit[5], unit[6])
-            seen += dose
+def _point_exposures(
+    squared: Floats, units: Short, first: int, last: int, east: float, north: float, up: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Kill and detection exposure of one point to units[first:last] (eq. 9, 10)."""
+    kill, seen = 0.0, 0.0
+    for entry in range(first, last):
+        k = np.uintp(units[entry])
+        dx, dy, dz = east - squared[k, 0], north - squared[k, 1], up - squared[k, 2]
+        d2 = dx * dx + dy * dy + dz * dz
+        closest2 = max(d2, CLOSEST * CLOSEST)
+        share = 1.0 / (closest2 * closest2)
+        # By multiplication: whether a radius is passed cannot be guessed, and a wrong guess costs more.
+        kill += squared[k, 4] * share * (1.0 if d2 <= squared[k, 3] else 0.0)
+        seen += squared[k, 6] * share * (1.0 if d2 <= squared[k, 5] else 0.0)
     return kill, seen
 
 
 @compiled
-def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
-    """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and fly-by arcs.
+def _judge_points(
+    rules: Rules, gauge: Gauge, squared: Floats, paths: Floats, n: int, missed: Floats, objectives: Floats
+) -> None:  # pragma: no cover - compiled
+    """Add what the dividing points of path n say of terrain, exposure and height (eq. 5, 9-11).
 
-    Exposures and height are means along the path times the paper's number of points, so that they compare with
-    its sums.
+    A waypoint is taken to the raster once; between waypoints a leg counts as straight in pixels.
     """
+    # Arrays are taken out of the rules once: handing the rules on costs more than a point's whole judgement.
+    heights, to_pixel = rules.heights, rules.to_pixel
+    first, units = rules.near.first, rules.near.units
+    west, south, per_metre, cols, rows = grid_of(rules.near)
+    clear, last = gauge.clear, paths.shape[1] - 1
+    whole = clear[10] > 0.0
+    below, kill, seen, height = 0, 0.0, 0.0, 0.0
+    need = rules.clearance + rules.reserve
+    col1, row1 = polymap(to_pixel, paths[n, 0, 0], paths[n, 0, 1])
+    for i in range(last):
+        x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
+        dx, dy, dz = paths[n, i + 1, 0] - x, paths[n, i + 1, 1] - y, paths[n, i + 1, 2] - z
+        col0, row0 = col1, row1
+        col1, row1 = polymap(to_pixel, x + dx, y + dy)
+        # A departure: eq. 6 never reaches the destination, which is the seventh point of the last leg.
+        for j in range(POINTS + (i == last - 1)):
+            f = j * (1.0 / POINTS)
+            east, north, up = x + f * dx, y + f * dy, z + f * dz
+            ground = pixel_height(heights, col0 + f * (col1 - col0), row0 + f * (row1 - row0))
+            if not whole:
+                need = required_clearance(clear, east, north)
+            # Written so that NaN is below.
+            below += 0 if up > ground + need else 1
+            height += up - ground if up > ground and j < POINTS else 0.0
+            cell = cell_at(west, south, per_metre, cols, rows, east, north)
+            one, two = _point_exposures(squared, units, first[cell], first[cell + 1], east, north, up)
+            kill += one
+            seen += two
+    missed[n, 2] += below
+    objectives[n, 1] = kill
+    objectives[n, 2] = seen
+    objectives[n, 3] = height / POINTS
+
+
+@compiled
+def paper_scores(rules: Rules, paths: Floats) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
+    """Judge paths (n, w, 3) on six points a leg and the destination: counts (n, 4), objectives (n, 4) (eq. 1-11)."""
     number, count, _ = paths.shape
-    graded = np.zeros((number, 4))
+    missed = np.zeros((number, 4))
     objectives = np.zeros((number, 4))
-    unused = np.zeros(4, dtype=np.int64)
+    gauge = make_gauge(rules)
+    squared = _squared(rules.threats)
+    legs, corners = np.empty((count - 1, 4)), np.zeros((count, 2))
     for n in range(number):
-        path = paths[n]
-        constraints(rules, path, unused, graded[n])
-        radii = corner_radii(rules, path)
+        measure_legs(paths, n, legs)
+        if rules.room:
+            measure_corners(rules, gauge, paths, n, legs, corners)
+        constraints(rules, gauge, paths, n, legs, corners, False, missed)
+        _judge_points(rules, gauge, squared, paths, n, missed, objectives)
         length = 0.0
         for i in range(count - 1):
-            length += _add_segment(rules, path[i], path[i + 1], graded[n], objectives[n])
-        for i in range(1, count - 1):
-            arc = corner(rules, path[i - 1], path[i], path[i + 1], radii[i])
-            for k in range(max(1, arc.shape[0] - 1)):
-                _add_arc(rules, arc[k], arc[min(k + 1, arc.shape[0] - 1)], graded[n], objectives[n])
-        for column in (1, 2):
-            objectives[n, column] *= POINTS * (count - 1) / length
-        objectives[n, 3] *= (count - 1) / length
-        objectives[n, 0] = length / straight(rules)
-    return graded, objectives
-
-
-@compiled
-def _add_segment(
-    rules: Rules, a: Floats, b: Floats, graded: Floats, objectives: Floats
-) -> float:  # pragma: no cover - compiled
-    length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-    depth, above = terrain_excess(rules, a, b)
-    kill, seen = exposures(rules, a, b)
-    graded[2] += depth
-    objectives[1] += kill * length
-    objectives[2] += seen * length
-    objectives[3] += above * length
-    return length
-
-
-@compiled
-def _add_arc(rules: Rules, a: Floats, b: Floats, graded: Floats, objectives: Floats) -> None:  # pragma: no cover
-    depth, _ = terrain_excess(rules, a, b)
-    graded[2] += depth
-    length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-    for k in range(rules.threats.shape[0]):
-        unit = rules.threats[k]
-        if unit[3] > 0.0:
-            near, _, _ = sphere_window(a, b, unit[:3], unit[3] + rules.kill_margin)
-            if near <= unit[3] + rules.kill_margin:
-                _, dose = segment_exposure(a, b, unit[:3], unit[3] + rules.kill_margin, unit[4])
-                objectives[1] += dose * length
+            length += legs[i, 3]
+        objectives[n, 0] = length / gauge.straight
+    return missed.astype(np.int64), objectives

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.cells import make_cells
 from planner.encoding import Space
-from planner.rules import Rules
+from planner.rules import CORNER_SLACK, Rules
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
+from world.terrain import steepest_slope
 
 Floats = NDArray[np.float64]
 
@@ -81,6 +83,9 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         left = above - limits.min_clearance - 0.01
         return reserve if left >= reserve else share * max(0.0, left)
 
+    reach = np.maximum(threats.kill_radius, threats.detection_radius)
+    armed = np.where(threats.kill_radius > 0.0, threats.kill_radius + kill_margin, 0.0)
+
     def or_nan(value: float | None) -> float:
         return math.nan if value is None else float(value)
 
@@ -107,6 +112,10 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         destination_course=or_nan(scenario.destination_course),
         start_slack=slack(scenario.start),
         destination_slack=slack(scenario.destination),
+        near=make_cells(threats.position, reach, scenario.bounds),
+        # Half a cell's side on either side of points that stand a side apart.
+        missiles=make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK),
+        steepest=float(steepest_slope(terrain.heights, terrain.spacing)),
     )
 
 

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from planner.algorithms import Algorithm, find_algorithm
 from planner.certify import certify, kill_distance
-from planner.criteria import graded_scores, paper_scores
+from planner.criteria import paper_scores
 from planner.encoding import ENCODINGS, Encoding, rotated_vectors
+from planner.graded import graded_scores
 from planner.plan import Certificate, Plan
 from planner.preference import NO_GOAL, Level, ranks
 from planner.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
@@ -49,10 +50,22 @@ class _Archive:
 
     def take(self, vectors: Floats, scores: Floats) -> None:
         """Let new rows in; equal ranks keep their order, older first."""
+        fit = len(self.scores) == ARCHIVE_SIZE and not self.scores[:, :4].any()
+        if fit:
+            # Among rows that meet the constraints the order is by exposure, then by length.
+            last = self.scores[-1]
+            better = (scores[:, KILL] < last[KILL]) | ((scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH]))
+            rows = np.flatnonzero(better & ~scores[:, :4].any(axis=1))
+            if not rows.size:
+                return
+            vectors, scores = vectors[rows], scores[rows]
         every = np.concatenate([self.scores, scores])
-        rows = np.concatenate([self.vectors, vectors])
-        order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
-        self.vectors, self.scores = rows[order], every[order]
+        joined = np.concatenate([self.vectors, vectors])
+        if fit:
+            order = np.lexsort((every[:, LENGTH], every[:, KILL]))[:ARCHIVE_SIZE]
+        else:
+            order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
+        self.vectors, self.scores = joined[order], every[order]
 
 
 @dataclass(slots=True)
@@ -173,10 +186,9 @@ def _levels(run: _Run) -> tuple[Level, ...]:
     goals = run.problem.scenario.planner.goals
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
-    last = Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
     if run.algorithm.graded:
-        return VIOLATIONS, Level((KILL,), (kill,)), Level((LENGTH,), (length,)), last
-    return VIOLATIONS, Level((LENGTH, KILL), (length, kill)), last
+        return VIOLATIONS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
+    return VIOLATIONS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 
 
 def _retry(run: _Run, number: int) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
-from planner.criteria import exposures, required_clearance, slope_excess, slope_limits, terrain_excess
+from planner.criteria import Gauge, make_gauge, pack_clearance, required_clearance, slope_excess, slope_limits
 from planner.encoding import Frame, rotated_frame
+from planner.graded import kill_density, pixels, terrain_excess
 from planner.rules import Rules
 from world.terrain import ground_height
 
@@ -26,8 +27,10 @@ DEPTH_COST = 2e4
 SLOPE_COST = 1e6
 # Steps across a grid's cell that one stage forward may make.
 SIDEWAYS = 3
-# Pitch of the layers, as a share of the pitch along.
-LAYER = 0.05
+# Pitch of the layers, as a share of the pitch along: what the gentler slope limit climbs or sinks in a step, over this,
+# and between these.
+LAYERS_A_STEP = 2.5
+LOW_LAYER, HIGH_LAYER = 0.05, 0.12
 # Cells of one grid, at most: stages x across x layers.
 MOST_CELLS = 1_200_000
 
@@ -47,9 +50,12 @@ def make_grid(rules: Rules, frame: Frame, span: tuple[float, float], stages: int
     The pitch grows where the grid would get too large.
     """
     low, high = max(rules.floor, float(np.nanmin(rules.heights))), rules.ceiling
+    ends = np.stack([rules.start, rules.destination])
+    share = math.tan(max(0.0, min(slope_limits(rules, ends[0], np.array([*ends[1, :2], ends[0, 2]])))))
+    share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_A_STEP))
     while True:
         step = frame.length / stages
-        layer = LAYER * step
+        layer = share * step
         below, above = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-below, above + 1) * step
         up = np.arange(math.ceil((low - rules.start[2]) / layer), math.floor((high - rules.start[2]) / layer) + 1)
@@ -92,6 +98,7 @@ def _place(packed: Floats, along: float, across: float) -> tuple[float, float]: 
 def _floors(rules: Rules, packed: Floats, stages: int, across: Floats) -> Floats:  # pragma: no cover - compiled
     """Lowest height allowed in each cell (stages + 1, across): highest ground on 3 x 3 samples, plus clearance."""
     step = packed[4] / stages
+    clear = pack_clearance(rules)
     out = np.empty((stages + 1, across.size))
     for s in range(stages + 1):
         for y in range(across.size):
@@ -104,7 +111,7 @@ def _floors(rules: Rules, packed: Floats, stages: int, across: Floats) -> Floats
                     ground = ground_height(rules.heights, rules.to_pixel, east, north)
                     if math.isnan(ground):
                         ground = math.inf
-                    worst = max(worst, ground + required_clearance(rules, east, north))
+                    worst = max(worst, ground + required_clearance(clear, east, north))
             east, north = _place(packed, s * step, across[y])
             west, south = rules.bounds[0, 0], rules.bounds[1, 0]
             if not (west <= east <= rules.bounds[0, 1] and south <= north <= rules.bounds[1, 1]):
@@ -215,13 +222,21 @@ def _dynamic(
 
 
 @compiled
-def leg_cost(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
-    """Cost of one leg, in m of path: its length and what it violates."""
-    length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-    steep = slope_excess(rules, a, b)
-    depth, _ = terrain_excess(rules, a, b)
+def leg_cost(
+    rules: Rules, gauge: Gauge, seen: Ints, stamp: int, a: Floats, b: Floats
+) -> float:  # pragma: no cover - compiled
+    """Cost of one leg, in m of path: its length and what it violates.  seen, stamp: of `kill_density`."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    run = math.sqrt(dx * dx + dy * dy)
+    length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
+    ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
+    steep = slope_excess(rules, gauge, ux, uy, run, a[2], b[2])
+    ends = pixels(rules.to_pixel, a[0], a[1], b[0], b[1])
+    depth, _ = terrain_excess(rules.heights, gauge.clear, ends, a[0], a[1], a[2], b[0], b[1], b[2])
     total = length + SLOPE_COST * steep + DEPTH_COST * depth
-    kill, _ = exposures(rules, a, b)
+    kill, _ = kill_density(
+        rules.threats, rules.missiles, rules.kill_margin, seen, stamp, a[0], a[1], a[2], b[0], b[1], b[2]
+    )
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
     return total
@@ -232,26 +247,30 @@ def _choose(rules: Rules, candidates: Floats) -> Ints:  # pragma: no cover - com
     """Which of the candidates (w, c, 3) world m to take at each waypoint, so that the legs cost least."""
     count, width, _ = candidates.shape
     came = np.zeros((count, width), dtype=np.int64)
-    cost = np.zeros(width)
+    cost = np.full(width, np.inf)
+    cost[0] = 0.0
+    gauge = make_gauge(rules)
+    seen, stamp = np.zeros(rules.threats.shape[0], dtype=np.int64), 0
+    least = np.empty(width)
     for i in range(1, count):
         after = np.full(width, np.inf)
-        for k in range(width):
+        for k in range(width if i < count - 1 else 1):
+            b = candidates[i, k]
             for j in range(width):
-                if cost[j] == np.inf:
-                    continue
-                a, b = candidates[i - 1, j], candidates[i, k]
+                a = candidates[i - 1, j]
                 # No leg costs less than its length.
-                least = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-                if cost[j] + least >= after[k]:
-                    continue
-                total = cost[j] + leg_cost(rules, a, b)
+                least[j] = cost[j] + math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+            # The most promising first: the first without violations ends it.
+            while True:
+                j = int(np.argmin(least))
+                if least[j] >= after[k]:
+                    break
+                least[j] = np.inf
+                stamp += 1
+                total = cost[j] + leg_cost(rules, gauge, seen, stamp, candidates[i - 1, j], b)
                 if total < after[k]:
                     after[k] = total
                     came[i, k] = j
-                if i == 1:
-                    break
-            if i == count - 1:
-                break
         cost = after
     out = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):

@@ -7,6 +7,7 @@ they stand for.
 from collections.abc import Callable
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -92,5 +93,27 @@ class Umda:
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    # einsum without optimisation sums in a fixed order; BLAS may not, and a plan must not depend on the machine.
-    return np.asarray(np.einsum("nd,dk->nk", rows, basis, optimize=False))
+    return _product(np.ascontiguousarray(rows), np.ascontiguousarray(basis))
+
+
+@njit(cache=True)
+def _product(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
+    """Rows (n, d) times a basis (d, k) of which most entries are 0."""
+    # In a fixed order: BLAS sums as the machine has it, and the result must not depend on the machine.
+    size = basis.shape[1]
+    entries = np.empty((size, basis.shape[0]), dtype=np.int64)
+    filled = np.zeros(size, dtype=np.int64)
+    for k in range(size):
+        for d in range(basis.shape[0]):
+            if basis[d, k] != 0.0:
+                entries[k, filled[k]] = d
+                filled[k] += 1
+    out = np.empty((rows.shape[0], size))
+    for n in range(rows.shape[0]):
+        for k in range(size):
+            total = 0.0
+            for entry in range(filled[k]):
+                d = entries[k, entry]
+                total += rows[n, d] * basis[d, k]
+            out[n, k] = total
+    return out
