@@ -5,6 +5,7 @@ differently.  Steps over the ground grow with the height above it: ground can ri
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,6 +145,63 @@ def _dose(along: float, start2: float, length2: float, radius: float, scale: flo
     return window_exposure(enter, leave, length2, along, start2, scale) if leave > enter else 0.0
 
 
+class Bench(NamedTuple):
+    """Scratch for judging one path after another: legs, corners, gaps of each leg, units seen, and the last stamp."""
+
+    legs: Floats
+    corners: Floats
+    gaps: Floats
+    seen: Ints
+    stamp: Ints
+
+
+@compiled
+def make_bench(rules: Rules, count: int) -> Bench:  # pragma: no cover - compiled
+    """Scratch for paths of `count` waypoints."""
+    seen = np.zeros(rules.threats.shape[0], dtype=np.int64)
+    shape = count - 1
+    return Bench(
+        np.empty((shape, 4)), np.zeros((count, 2)), np.empty((shape, 2)), seen, np.zeros(1, dtype=np.int64)
+    )
+
+
+@compiled
+def score_path(
+    rules: Rules, gauge: Gauge, bench: Bench, paths: Floats, n: int, missed: Floats, objectives: Floats
+) -> None:  # pragma: no cover - compiled
+    """Judge path n of (n, w, 3): rows n of missed (n, 4), which must be 0, and of objectives."""
+    # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
+    heights, to_pixel, threats, missiles = rules.heights, rules.to_pixel, rules.threats, rules.missiles
+    clear, margin = gauge.clear, rules.kill_margin
+    legs, corners, gaps, seen, stamp = bench.legs, bench.corners, bench.gaps, bench.seen, bench.stamp[0]
+    count = paths.shape[1]
+    measure_legs(paths, n, legs)
+    measure_corners(rules, gauge, paths, n, legs, corners)
+    constraints(rules, gauge, paths, n, legs, corners, True, missed)
+    length, kill = 0.0, 0.0
+    after = polymap(to_pixel, paths[n, 0, 0], paths[n, 0, 1])
+    for i in range(count - 1):
+        stamp += 1
+        x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
+        x2, y2, z2 = paths[n, i + 1, 0], paths[n, i + 1, 1], paths[n, i + 1, 2]
+        before = after
+        after = polymap(to_pixel, x2, y2)
+        ends = (before[0], before[1], after[0], after[1])
+        depth, gaps[i, 0] = terrain_excess(heights, clear, ends, x, y, z, x2, y2, z2)
+        dose, gaps[i, 1] = kill_density(threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2)
+        missed[n, 2] += depth
+        kill += dose * legs[i, 3]
+        length += legs[i, 3]
+    for i in range(1, count - 1):
+        low, close, radius = _corner_matters(rules, gauge, paths, n, i, legs, corners, gaps)
+        if low or close:
+            stamp, dose = _judge_corner(rules, clear, paths, n, i, radius, low, close, seen, stamp, missed)
+            kill += dose
+    bench.stamp[0] = stamp
+    objectives[n, 0] = length / gauge.straight
+    objectives[n, 1] = kill * POINTS * (count - 1) / length
+
+
 @compiled
 def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
     """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and fly-by arcs.
@@ -156,38 +214,9 @@ def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # prag
     missed = np.zeros((number, 4))
     objectives = np.zeros((number, 4))
     gauge = make_gauge(rules)
-    legs, corners, gaps = np.empty((count - 1, 4)), np.zeros((count, 2)), np.empty((count - 1, 2))
-    seen = np.zeros(rules.threats.shape[0], dtype=np.int64)
-    stamp = 0
-    # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
-    heights, clear, threats, missiles, margin = (
-        rules.heights, gauge.clear, rules.threats, rules.missiles, rules.kill_margin,
-    )  # fmt: skip
+    bench = make_bench(rules, count)
     for n in range(number):
-        measure_legs(paths, n, legs)
-        measure_corners(rules, gauge, paths, n, legs, corners)
-        constraints(rules, gauge, paths, n, legs, corners, True, missed)
-        length, kill = 0.0, 0.0
-        after = polymap(rules.to_pixel, paths[n, 0, 0], paths[n, 0, 1])
-        for i in range(count - 1):
-            stamp += 1
-            x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
-            x2, y2, z2 = paths[n, i + 1, 0], paths[n, i + 1, 1], paths[n, i + 1, 2]
-            before = after
-            after = polymap(rules.to_pixel, x2, y2)
-            ends = (before[0], before[1], after[0], after[1])
-            depth, gaps[i, 0] = terrain_excess(heights, clear, ends, x, y, z, x2, y2, z2)
-            dose, gaps[i, 1] = kill_density(threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2)
-            missed[n, 2] += depth
-            kill += dose * legs[i, 3]
-            length += legs[i, 3]
-        for i in range(1, count - 1):
-            low, close, radius = _corner_matters(rules, gauge, paths, n, i, legs, corners, gaps)
-            if low or close:
-                stamp, dose = _judge_corner(rules, clear, paths, n, i, radius, low, close, seen, stamp, missed)
-                kill += dose
-        objectives[n, 0] = length / gauge.straight
-        objectives[n, 1] = kill * POINTS * (count - 1) / length
+        score_path(rules, gauge, bench, paths, n, missed, objectives)
     return missed, objectives
 
 

@@ -13,6 +13,7 @@ from planner.criteria import paper_scores
 from planner.encoding import ENCODINGS, Encoding, rotated_vectors
 from planner.graded import graded_scores
 from planner.plan import Certificate, Plan
+from planner.polish import polish
 from planner.preference import NO_GOAL, Level, ranks
 from planner.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
 from planner.sampling import bridge_basis, first_samples
@@ -34,9 +35,11 @@ LENGTH, KILL, DETECTION, HEIGHT = 4, 5, 6, 7
 ARCHIVE_LEVELS = (VIOLATIONS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
 ARCHIVE_SIZE = 24
 # Of each attempt: stages of its grids, routes from each, and the population's growth.
-ATTEMPTS = (((52, 80), 2, 1), ((110, 66), 3, 2), ((160, 96), 3, 3))
+ATTEMPTS = (((36, 52, 80), 2, 1), ((24, 66, 110), 3, 2), ((44, 96, 160), 3, 3))
 # A seeded search ends when this many generations have not shortened its best path by 1e-5.
-PATIENCE = 25
+PATIENCE = 10
+# Evaluations that each seed, and the best path at the end, are polished with, at most.
+SEED_POLISH, LAST_POLISH = 500, 2500
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
 
@@ -94,6 +97,21 @@ class _Run:
         self.evaluations += len(vectors)
         self.archive.take(vectors, scores)
         return scores
+
+    def polish(self, vector: Floats, most: int) -> None:
+        """Tighten a vector (d,) by a local search; the archive sees what it finds."""
+        left = self.budget() - self.evaluations
+        if min(most, left) < 2:
+            return
+        found, made = polish(self.problem.search, self.encoding, vector, int(min(most, left)))
+        self.evaluate(found)
+        # What is found was counted when it was found.
+        self.evaluations += made - len(found)
+
+    def budget(self) -> float:
+        """Evaluations that the scenario allows; no limit by default."""
+        most = self.problem.scenario.planner.budget
+        return math.inf if most is None else most
 
     def note(self) -> None:
         """Add the archive's best to the history."""
@@ -177,8 +195,7 @@ def _check_options(scenario: Scenario) -> None:
 
 
 def _spent(run: _Run) -> bool:
-    budget = run.problem.scenario.planner.budget
-    return budget is not None and run.evaluations >= budget
+    return run.evaluations >= run.budget()
 
 
 def _levels(run: _Run) -> tuple[Level, ...]:
@@ -212,8 +229,10 @@ def _attempt(run: _Run, number: int) -> None:
         span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
         paths = seeds(run.problem.search, span, table.waypoints, stages, each)
         if paths:
-            # Marginals over several routes at once fit none of them: the best one leads.
             starts = rotated_vectors(run.problem.space, encoding, np.array(paths))
+        for vector in starts:
+            run.polish(vector, SEED_POLISH)
+        # Marginals over several routes at once fit none of them: the best one leads.
         starts = _best(run, np.concatenate([starts, run.archive.vectors]), 1)
     levels = _levels(run)
     basis = bridge_basis(table.waypoints - 2) if algorithm.smooth else None
@@ -233,6 +252,9 @@ def _attempt(run: _Run, number: int) -> None:
         run.done += 1
         if run.progress is not None:
             run.progress(run.done, run.done + table.generations - generation - 1, _status(run.archive.scores[0]))
+    if algorithm.seeded:
+        run.polish(run.archive.vectors[0], LAST_POLISH)
+        run.note()
 
 
 def _best(run: _Run, vectors: Floats, count: int) -> Floats:
