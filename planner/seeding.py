@@ -6,6 +6,7 @@ hold never turns back.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -311,10 +312,11 @@ def _pick(rules: Rules, frame: Frame, candidates: Floats) -> Floats:
     return candidates[np.arange(len(candidates)), chosen]
 
 
-def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int) -> list[Floats]:
-    """Seed paths (w, 3) world m: up to `each` different routes from a grid of each number of stages."""
+def routes(
+    rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int
+) -> Iterator[Floats]:
+    """Seed paths (w, 3) world m: up to `each` different routes from a grid of each number of stages, as found."""
     frame = rotated_frame(rules.start, rules.destination)
-    found: list[Floats] = []
     for number in stages:
         grid = make_grid(rules, frame, span, number)
         used: list[Floats] = []
@@ -323,5 +325,9 @@ def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple
             if route is None:
                 break
             used.append(route)
-            found.append(fit_waypoints(rules, frame, route, waypoints))
-    return found
+            yield fit_waypoints(rules, frame, route, waypoints)
+
+
+def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int) -> list[Floats]:
+    """All of `routes`."""
+    return list(routes(rules, span, waypoints, stages, each))

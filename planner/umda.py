@@ -69,10 +69,20 @@ class Umda:
         mean, deviation = kept.mean(axis=0), kept.std(axis=0)
         if self._floor is not None:
             deviation = np.maximum(deviation, self._floor)
-        drawn = self._rng.normal(mean, deviation, (count, mean.size))
         if self._basis is None:
-            return self._redraw_each(drawn, mean, deviation)
-        return self._redraw_rows(drawn, mean, deviation, self._basis)
+            return self._redraw_each(self._rng.normal(mean, deviation, (count, mean.size)), mean, deviation)
+        back = self._basis.T
+        return self._redraw(lambda rows: _project(self._rng.normal(mean, deviation, (rows, mean.size)), back), count)
+
+    def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
+        """Rows of `draw`; those outside the box are drawn again, and then clipped."""
+        out = draw(count)
+        for _ in range(REDRAWS):
+            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
+            if rows.size == 0:
+                return out
+            out[rows] = draw(rows.size)
+        return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
         for _ in range(REDRAWS):
@@ -81,15 +91,6 @@ class Umda:
                 return drawn
             drawn[rows, columns] = self._rng.normal(mean[columns], deviation[columns])
         return np.clip(drawn, self.lower, self.upper)
-
-    def _redraw_rows(self, drawn: Floats, mean: Floats, deviation: Floats, basis: Floats) -> Floats:
-        out = _project(drawn, basis.T)
-        for _ in range(REDRAWS):
-            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
-            if rows.size == 0:
-                return out
-            out[rows] = _project(self._rng.normal(mean, deviation, (rows.size, mean.size)), basis.T)
-        return np.clip(out, self.lower, self.upper)
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
