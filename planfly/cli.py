@@ -52,6 +52,42 @@ def _wind(text: str) -> tuple[float, float]:
     return speed, source
 
 
+def _budget(text: str) -> tuple[int | None, float | None]:
+    """Evaluations, or seconds where the text ends in s."""
+    try:
+        if text.endswith("s"):
+            seconds = float(text[:-1])
+            if 0.0 < seconds <= 1e6:
+                return None, seconds
+        elif 4 <= int(text) <= 10**10:
+            return int(text), None
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(
+        f"{text!r}: a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s), is expected"
+    )
+
+
+def _leg(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text!r}: a leg's number is expected, from 0")
+    return value
+
+
+def _threat(text: str) -> tuple[float, float, float, float]:
+    try:
+        east, north, kill, detection = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: EAST,NORTH,KILL,DETECTION is expected: four numbers in m, a radius of 0 for none"
+        ) from None
+    return east, north, kill, detection
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     parser = _Parser(
@@ -107,13 +143,38 @@ def _add_run_and_plan(command: _Command) -> None:
         "--seed", metavar="N", type=_seed, help="of planner and turbulence (default: the scenario's, or 1)"
     )
     _overwrite(run)
-    plan = command("plan", "plan only", "planfly plan jacksboro --seed 3 --out plan.json")
+    # Names and summaries only: what they stand for is imported with the command.
+    from planner.algorithms import algorithm_lines
+
+    plan = command(
+        "plan",
+        "plan only, or again in flight",
+        "planfly plan jacksboro --seed 3 --out plan.json\n"
+        "         planfly plan jacksboro --from plan.json --at-leg 4 --add-threat=-2000,1500,800,1500\n\n"
+        f"algorithms:\n{algorithm_lines()}",
+    )
     plan.add_argument("scenario", metavar="SCENARIO", help="TOML file or embedded name")
     plan.add_argument("--seed", metavar="N", type=_seed, help="of the planner (default: the scenario's, or 1)")
     plan.add_argument(
         "--algorithm",
         metavar="A",
-        help="the planner's algorithm, in place of the scenario's (an unknown name lists them)",
+        help="the planner's algorithm, in place of the scenario's (see below)",
+    )
+    plan.add_argument(
+        "--budget",
+        metavar="N|Xs",
+        type=_budget,
+        help="end after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
+        "in seconds may differ from run to run",
+    )
+    plan.add_argument("--from", dest="old", metavar="PLAN.json", help="plan again in flight: the plan being flown")
+    plan.add_argument("--at-leg", metavar="K", type=_leg, help="with --from: legs before K are flown and stay")
+    plan.add_argument(
+        "--add-threat",
+        metavar="EAST,NORTH,KILL,DETECTION",
+        type=_threat,
+        action="append",
+        help="with --from: a threat that has popped up, in m; --add-threat=-... where EAST is negative; repeatable",
     )
     plan.add_argument("--out", metavar="FILE", help="the plan file (default: runs/<name>-seed<N>/plan.json, replaced)")
     _overwrite(plan)
@@ -206,9 +267,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     args = build_parser().parse_args(argv)
     # Imported here: pydantic and numba take longer than --help may.
-    from planfly.commands import COMMANDS
-    from world.errors import PlanflyError
-
+    try:
+        from planfly.commands import COMMANDS
+        from world.errors import PlanflyError
+    except KeyboardInterrupt:
+        return _fail(INTERRUPTED, "interrupted")
     try:
         return COMMANDS[args.command](args)
     except PlanflyError as error:

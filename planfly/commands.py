@@ -60,17 +60,19 @@ def run(args: argparse.Namespace) -> int:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """``planfly plan``."""
-    from planfly.pipeline import choose_seed, load_vehicle, make_plan
+    """``planfly plan``, and planning again with ``--from``."""
+    from planfly.pipeline import choose_seed, load_vehicle
+    from planfly.planning import make_plan, prepare
     from planfly.results import print_plan
     from planner.plan import plan_json
 
-    scenario = load_scenario(args.scenario)
+    scenario, old = prepare(args, load_scenario(args.scenario))
     seed = choose_seed(scenario, args.seed)
-    target = _target(args.out, _default_folder(scenario.name, seed) / "plan.json", args.overwrite)
+    default = _default_folder(scenario.name, seed) / ("plan.json" if old is None else "replan.json")
+    target = _target(args.out, default, args.overwrite)
     vehicle = load_vehicle(scenario)
     with progress(f"planning {scenario.name}") as advance:
-        made = make_plan(scenario, vehicle, seed, args.algorithm, advance)
+        made = make_plan(args, scenario, old, vehicle, seed, advance)
     target.parent.mkdir(parents=True, exist_ok=True)
     write_whole(target, plan_json(made))
     print_plan(made)
