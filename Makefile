@@ -17,6 +17,7 @@ test: setup
 	$(BIN)/python -m pytest -n 2
 
 bench: setup
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
 soak: setup
