@@ -36,12 +36,12 @@ class Motions(ob.MotionValidator):
 
     def checkMotion(self, one: list[float], two: list[float]) -> bool:
         """The library's callback."""
-        began = time.perf_counter_ns()
+        began = time.process_time_ns()
         # Climb and dive limits differ, and rewiring turns motions round: all are judged as they would be flown.
         forward = (two[0] - one[0]) * self.east + (two[1] - one[1]) * self.north >= 0.0
         valid = self.judge(one, two) if forward else self.judge(two, one)
         self.count += 1
-        self.nanoseconds += time.perf_counter_ns() - began
+        self.nanoseconds += time.process_time_ns() - began
         return valid
 
     def judge(self, one: list[float], two: list[float]) -> bool:
