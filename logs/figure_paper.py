@@ -55,7 +55,8 @@ def draw_paths(scenario: Scenario, algorithm: str, lines: Sequence[Line]) -> Fig
                 axes.plot(*line.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
             if chosen:
                 ratios = [line.length_ratio for line in chosen]
-                text = f"{len(chosen)} paths {word}\nPLR {min(ratios):.3f} to {max(ratios):.3f}"
+                span = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
+                text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {word}\nPLR {span}"
                 handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
         handles += _ends(axes, scenario, [line.waypoints for line in lines])
         draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
