@@ -69,8 +69,11 @@ ALGORITHMS: dict[str, Algorithm] = {
             optimiser="differential",
         ),
         Algorithm("de", "the same without seeds", graded=True, smooth=True, optimiser="differential"),
-        Algorithm("de-paper", "differential evolution in the paper's frame: its encoding, counts and preference",
-                  optimiser="differential"),
+        Algorithm(
+            "de-paper",
+            "differential evolution in the paper's frame: its encoding, counts and preference",
+            optimiser="differential",
+        ),
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
         Algorithm("umda", "the paper's UMDA in the rotated frame: counts on six points a leg, no seeds"),
         Algorithm("umda-cartesian", "the paper's baseline: the same UMDA on absolute waypoints", encoding="cartesian"),

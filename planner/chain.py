@@ -40,7 +40,8 @@ def _cross(rows: Floats, first: int, second: int, size: int) -> Floats:  # pragm
         for i in range(size):
             for j in range(size):
                 out[i, j] += rows[n, first + i] * rows[n, second + j]
-    return out / rows.shape[0]
+    out /= rows.shape[0]
+    return out
 
 
 @njit(cache=True)

@@ -22,7 +22,9 @@ class Emna(Umda):
         # Scaled to the box, so that metres of one variable do not drown those of another.
         width = self.upper - self.lower
         factor = _factor(np.ascontiguousarray((self.samples - mean) / width), RIDGE)
-        return self._redraw(lambda rows: mean + width * _lower_product(self._rng.normal(size=(rows, mean.size)), factor), count)
+        return self._redraw(
+            lambda rows: mean + width * _lower_product(self._rng.normal(size=(rows, mean.size)), factor), count
+        )
 
 
 @njit(cache=True)

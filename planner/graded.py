@@ -12,20 +12,12 @@ from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
 from planner.cells import Cells, cell_at, grid_of
-from planner.corners import ARC_STEP, corner
-from planner.criteria import (
-    POINTS,
-    Gauge,
-    constraints,
-    make_gauge,
-    measure_corners,
-    measure_legs,
-    required_clearance,
-)
+from planner.corners import ARC_STEP, blend_reach, corner
+from planner.criteria import POINTS
+from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs, required_clearance
 from planner.rules import CORNER_SLACK, Rules
 from world.frames import polymap
-from world.geometry import sphere_window, window_exposure
-from world.limits import BLEND_ACCELERATION
+from world.geometry import window_exposure
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -160,9 +152,7 @@ def make_bench(rules: Rules, count: int) -> Bench:  # pragma: no cover - compile
     """Scratch for paths of `count` waypoints."""
     seen = np.zeros(rules.threats.shape[0], dtype=np.int64)
     shape = count - 1
-    return Bench(
-        np.empty((shape, 4)), np.zeros((count, 2)), np.empty((shape, 2)), seen, np.zeros(1, dtype=np.int64)
-    )
+    return Bench(np.empty((shape, 4)), np.zeros((count, 2)), np.empty((shape, 2)), seen, np.zeros(1, dtype=np.int64))
 
 
 @compiled
@@ -226,6 +216,7 @@ def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # 
 
     As `corners.corner_radii`, of which the ends have no arc.
     """
+    radius: float = corners[i, 1]
     if math.isinf(corners[i, 0]):
         return 0.0
     if not room:
@@ -234,7 +225,7 @@ def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # 
         after = corners[i + 1, 0] if i < last - 1 else 0.0
         if corners[i, 0] + before > legs[i - 1, 2] or corners[i, 0] + after > legs[i, 2]:
             return 0.0
-    return corners[i, 1]
+    return radius
 
 
 @compiled
@@ -246,12 +237,12 @@ def _corner_matters(
     They are not where the legs stay further from them than the corner departs from the legs: sideways by at most
     R(1/cos(theta/2) - 1) and a chord's rise, downwards by the crest that is cut.
     """
-    radius = _arc_radius(rules.room, legs, corners, i)
+    radius = 0.0 if rules.fly_over else _arc_radius(rules.room, legs, corners, i)
     tangent = corners[i, 0] if radius > 0.0 else 0.0
     before, after = max(legs[i - 1, 2], 1e-6), max(legs[i, 2], 1e-6)
     slope_in, slope_out = (paths[n, i, 2] - paths[n, i - 1, 2]) / before, (paths[n, i + 1, 2] - paths[n, i, 2]) / after
     crest = max(0.0, slope_in - slope_out)
-    reach = (rules.aircraft[0, 0] + rules.aircraft[0, 2]) ** 2 / (2.0 * BLEND_ACCELERATION)
+    reach = blend_reach(rules.aircraft, paths[n, i, 2])
     aside = math.sqrt(radius * radius + tangent * tangent) - radius
     aside += min(aside, radius * (1.0 - math.cos(0.5 * ARC_STEP)))
     drop = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
@@ -286,8 +277,6 @@ def _judge_corner(
             missed[n, 2] += depth
         if close:
             stamp += 1
-            dose, _ = kill_density(
-                rules.threats, rules.missiles, rules.kill_margin, seen, stamp, x, y, z, x2, y2, z2
-            )
+            dose, _ = kill_density(rules.threats, rules.missiles, rules.kill_margin, seen, stamp, x, y, z, x2, y2, z2)
             kill += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
     return stamp, kill

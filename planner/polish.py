@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aircraft.compiled import compiled
 from planner.encoding import Encoding, rotated_frame
 from planner.graded import Bench, make_bench, score_path
-from planner.criteria import Gauge, make_gauge
+from planner.legs import Gauge, make_gauge
 from planner.rules import Rules
 
 Floats = NDArray[np.float64]

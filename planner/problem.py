@@ -29,6 +29,8 @@ SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
 CERTIFIED_SLACK = 0.75
 # More reserve for each attempt after the first, m: the search had not seen all ground between its samples.
 ATTEMPT_RESERVE = 5.0
+# Of the aircraft's steepest climb and dive, the share that a plan uses: holding a path in gusts takes the rest.
+TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
 # m inside the map, and inside floor and ceiling, that a search keeps where the fixed ends do.
 MAP_MARGIN, HEIGHT_MARGIN = 10.0, 4.0
 
@@ -93,7 +95,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.packed,
         threats=units,
-        aircraft=limits.packed(),
+        aircraft=_with_share(limits, scenario.wind.turbulence),
         bounds=scenario.bounds,
         start=scenario.start,
         destination=scenario.destination,
@@ -101,6 +103,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         ceiling=float(scenario.ceiling),
         max_turn=AIRCRAFT_TURN if limits.max_turn is None else limits.max_turn - SPARE,
         room=limits.max_turn is None,
+        fly_over=scenario.flight.fly_over,
         climb=or_nan(limits.max_climb),
         dive=or_nan(limits.max_dive),
         spare=SPARE,
@@ -117,6 +120,15 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         missiles=make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK),
         steepest=float(steepest_slope(terrain.heights, terrain.spacing)),
     )
+
+
+def _with_share(limits: Limits, turbulence: str) -> Floats:
+    """Packed aircraft of which a plan uses the share of climb and dive that turbulence leaves."""
+    packed = limits.packed()
+    angles = packed[1:, 8:]
+    # What is below 0 is a loss of height, of which no share helps.
+    packed[1:, 8:] = np.where(angles > 0.0, TURBULENCE_SHARE[turbulence] * angles, angles)
+    return packed
 
 
 def _inset(rules: Rules) -> Rules:

@@ -48,9 +48,7 @@ def replan(
     course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
     table = scenario.planner.model_copy(update={"waypoints": len(rest)})
     ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
-    made = plan_path(
-        ahead, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=rest
-    )
+    made = plan_path(ahead, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=rest)
     waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])
     counts, objectives = paper_scores(make_problem(scenario, limits).certified, waypoints[None])
     return replace(

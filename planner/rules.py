@@ -18,7 +18,8 @@ class Rules(NamedTuple):
     """What paths are judged against, in the form that the compiled functions take.
 
     threats: (m, 7) east, north, up, kill radius and scale, detection radius and scale.  aircraft: packed limits.
-    max_turn: rad.  room: whether a leg must hold its turns.  climb, dive: rad, NaN to ask the aircraft.
+    max_turn: rad.  room: whether a leg must hold its turns.  fly_over: whether a
+    turn begins at its waypoint, not before it.  climb, dive: rad, NaN to ask the aircraft.
     spare: rad kept inside slope limits.  clearance, reserve: m, required and kept on top.  kill_margin: m.
     pitch: m between terrain samples of the graded judge.
     start_course, destination_course: rad or NaN.  start_slack, destination_slack: m of reserve at the ends.
@@ -37,6 +38,7 @@ class Rules(NamedTuple):
     ceiling: float
     max_turn: float
     room: bool
+    fly_over: bool
     climb: float
     dive: float
     spare: float

@@ -1,6 +1,7 @@
 """Running an algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,13 +28,17 @@ from world.streams import PLANNER, stream
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Of each attempt: stages of its grids, routes from each, and the population's growth.
-ATTEMPTS = (((36, 52, 80), 2, 1), ((24, 66, 110), 3, 2), ((44, 96, 160), 3, 3))
+# Of each attempt: stages of its grids with the routes from each, and the population's growth.
+ATTEMPTS = (
+    (((36, 2), (66, 1), (130, 1)), 1),
+    (((24, 3), (52, 3), (80, 3), (110, 2)), 2),
+    (((44, 3), (96, 3), (160, 2)), 3),
+)
 # A seeded search ends when this many generations have shortened its best path by less than this share of the straight
 # line: the polish at the end is faster at the rest.
 PATIENCE, GAIN = 10, 2e-4
 # Of the evaluations that the paper's planner makes, the share that a seeded search spends before its last polish.
-SHARE = 0.5
+SHARE = 0.3
 # Evaluations that each seed, and the best path at the end, are polished with, at most.
 SEED_POLISH, LAST_POLISH = 500, 2500
 # Numbers a population may hold.
@@ -145,11 +150,11 @@ def _retry(run: Run, number: int) -> None:
 def _attempt(run: Run, number: int, previous: Floats | None) -> None:
     """One search from its first population to its last generation."""
     table = run.problem.scenario.planner
-    stages, each, growth = ATTEMPTS[number]
+    grids, growth = ATTEMPTS[number]
     population = table.population * growth
     encoding, algorithm = run.encoding, run.algorithm
     before = run.evaluations
-    starts = _starts(run, stages, each, previous)
+    starts = _starts(run, grids, previous)
     if len(run.archive.scores) and (run.safe_already() or run.over()):
         run.note()
         return
@@ -178,7 +183,7 @@ def _attempt(run: Run, number: int, previous: Floats | None) -> None:
         run.note()
 
 
-def _starts(run: Run, stages: tuple[int, ...], each: int, previous: Floats | None) -> Floats:
+def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
     """Vectors (n, d) that a search starts from: the seed that comes out best when polished, and the older path.
 
     Marginals over several routes at once fit none of them: one leads.  It leads as it was: polished it stands so close
@@ -187,16 +192,16 @@ def _starts(run: Run, stages: tuple[int, ...], each: int, previous: Floats | Non
     encoding, space, waypoints = run.encoding, run.problem.space, run.encoding.waypoints
     if encoding.name != "rotated" or (not run.algorithm.seeded and previous is None):
         return np.empty((0, encoding.lower.size))
-    starts, polished = list(run.archive.vectors[:1]), []
+    starts = list(run.archive.vectors[:1])
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
-    for vector in (*starts, *older):
-        polished.append(run.polish(vector, SEED_POLISH))
     starts += older
+    polished = [run.polish(vector, SEED_POLISH) for vector in starts]
     if run.algorithm.seeded:
         if run.progress is not None:
             run.progress(run.done, run.done + run.problem.scenario.planner.generations, "grid routes")
         span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-        for path in routes(run.problem.search, span, waypoints, stages, each):
+        found = (routes(run.problem.search, span, waypoints, (stages,), each) for stages, each in grids)
+        for path in chain.from_iterable(found):
             starts.append(rotated_vectors(space, encoding, path[None])[0])
             polished.append(run.polish(starts[-1], SEED_POLISH))
             if run.over() or run.safe_already():

@@ -184,6 +184,31 @@ def corner_tangent(
 
 
 @compiled
+def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
+    """Tangent of the slope along a fly-by arc: the heights of its tangent points over the arc's own length.
+
+    tan_in, tan_out: of the legs.  tangent = radius x tan(theta/2): the arc, radius x theta, is shorter than its two
+    tangents, and so steeper: by 1.27 at 90 degrees.
+    """
+    if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
+        return 0.0
+    half = math.atan(tangent / radius)
+    return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
+
+
+@compiled
+def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
+    """Run after a fly-over turn (rad), in radii; its greatest up to this angle, so that it never falls with the angle.
+
+    With overshoot angle phi, cos phi = (1 + cos turn)/2, the track is back on the leg after sin turn + 2 sin phi.
+    """
+    # Where sin turn + 2 sin phi is greatest, 2 sqrt 2.
+    sharpest = min(turn, math.acos(-1.0 / 3.0))
+    back = 0.5 * (1.0 + math.cos(sharpest))
+    return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
+
+
+@compiled
 def turn_tangents(packed: Floats, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
     """Length of leg that the fly-by arc at each waypoint uses on either side, (w,) m; 0 at the ends.
 

@@ -297,7 +297,7 @@ def with_threats(
 
 
 def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
-    """Make the same scenario with other keys of [planner].  Raises ScenarioError for values that a file may not have."""
+    """Make the same scenario with other keys of [planner].  Raises ScenarioError as a file with them would."""
     table = scenario.planner.model_dump() | changes
     changed = _checked(lambda: PlannerTable(**table), source)
     return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed}), planner=changed)
