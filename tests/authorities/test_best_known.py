@@ -113,11 +113,6 @@ def test_default_plans_are_safe_and_never_far_from_the_best_known(name: str) -> 
     assert max(default_ratios(name)) <= WORST
 
 
-_NARROW = "1.014 in all runs: Informed RRT* passes gaps that our grid routes do not find"
-
-
-@pytest.mark.parametrize(
-    "name", [*NAMES[:3], pytest.param("hard-60", marks=pytest.mark.xfail(reason=_NARROW, strict=True))]
-)
+@pytest.mark.parametrize("name", NAMES)
 def test_default_plans_are_close_to_the_best_known(name: str) -> None:
     assert float(np.median(default_ratios(name))) <= MEDIAN
