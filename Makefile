@@ -18,6 +18,7 @@ test: $(TESTED) clients
 	$(BIN)/python -m pytest -n 2
 
 bench: $(TESTED)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
 soak: $(TESTED) clients

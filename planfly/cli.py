@@ -83,6 +83,42 @@ def _moment_or_stations(text: str) -> float | str:
     return text if ":" in text else _moment(text)
 
 
+def _budget(text: str) -> tuple[int | None, float | None]:
+    """Evaluations, or seconds where the text ends in s."""
+    try:
+        if text.endswith("s"):
+            seconds = float(text[:-1])
+            if 0.0 < seconds <= 1e6:
+                return None, seconds
+        elif 4 <= int(text) <= 10**10:
+            return int(text), None
+    except ValueError:
+        pass
+    raise argparse.ArgumentTypeError(
+        f"{text!r}: a number of evaluations (4..10^10), or of seconds such as 2.5s (up to 1,000,000s), is expected"
+    )
+
+
+def _leg(text: str) -> int:
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if not 0 <= value <= 10_000:
+        raise argparse.ArgumentTypeError(f"{text!r}: a leg's number is expected, from 0")
+    return value
+
+
+def _threat(text: str) -> tuple[float, float, float, float]:
+    try:
+        east, north, kill, detection = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"{text!r}: EAST,NORTH,KILL,DETECTION is expected: four numbers in m, a radius of 0 for none"
+        ) from None
+    return east, north, kill, detection
+
+
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command line."""
     parser = _Parser(
@@ -108,6 +144,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_export_and_fly(command)
     _add_log_commands(command)
     _add_serve(command)
+    _add_paper(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser
 
@@ -152,13 +189,38 @@ def _add_run_and_plan(command: _Command) -> None:
         help="where it does not fly, tighten and try again, up to N times",
     )
     _overwrite(run)
-    plan = command("plan", "plan only", "planfly plan jacksboro --seed 3 --out plan.json")
+    # Names and summaries only: what they stand for is imported with the command.
+    from planner.algorithms import algorithm_lines
+
+    plan = command(
+        "plan",
+        "plan only, or again in flight",
+        "planfly plan jacksboro --seed 3 --out plan.json\n"
+        "         planfly plan jacksboro --from plan.json --at-leg 4 --add-threat=-2000,1500,800,1500\n\n"
+        f"algorithms:\n{algorithm_lines()}",
+    )
     plan.add_argument("scenario", metavar="SCENARIO", help="TOML file or embedded name")
     plan.add_argument("--seed", metavar="N", type=_seed, help="of the planner (default: the scenario's, or 1)")
     plan.add_argument(
         "--algorithm",
         metavar="A",
-        help="the planner's algorithm, in place of the scenario's (an unknown name lists them)",
+        help="the planner's algorithm, in place of the scenario's (see below)",
+    )
+    plan.add_argument(
+        "--budget",
+        metavar="N|Xs",
+        type=_budget,
+        help="end after N evaluations or X seconds with the best plan so far (as Ctrl-C does); a plan under a budget "
+        "in seconds may differ from run to run",
+    )
+    plan.add_argument("--from", dest="old", metavar="PLAN.json", help="plan again in flight: the plan being flown")
+    plan.add_argument("--at-leg", metavar="K", type=_leg, help="with --from: legs before K are flown and stay")
+    plan.add_argument(
+        "--add-threat",
+        metavar="EAST,NORTH,KILL,DETECTION",
+        type=_threat,
+        action="append",
+        help="with --from: a threat that has popped up, in m; --add-threat=-... where EAST is negative; repeatable",
     )
     plan.add_argument("--out", metavar="FILE", help="the plan file (default: runs/<name>-seed<N>/plan.json, replaced)")
     _overwrite(plan)
@@ -290,6 +352,40 @@ def _add_serve(command: _Command) -> None:
     serve.add_argument(
         "--log", metavar="DIR", default="runs/serve", help="folder of the flight logs (default: runs/serve)"
     )
+
+
+def _problems(text: str) -> tuple[int, ...]:
+    allowed = (7, 15, 30, 60)
+    parts = [part.strip() for part in text.split(",")]
+    numbers = sorted({int(part) for part in parts if part.isdecimal()})
+    if not all(part.isdecimal() for part in parts) or not set(numbers) <= set(allowed):
+        raise argparse.ArgumentTypeError(f"{text!r}: numbers of threats out of 7,15,30,60 are expected")
+    return tuple(numbers)
+
+
+def _positive_count(text: str) -> int:
+    value = int(text) if text.isdecimal() else 0
+    if not 1 <= value <= 1000:
+        raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 1 to 1,000 is expected")
+    return value
+
+
+def _add_paper(command: _Command) -> None:
+    paper = command(
+        "paper",
+        "run the paper's section V again: tables and figures of seeded runs in three encodings",
+        "planfly paper --problems 7,60 --runs 5 --out my-paper",
+    )
+    paper.add_argument(
+        "--problems", metavar="N,...", type=_problems, default=(7, 15, 30, 60), help="threats (default: 7,15,30,60)"
+    )
+    paper.add_argument("--runs", metavar="N", type=_positive_count, default=15, help="seeds 1..N of each (default: 15)")
+    paper.add_argument(
+        "--algorithm", metavar="A", default="umda", help="in place of the paper's umda, beside the two baselines"
+    )
+    paper.add_argument("--jobs", metavar="N", type=_positive_count, help="processes (default: one a core)")
+    paper.add_argument("--out", metavar="DIR", help="where tables and figures go (default: runs/paper, replaced)")
+    _overwrite(paper)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

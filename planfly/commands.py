@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from planfly import log_commands
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.files import default_folder, refuse_existing
+from planfly.files import default_folder, prepare_folder, refuse_existing, refuse_folder
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
@@ -36,22 +36,45 @@ def run(args: argparse.Namespace) -> int:
 
 
 def plan(args: argparse.Namespace) -> int:
-    """``planfly plan``."""
-    from planfly.pipeline import choose_seed, load_vehicle, make_plan
+    """``planfly plan``, and planning again with ``--from``."""
+    from planfly.pipeline import choose_seed, load_vehicle
+    from planfly.planning import make_plan, prepare
     from planfly.results import print_plan
     from planner.plan import plan_json
 
-    scenario = load_scenario(args.scenario)
+    scenario, old = prepare(args, load_scenario(args.scenario))
     seed = choose_seed(scenario, args.seed)
-    target = _target(args.out, default_folder(scenario.name, seed) / "plan.json", args, Path(args.scenario))
+    default = default_folder(scenario.name, seed) / ("plan.json" if old is None else "replan.json")
+    target = _target(args.out, default, args, Path(args.scenario))
     vehicle = load_vehicle(scenario)
     with progress(f"planning {scenario.name}") as advance:
-        made = make_plan(scenario, vehicle, seed, args.algorithm, advance)
+        made = make_plan(args, scenario, old, vehicle, seed, advance)
     target.parent.mkdir(parents=True, exist_ok=True)
     write_whole(target, plan_json(made))
     print_plan(made)
     print(f"plan      {target}")
     return FLYABLE if made.safe else NOT_FLYABLE
+
+
+def paper(args: argparse.Namespace) -> int:
+    """``planfly paper``: a table whatever it says; no path in it is an answer too."""
+    from planfly.files import RUNS
+    from planfly.paper import PROBLEMS, run_section, table
+    from planfly.paper_files import file_names, table_text, write_figures, write_tables
+
+    folder = Path(args.out) if args.out else RUNS / "paper"
+    if args.out:
+        refuse_folder(folder, args.overwrite)
+    with progress("planning") as advance:
+        done = run_section(args.problems, args.runs, args.algorithm, args.jobs, advance)
+    rows = table(done)
+    prepare_folder(folder, tuple(file_names(PROBLEMS)))
+    write_tables(folder, rows, done)
+    with progress("drawing"):
+        write_figures(folder, done)
+    print(table_text(rows))
+    print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
+    return FLYABLE
 
 
 def export(args: argparse.Namespace) -> int:
@@ -173,6 +196,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "export": export,
     "fly": fly,
     "check": check,
+    "paper": paper,
     "serve": serve,
     "replay": log_commands.replay,
     "recover": log_commands.recover,

@@ -1,8 +1,11 @@
 """The algorithms that a scenario or a command may name."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 from world.errors import ScenarioError
+
+Optimiser = Literal["umda", "emna", "chain", "differential"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -10,7 +13,8 @@ class Algorithm:
     """One way to search: its encoding and what it adds to the paper's planner.
 
     graded: constraints by how far they are missed, along the whole path, and kill exposure ahead of length.
-    smooth: marginals along the eigenvectors of the Brownian-bridge kernel.  seeded: starts from grid routes.
+    smooth: first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
+    seeded: starts from grid routes, polished.  optimiser: the file in `planner/` that holds it.
     """
 
     name: str
@@ -19,6 +23,7 @@ class Algorithm:
     graded: bool = False
     smooth: bool = False
     seeded: bool = False
+    optimiser: Optimiser = "umda"
 
 
 ALGORITHMS: dict[str, Algorithm] = {
@@ -26,7 +31,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     for item in (
         Algorithm(
             "umda-seeded",
-            "the default: smooth UMDA in the rotated frame, started from grid routes over terrain and threats",
+            "the default: smooth UMDA in the rotated frame, started from polished grid routes over terrain and threats",
             graded=True,
             smooth=True,
             seeded=True,
@@ -37,6 +42,38 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
         ),
+        Algorithm(
+            "emna-seeded",
+            "full covariance of all variables (EMNA), started from grid routes",
+            graded=True,
+            smooth=True,
+            seeded=True,
+            optimiser="emna",
+        ),
+        Algorithm("emna", "the same without seeds", graded=True, smooth=True, optimiser="emna"),
+        Algorithm(
+            "chain-seeded",
+            "each waypoint depends on the one before it (Markov chain), started from grid routes",
+            graded=True,
+            smooth=True,
+            seeded=True,
+            optimiser="chain",
+        ),
+        Algorithm("chain", "the same without seeds", graded=True, smooth=True, optimiser="chain"),
+        Algorithm(
+            "de-seeded",
+            "a classical evolutionary algorithm (differential evolution), started from grid routes",
+            graded=True,
+            smooth=True,
+            seeded=True,
+            optimiser="differential",
+        ),
+        Algorithm("de", "the same without seeds", graded=True, smooth=True, optimiser="differential"),
+        Algorithm(
+            "de-paper",
+            "differential evolution in the paper's frame: its encoding, counts and preference",
+            optimiser="differential",
+        ),
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
         Algorithm("umda", "the paper's UMDA in the rotated frame: counts on six points a leg, no seeds"),
         Algorithm("umda-cartesian", "the paper's baseline: the same UMDA on absolute waypoints", encoding="cartesian"),
@@ -44,6 +81,12 @@ ALGORITHMS: dict[str, Algorithm] = {
     )
 }
 DEFAULT = "umda-seeded"
+
+
+def algorithm_lines() -> str:
+    """The algorithms, one line each."""
+    width = max(len(name) for name in ALGORITHMS)
+    return "\n".join(f"  {item.name:<{width}}  {item.summary}" for item in ALGORITHMS.values())
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from planner.corners import corner, corner_radii
-from planner.criteria import RESERVE_GROWTH, extended, settling_room, slope_limits
+from planner.legs import CERTIFIED_LEG, RESERVE_GROWTH, extended, settling_room, slope_limits
 from planner.plan import Certificate
 from planner.problem import SPARE, Problem
 from planner.rules import Rules
 from world.geometry import leg_runs, leg_slopes, sphere_window, turning_angles
-from world.limits import turn_tangents
+from world.limits import arc_slope, fly_over_run, turn_tangents
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -49,13 +50,38 @@ def pieces(rules: Rules, waypoints: Floats) -> Iterator[tuple[str, Floats, Float
 
 def kill_distance(rules: Rules, waypoints: Floats) -> float:
     """Distance from the path to the surface of the nearest missile sphere, m: negative inside, inf without any."""
+    return float(_kill_distance(rules, np.ascontiguousarray(waypoints)))
+
+
+@compiled
+def _kill_distance(rules: Rules, waypoints: Floats) -> float:  # pragma: no cover - compiled
     nearest = math.inf
-    armed = rules.threats[rules.threats[:, 3] > 0.0]
-    for _, a, b in pieces(rules, waypoints):
-        for unit in armed:
-            near, _, _ = sphere_window(a, b, unit[:3], unit[3])
-            nearest = min(nearest, near - unit[3])
-    return float(nearest)
+    last = waypoints.shape[0] - 1
+    for i in range(last):
+        nearest = min(nearest, _segment_distance(rules.threats, waypoints[i], waypoints[i + 1], nearest))
+    radii = corner_radii(rules, waypoints)
+    for i in range(1, last):
+        arc = corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        for k in range(max(1, arc.shape[0] - 1)):
+            nearest = _segment_distance(rules.threats, arc[k], arc[min(k + 1, arc.shape[0] - 1)], nearest)
+    return nearest
+
+
+@compiled
+def _segment_distance(threats: Floats, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
+    """Distance from a-b to the nearest missile sphere's surface, or `nearest` if that is less."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    length2 = dx * dx + dy * dy + dz * dz
+    for k in range(threats.shape[0]):
+        if threats[k, 3] <= 0.0:
+            continue
+        x, y, z = a[0] - threats[k, 0], a[1] - threats[k, 1], a[2] - threats[k, 2]
+        along = dx * x + dy * y + dz * z
+        f = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
+        # From the point itself: differences of squares lose digits.
+        x, y, z = x + f * dx, y + f * dy, z + f * dz
+        nearest = min(nearest, math.sqrt(x * x + y * y + z * z) - threats[k, 3])
+    return nearest
 
 
 def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
@@ -68,10 +94,11 @@ def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float,
             turned, most = math.degrees(allowed - margin), math.degrees(allowed - spare)
             problems.append(f"waypoint {i}: turns {turned:.1f} deg, allowed {most:.1f} deg")
     room = math.inf
+    for i, run in enumerate(leg_runs(waypoints)):
+        if run < CERTIFIED_LEG:
+            problems.append(f"leg {i}: {run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
     if rules.room:
-        tangents = turn_tangents(rules.aircraft, way)[1:-1]
-        for i, run in enumerate(leg_runs(waypoints)):
-            need = tangents[i] + tangents[i + 1]
+        for i, (run, need) in enumerate(zip(leg_runs(waypoints), _turn_needs(rules, way), strict=True)):
             if need == 0.0:
                 continue
             room = min(room, float(run - need))
@@ -81,8 +108,48 @@ def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float,
     return float(margins.min(initial=math.inf)), room
 
 
-def _slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
+def _turn_needs(rules: Rules, way: Floats) -> Floats:
+    """Length of each leg (w - 1,) that its turns use, m; way: extended."""
+    tangents = turn_tangents(rules.aircraft, way)[1:-1]
+    if not rules.fly_over:
+        return np.asarray(tangents[:-1] + tangents[1:])
+    turns = turning_angles(way)
+    half = np.array([math.tan(0.5 * min(turn, math.pi - 1e-6)) for turn in turns])
+    return np.array(
+        [
+            tangent / tangent_of_half * fly_over_run(turn) if 0.0 < tangent < math.inf else tangent
+            for tangent, tangent_of_half, turn in zip(tangents[:-1], half[:-1], turns[:-1], strict=True)
+        ]
+    )
+
+
+def _arc_slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
+    """Slopes along the arcs, which are shorter than the legs that they replace; the least margin, rad."""
     least = math.inf
+    if not rules.room or rules.fly_over or not (math.isnan(rules.climb) or math.isnan(rules.dive)):
+        return least
+    radii, tangents = corner_radii(rules, waypoints), turn_tangents(rules.aircraft, waypoints)
+    rises = np.tan(leg_slopes(waypoints))
+    for i in range(1, len(waypoints) - 1):
+        if tangents[i] <= 0.0 or radii[i] <= 0.0:
+            continue
+        slope = math.atan(arc_slope(rises[i - 1], rises[i], tangents[i], radii[i]))
+        flat = np.array([0.0, 0.0, waypoints[i, 2]])
+        for before, after in ((i - 1, i), (i, i + 1)):
+            step = np.append((waypoints[after] - waypoints[before])[:2], waypoints[i, 2])
+            climb, dive = slope_limits(rules, flat, step)
+            inside = min(climb - slope, dive + slope)
+            least = min(least, inside + rules.spare)
+            if inside < -_EPSILON:
+                word, limit = ("climbs", climb) if slope > 0 else ("sinks", dive)
+                steep, most = math.degrees(abs(slope)), math.degrees(limit)
+                problems.append(f"turn at waypoint {i}: {word} {steep:.1f} deg along its arc, allowed {most:.1f} deg")
+                break
+    return least
+
+
+def _slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
+    least = _arc_slopes(rules, waypoints, problems)
     for i, slope in enumerate(leg_slopes(waypoints)):
         climb, dive = slope_limits(rules, waypoints[i], waypoints[i + 1])
         inside = min(climb - slope, dive + slope)

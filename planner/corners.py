@@ -8,12 +8,20 @@ from numpy.typing import NDArray
 from aircraft.compiled import compiled
 from planner.rules import Rules
 from world.geometry import turning_angle
-from world.limits import BLEND_ACCELERATION, turn_tangents
+from world.limits import BLEND_ACCELERATION, turn_tangents, wind_speed_at
 
 Floats = NDArray[np.float64]
 
 # Chords of a corner's arc: at most this angle each; on a 160 m radius the arc leaves its chord by 1.4 m.
 ARC_STEP = math.radians(15.0)
+
+
+@compiled
+def blend_reach(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
+    """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
+    speed = packed[0, 0] + wind_speed_at(packed, amsl)
+    reach: float = speed * speed / (2.0 * BLEND_ACCELERATION)
+    return reach
 
 
 @compiled
@@ -43,7 +51,7 @@ def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: floa
     room_in, room_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
     beside = 0.5 * arc if chords > 0 else min(room_in, room_out)
     room_in, room_out = min(room_in, beside), min(room_out, beside)
-    reach = (rules.aircraft[0, 0] + rules.aircraft[0, 2]) ** 2 / (2.0 * BLEND_ACCELERATION)
+    reach = blend_reach(rules.aircraft, at[2])
     half_in = min(abs(slope_in - slope) * reach, room_in)
     half_out = min(abs(slope - slope_out) * reach, room_out) if chords > 0 else half_in
     cut_in = 0.25 * max(0.0, slope_in - slope) * half_in
@@ -73,8 +81,11 @@ def corner_radii(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - co
     """Radius (m) of the fly-by arc at each waypoint (w,); 0 at the ends and where the path goes straight on.
 
     Where a number alone limits turns, a leg may be shorter than its two turns.  Nothing flies those arcs, so there
-    are none: the corners are judged as drawn, and the flight shows what the aircraft makes of them.
+    are none: the corners are judged as drawn, and the flight shows what the aircraft makes of them.  A fly-over passes
+    outside its corner, and has none either.
     """
+    if rules.fly_over:
+        return np.zeros(path.shape[0])
     tangents = turn_tangents(rules.aircraft, path)
     count = path.shape[0]
     fits = np.ones(count, dtype=np.bool_)

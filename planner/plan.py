@@ -73,7 +73,9 @@ class Plan:
     on the paper's six points a leg, whatever the search looked at.  feasible: no violations and a clean certificate.
     safe: feasible, and outside every missile sphere.
     history: (g, 3) after each generation, of the best path yet: length ratio, kill exposure and violations (the
-    graded algorithms count kinds of violations).
+    graded algorithms count kinds of violations).  ended: "completed", or why the search ended before: "budget",
+    "interrupted".  flown_legs: legs at the beginning that an earlier plan had and that are flown; the certificate is
+    of what follows them.
     """
 
     scenario: Scenario
@@ -85,6 +87,8 @@ class Plan:
     algorithm: str
     evaluations: int
     history: Floats
+    ended: str = "completed"
+    flown_legs: int = 0
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -132,6 +136,8 @@ class _PlanFile(_Model):
     algorithm: str
     seed: Annotated[int, Field(ge=0)]
     evaluations: Annotated[int, Field(ge=0)]
+    ended: Literal["completed", "budget", "interrupted"] = "completed"
+    flown_legs: Annotated[int, Field(ge=0)] = 0
     feasible: bool
     safe: bool
     waypoints_east_north_amsl_m: Annotated[
@@ -155,6 +161,8 @@ def plan_json(plan: Plan) -> str:
         "algorithm": plan.algorithm,
         "seed": plan.seed,
         "evaluations": plan.evaluations,
+        "ended": plan.ended,
+        "flown_legs": plan.flown_legs,
         "feasible": plan.feasible,
         "safe": plan.safe,
         "waypoints_east_north_amsl_m": plan.waypoints.tolist(),
@@ -218,6 +226,8 @@ def parse_plan(
         algorithm=file.algorithm,
         evaluations=file.evaluations,
         history=history,
+        ended=file.ended,
+        flown_legs=file.flown_legs,
     )
 
 

@@ -70,6 +70,9 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     for level in levels:
         raised = np.ascontiguousarray(np.maximum(scores[:, list(level.columns)], np.array(level.goals)))
         group = _count_level(raised, group, total)
+        if group.size and int(group.max()) == group.size - 1:
+            # No two rows are equal: lower levels have nothing to decide.
+            return total
     lowest = np.ascontiguousarray(scores[:, list(levels[-1].columns)])
     _count_level(lowest, group, total)
     return total
@@ -79,10 +82,13 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
 def _count_level(values: Floats, group: Ints, total: Ints) -> Ints:  # pragma: no cover - compiled
     """Add to total the dominators of each row within its group; return groups split by equal rows."""
     count, width = values.shape
+    if count == 0:
+        return group
     order = np.arange(count)
     for column in range(width - 1, -1, -1):
         order = order[np.argsort(values[order, column], kind="mergesort")]
-    order = order[np.argsort(group[order], kind="mergesort")]
+    if group.max() > 0:
+        order = order[np.argsort(group[order], kind="mergesort")]
     split = np.empty(count, dtype=np.int64)
     # Distinct rows in sorted order: the position of their first member, closed by count.
     firsts = np.empty(count + 1, dtype=np.int64)

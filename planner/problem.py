@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.cells import make_cells
 from planner.encoding import Space
-from planner.rules import Rules
+from planner.rules import CORNER_SLACK, Rules
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
+from world.terrain import steepest_slope
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +29,8 @@ SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
 CERTIFIED_SLACK = 0.75
 # More reserve for each attempt after the first, m: the search had not seen all ground between its samples.
 ATTEMPT_RESERVE = 5.0
+# Of the aircraft's steepest climb and dive, the share that a plan uses: holding a path in gusts takes the rest.
+TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
 # m inside the map, and inside floor and ceiling, that a search keeps where the fixed ends do.
 MAP_MARGIN, HEIGHT_MARGIN = 10.0, 4.0
 
@@ -81,6 +85,9 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         left = above - limits.min_clearance - 0.01
         return reserve if left >= reserve else share * max(0.0, left)
 
+    reach = np.maximum(threats.kill_radius, threats.detection_radius)
+    armed = np.where(threats.kill_radius > 0.0, threats.kill_radius + kill_margin, 0.0)
+
     def or_nan(value: float | None) -> float:
         return math.nan if value is None else float(value)
 
@@ -88,7 +95,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.packed,
         threats=units,
-        aircraft=limits.packed(),
+        aircraft=_with_share(limits, scenario.wind.turbulence),
         bounds=scenario.bounds,
         start=scenario.start,
         destination=scenario.destination,
@@ -96,6 +103,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         ceiling=float(scenario.ceiling),
         max_turn=AIRCRAFT_TURN if limits.max_turn is None else limits.max_turn - SPARE,
         room=limits.max_turn is None,
+        fly_over=scenario.flight.fly_over,
         climb=or_nan(limits.max_climb),
         dive=or_nan(limits.max_dive),
         spare=SPARE,
@@ -107,7 +115,20 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         destination_course=or_nan(scenario.destination_course),
         start_slack=slack(scenario.start),
         destination_slack=slack(scenario.destination),
+        near=make_cells(threats.position, reach, scenario.bounds),
+        # Half a cell's side on either side of points that stand a side apart.
+        missiles=make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK),
+        steepest=float(steepest_slope(terrain.heights, terrain.spacing)),
     )
+
+
+def _with_share(limits: Limits, turbulence: str) -> Floats:
+    """Packed aircraft of which a plan uses the share of climb and dive that turbulence leaves."""
+    packed = limits.packed()
+    angles = packed[1:, 8:]
+    # What is below 0 is a loss of height, of which no share helps.
+    packed[1:, 8:] = np.where(angles > 0.0, TURBULENCE_SHARE[turbulence] * angles, angles)
+    return packed
 
 
 def _inset(rules: Rules) -> Rules:

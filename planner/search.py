@@ -1,21 +1,24 @@
-"""Running an algorithm on a scenario: evaluation, archive, escalation, and the plan that comes of it."""
+"""Running an algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.algorithms import Algorithm, find_algorithm
-from planner.certify import certify, kill_distance
-from planner.criteria import graded_scores, paper_scores
-from planner.encoding import ENCODINGS, Encoding, rotated_vectors
+from planner.algorithms import find_algorithm
+from planner.certify import kill_distance
+from planner.chain import Chain
+from planner.criteria import paper_scores
+from planner.differential import Differential
+from planner.emna import Emna
+from planner.encoding import ENCODINGS, rotated_vectors
 from planner.plan import Certificate, Plan
 from planner.preference import NO_GOAL, Level, ranks
-from planner.problem import CERTIFIED_KILL_MARGIN, Problem, make_problem
+from planner.problem import CERTIFIED_KILL_MARGIN, make_problem
+from planner.run import ARCHIVE_LEVELS, DETECTION, HEIGHT, KILL, LENGTH, VIOLATIONS, Archive, Progress, Run, Stop
 from planner.sampling import bridge_basis, first_samples
-from planner.seeding import seeds
+from planner.seeding import routes
 from planner.umda import Umda
 from world.errors import ScenarioError
 from world.limits import Limits
@@ -24,69 +27,22 @@ from world.streams import PLANNER, stream
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Progress = Callable[[int, int, str], None]
 
-# Columns of the scores that a search ranks: four violations, then the four objectives.
-VIOLATIONS = Level((0, 1, 2, 3), (0.0, 0.0, 0.0, 0.0))
-LENGTH, KILL, DETECTION, HEIGHT = 4, 5, 6, 7
-# The order of the archive: what meets the constraints, then least kill exposure, then the shortest.
-ARCHIVE_LEVELS = (VIOLATIONS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
-ARCHIVE_SIZE = 24
-# Of each attempt: stages of its grids, routes from each, and the population's growth.
-ATTEMPTS = (((52, 80), 2, 1), ((110, 66), 3, 2), ((160, 96), 3, 3))
-# A seeded search ends when this many generations have not shortened its best path by 1e-5.
-PATIENCE = 25
+# Of each attempt: stages of its grids with the routes from each, and the population's growth.
+ATTEMPTS = (
+    (((36, 2), (66, 1), (130, 1)), 1),
+    (((24, 3), (52, 3), (80, 3), (110, 2)), 2),
+    (((44, 3), (96, 3), (160, 2)), 3),
+)
+# A seeded search ends when this many generations have shortened its best path by less than this share of the straight
+# line: the polish at the end is faster at the rest.
+PATIENCE, GAIN = 10, 2e-4
+# Of the evaluations that the paper's planner makes, the share that a seeded search spends before its last polish.
+SHARE = 0.3
+# Evaluations that each seed, and the best path at the end, are polished with, at most.
+SEED_POLISH, LAST_POLISH = 500, 2500
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
-
-
-@dataclass(slots=True)
-class _Archive:
-    """The best paths of all that were evaluated, best first."""
-
-    vectors: Floats
-    scores: Floats
-
-    def take(self, vectors: Floats, scores: Floats) -> None:
-        """Let new rows in; equal ranks keep their order, older first."""
-        every = np.concatenate([self.scores, scores])
-        rows = np.concatenate([self.vectors, vectors])
-        order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
-        self.vectors, self.scores = rows[order], every[order]
-
-
-@dataclass(slots=True)
-class _Run:
-    """What attempts share: how much was evaluated, and what was seen after each generation."""
-
-    problem: Problem
-    algorithm: Algorithm
-    encoding: Encoding
-    rng: np.random.Generator
-    progress: Progress | None
-    archive: _Archive
-    evaluations: int = 0
-    done: int = 0
-    history: list[tuple[float, float, float]] = field(default_factory=list)
-
-    def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive sees them."""
-        paths = np.ascontiguousarray(self.encoding.decode(vectors))
-        violations: NDArray[np.generic]
-        if self.algorithm.graded:
-            violations, objectives = graded_scores(self.problem.search, paths)
-        else:
-            violations, objectives = paper_scores(self.problem.search, paths)
-        scores = np.concatenate([violations.astype(np.float64), objectives], axis=1)
-        self.evaluations += len(vectors)
-        self.archive.take(vectors, scores)
-        return scores
-
-    def note(self) -> None:
-        """Add the archive's best to the history."""
-        best = self.archive.scores[0]
-        missed = np.count_nonzero(best[:4]) if self.algorithm.graded else best[:4].sum()
-        self.history.append((best[LENGTH], best[KILL], float(missed)))
 
 
 def plan_path(
@@ -96,37 +52,27 @@ def plan_path(
     seed: int,
     algorithm: str | None = None,
     progress: Progress | None = None,
+    stop: Stop | None = None,
+    first_safe: bool = False,
+    previous: Floats | None = None,
 ) -> Plan:
     """Plan a path.  The same scenario, limits, algorithm and seed give the same plan.
 
     algorithm: a name of `planner.algorithms`; None takes the scenario's, or the default.  progress: called with
-    generations done, generations in all, and a short text.  No feasible path is a plan that says so.
-    Raises ScenarioError for options that cannot work.
+    generations done, generations in all, and a short text.  stop: asked between generations; a text such as
+    "interrupted" ends the search with the best path yet, and stands in the plan.  first_safe: end with the first
+    safe path.  previous: (w, 3) an older path of the same ends and number of waypoints to start from.
+    No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario)
     problem = make_problem(scenario, limits)
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
-    empty = _Archive(np.empty((0, encoding.lower.size)), np.empty((0, 8)))
-    run = _Run(problem, chosen, encoding, stream(seed, PLANNER), progress, empty)
     # No path is further from a missile's sphere than its own ends are.
-    ends = kill_distance(problem.certified, np.stack([scenario.start, scenario.start]))
-    ends = min(ends, kill_distance(problem.certified, np.stack([scenario.destination, scenario.destination])))
+    ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
-    attempts = ATTEMPTS if chosen.seeded else ATTEMPTS[:1]
-    best: tuple[Floats, Certificate] | None = None
-    for number in range(len(attempts)):
-        if number > 0:
-            _retry(run, number)
-        _attempt(run, number)
-        best = _best_certified(run)
-        if best[1].ok and best[1].kill_distance >= wanted:
-            break
-        if _spent(run):
-            break
-    if best is None:  # pragma: no cover - the loop always runs
-        raise ScenarioError(f"{scenario.name}: planner: nothing was tried")
-    waypoints, certificate = best
+    run = Run(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted)
+    waypoints, certificate = _attempts(run, previous)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,
@@ -138,7 +84,27 @@ def plan_path(
         algorithm=chosen.name,
         evaluations=run.evaluations,
         history=np.array(run.history).reshape(-1, 3),
+        ended=run.ended,
     )
+
+
+def _attempts(run: Run, previous: Floats | None) -> tuple[Floats, Certificate]:
+    """Search, and search again with finer grids and more samples while the certificate says no."""
+    attempts = ATTEMPTS if run.algorithm.seeded else ATTEMPTS[:1]
+    best: tuple[Floats, Certificate] | None = None
+    for number in range(len(attempts)):
+        if number > 0:
+            _retry(run, number)
+        _attempt(run, number, previous)
+        found = run.best_certified()
+        # An earlier attempt's is kept where a later one has nothing better.
+        if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
+            best = found
+        if run.finished(best[1]) or run.over():
+            break
+    if best is None:  # pragma: no cover - the loop always runs
+        raise ScenarioError(f"{run.problem.scenario.name}: planner: nothing was tried")
+    return best
 
 
 def _check_options(scenario: Scenario) -> None:
@@ -163,99 +129,118 @@ def _check_options(scenario: Scenario) -> None:
             )
 
 
-def _spent(run: _Run) -> bool:
-    budget = run.problem.scenario.planner.budget
-    return budget is not None and run.evaluations >= budget
-
-
-def _levels(run: _Run) -> tuple[Level, ...]:
+def _levels(run: Run) -> tuple[Level, ...]:
     """Preference that ranks a population; goals are the scenario's, none by default."""
     goals = run.problem.scenario.planner.goals
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
-    last = Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
     if run.algorithm.graded:
-        return VIOLATIONS, Level((KILL,), (kill,)), Level((LENGTH,), (length,)), last
-    return VIOLATIONS, Level((LENGTH, KILL), (length, kill)), last
+        return VIOLATIONS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
+    return VIOLATIONS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 
 
-def _retry(run: _Run, number: int) -> None:
+def _retry(run: Run, number: int) -> None:
     """Take more reserve, and judge again what the archive holds."""
     run.problem = make_problem(run.problem.scenario, run.problem.limits, number)
     vectors = run.archive.vectors
-    run.archive = _Archive(vectors[:0], np.empty((0, 8)))
+    run.archive = Archive(vectors[:0], np.empty((0, 8)))
     run.evaluate(vectors)
 
 
-def _attempt(run: _Run, number: int) -> None:
+def _attempt(run: Run, number: int, previous: Floats | None) -> None:
     """One search from its first population to its last generation."""
     table = run.problem.scenario.planner
-    stages, each, growth = ATTEMPTS[number]
+    grids, growth = ATTEMPTS[number]
     population = table.population * growth
     encoding, algorithm = run.encoding, run.algorithm
-    starts = np.empty((0, encoding.lower.size))
-    if algorithm.seeded:
-        if run.progress is not None:
-            run.progress(run.done, run.done + table.generations, "grid routes")
-        span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-        paths = seeds(run.problem.search, span, table.waypoints, stages, each)
-        if paths:
-            # Marginals over several routes at once fit none of them: the best one leads.
-            starts = rotated_vectors(run.problem.space, encoding, np.array(paths))
-        starts = _best(run, np.concatenate([starts, run.archive.vectors]), 1)
+    before = run.evaluations
+    starts = _starts(run, grids, previous)
+    if len(run.archive.scores) and (run.safe_already() or run.over()):
+        run.note()
+        return
     levels = _levels(run)
-    basis = bridge_basis(table.waypoints - 2) if algorithm.smooth else None
     initial = first_samples(run.problem.space, encoding, population, starts, run.rng) if algorithm.smooth else None
-    lower, upper = encoding.lower, encoding.upper
-    search = Umda(lower, upper, lambda scores: ranks(scores, levels), population, run.rng, initial=initial, basis=basis)
+    search = _optimiser(run, lambda scores: ranks(scores, levels), population, initial)
     search.tell(run.evaluate(search.ask()))
     run.note()
-    stale = 0
+    bests = [_first(search.scores)]
+    most = before + SHARE * (population + table.generations * (population // 2))
     for generation in range(table.generations):
-        if _spent(run) or (algorithm.seeded and stale >= PATIENCE):
+        if run.over() or run.safe_already():
             break
-        before = run.archive.scores[0].copy()
+        if algorithm.seeded and (_settled(bests) or run.evaluations >= most):
+            break
         search.tell(run.evaluate(search.ask()))
         run.note()
-        stale = stale + 1 if _settled(before, run.archive.scores[0]) else 0
+        bests.append(_first(search.scores))
         run.done += 1
+        run.report(table.generations - generation - 1)
+    if algorithm.seeded and run.ended == "completed":
+        # What the generations came to, polished, may be another way than the polished seed's.
+        order = np.argsort(ranks(_known(search.scores), ARCHIVE_LEVELS), kind="stable")
+        run.polish(search.samples[order[0]], LAST_POLISH)
+        run.polish(run.archive.vectors[0], LAST_POLISH)
+        run.note()
+
+
+def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
+    """Vectors (n, d) that a search starts from: the seed that comes out best when polished, and the older path.
+
+    Marginals over several routes at once fit none of them: one leads.  It leads as it was: polished it stands so close
+    to every limit that hardly a sample near it keeps them.
+    """
+    encoding, space, waypoints = run.encoding, run.problem.space, run.encoding.waypoints
+    if encoding.name != "rotated" or (not run.algorithm.seeded and previous is None):
+        return np.empty((0, encoding.lower.size))
+    starts = list(run.archive.vectors[:1])
+    older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
+    starts += older
+    polished = [run.polish(vector, SEED_POLISH) for vector in starts]
+    if run.algorithm.seeded:
         if run.progress is not None:
-            run.progress(run.done, run.done + table.generations - generation - 1, _status(run.archive.scores[0]))
+            run.progress(run.done, run.done + run.problem.scenario.planner.generations, "grid routes")
+        span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
+        found = (routes(run.problem.search, span, waypoints, (stages,), each) for stages, each in grids)
+        for path in chain.from_iterable(found):
+            starts.append(rotated_vectors(space, encoding, path[None])[0])
+            polished.append(run.polish(starts[-1], SEED_POLISH))
+            if run.over() or run.safe_already():
+                break
+    if not starts:
+        return np.empty((0, encoding.lower.size))
+    order = np.argsort(ranks(np.array(polished), ARCHIVE_LEVELS), kind="stable")
+    return np.array([starts[order[0]], *older])
 
 
-def _best(run: _Run, vectors: Floats, count: int) -> Floats:
-    """Best rows of some vectors, in the archive's order."""
-    if not len(vectors):
-        return vectors
-    order = np.argsort(ranks(run.evaluate(vectors), ARCHIVE_LEVELS), kind="stable")
-    return np.asarray(vectors[order[:count]])
+def _known(scores: Floats | None) -> Floats:
+    return np.empty((0, 8)) if scores is None else scores
 
 
-def _settled(before: Floats, after: Floats) -> bool:
+def _first(scores: Floats | None) -> Floats:
+    """Best row (8,) of a population's scores, in the archive's order."""
+    known = _known(scores)
+    return np.asarray(known[int(np.argmin(ranks(known, ARCHIVE_LEVELS)))])
+
+
+def _optimiser(
+    run: Run, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
+) -> Umda | Differential:
+    """Make the optimiser that the algorithm names."""
+    lower, upper = run.encoding.lower, run.encoding.upper
+    if run.algorithm.optimiser == "differential":
+        return Differential(lower, upper, rank, population, run.rng, initial=initial)
+    if run.algorithm.optimiser == "emna":
+        return Emna(lower, upper, rank, population, run.rng, initial=initial)
+    if run.algorithm.optimiser == "chain":
+        return Chain(lower, upper, rank, population, run.rng, initial=initial)
+    basis = bridge_basis(run.encoding.waypoints - 2) if run.algorithm.smooth else None
+    return Umda(lower, upper, rank, population, run.rng, initial=initial, basis=basis)
+
+
+def _settled(bests: list[Floats]) -> bool:
+    """Whether the last generations have gained next to nothing."""
+    if len(bests) <= PATIENCE:
+        return False
+    before, after = bests[-1 - PATIENCE], bests[-1]
     same = np.array_equal(before[:4], after[:4]) and before[KILL] == after[KILL]
-    return bool(same and before[LENGTH] - after[LENGTH] < 1e-5)
-
-
-def _status(best: Floats) -> str:
-    if best[:4].any():
-        return "no feasible path yet"
-    return f"length ratio {best[LENGTH]:.4f}, kill exposure {best[KILL]:.3g}"
-
-
-def _best_certified(run: _Run) -> tuple[Floats, Certificate]:
-    """First of the archive that is certified and out of reach; or certified and farthest; or the first."""
-    paths = np.ascontiguousarray(run.encoding.decode(run.archive.vectors))
-    first: tuple[Floats, Certificate] | None = None
-    reachable: tuple[Floats, Certificate] | None = None
-    for path in paths:
-        certificate = certify(run.problem, path)
-        if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
-            return path, certificate
-        first = first or (path, certificate)
-        least = -math.inf if reachable is None else reachable[1].kill_distance
-        if certificate.ok and certificate.kill_distance > least:
-            reachable = (path, certificate)
-    result = reachable or first
-    if result is None:  # pragma: no cover - an archive is never empty after an attempt
-        raise ScenarioError(f"{run.problem.scenario.name}: planner: nothing was evaluated")
-    return result
+    return bool(same and before[LENGTH] - after[LENGTH] < GAIN)

@@ -1,33 +1,36 @@
 """Seeds from coarse grids: a shortest way through terrain and threats in the rotated frame, stage by stage.
 
-The grid picks the side of each obstacle; `fit_waypoints` then puts the path's waypoints, one an interval, where
+The grid picks the side of each obstacle; `planner.fitting` then puts the path's waypoints, one an interval, where
 whole legs are judged.  Both are dynamic programmes over forward steps: a path that the rotated encoding can
 hold never turns back.
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
-from planner.criteria import exposures, required_clearance, slope_excess, slope_limits, terrain_excess
 from planner.encoding import Frame, rotated_frame
+from planner.fitting import KILL_COST, fit_waypoints
+from planner.legs import pack_clearance, required_clearance, slope_limits
 from planner.rules import Rules
 from world.terrain import ground_height
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Cost of a m inside a kill sphere, of a m of depth x km, and of a unit of slope excess, in m of path.
-KILL_COST = 40.0
-DEPTH_COST = 2e4
-SLOPE_COST = 1e6
+# Steps between stages longer than this (m) are coarse: kill spheres grow there by this share of a step, for what lies
+# between the cells.  Finer grids keep them as they are, and find the narrow gaps.
+COARSE, COARSE_GROWTH = 250.0, 0.15
 # Steps across a grid's cell that one stage forward may make.
 SIDEWAYS = 3
-# Pitch of the layers, as a share of the pitch along.
-LAYER = 0.05
+# Pitch of the layers, as a share of the pitch along: what the gentler slope limit climbs or sinks in a step, over this,
+# and between these.
+LAYERS_A_STEP = 2.5
+LOW_LAYER, HIGH_LAYER = 0.05, 0.12
 # Cells of one grid, at most: stages x across x layers.
 MOST_CELLS = 1_200_000
 
@@ -47,9 +50,12 @@ def make_grid(rules: Rules, frame: Frame, span: tuple[float, float], stages: int
     The pitch grows where the grid would get too large.
     """
     low, high = max(rules.floor, float(np.nanmin(rules.heights))), rules.ceiling
+    ends = np.stack([rules.start, rules.destination])
+    share = math.tan(max(0.0, min(slope_limits(rules, ends[0], np.array([*ends[1, :2], ends[0, 2]])))))
+    share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_A_STEP))
     while True:
         step = frame.length / stages
-        layer = LAYER * step
+        layer = share * step
         below, above = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-below, above + 1) * step
         up = np.arange(math.ceil((low - rules.start[2]) / layer), math.floor((high - rules.start[2]) / layer) + 1)
@@ -92,6 +98,7 @@ def _place(packed: Floats, along: float, across: float) -> tuple[float, float]: 
 def _floors(rules: Rules, packed: Floats, stages: int, across: Floats) -> Floats:  # pragma: no cover - compiled
     """Lowest height allowed in each cell (stages + 1, across): highest ground on 3 x 3 samples, plus clearance."""
     step = packed[4] / stages
+    clear = pack_clearance(rules)
     out = np.empty((stages + 1, across.size))
     for s in range(stages + 1):
         for y in range(across.size):
@@ -104,7 +111,7 @@ def _floors(rules: Rules, packed: Floats, stages: int, across: Floats) -> Floats
                     ground = ground_height(rules.heights, rules.to_pixel, east, north)
                     if math.isnan(ground):
                         ground = math.inf
-                    worst = max(worst, ground + required_clearance(rules, east, north))
+                    worst = max(worst, ground + required_clearance(clear, east, north))
             east, north = _place(packed, s * step, across[y])
             west, south = rules.bounds[0, 0], rules.bounds[1, 0]
             if not (west <= east <= rules.bounds[0, 1] and south <= north <= rules.bounds[1, 1]):
@@ -123,7 +130,7 @@ def _danger(
         radius = rules.threats[k, 3]
         if radius <= 0.0:
             continue
-        radius += rules.kill_margin + 0.15 * step
+        radius += rules.kill_margin + (COARSE_GROWTH * step if step > COARSE else 0.0)
         for y in range(across.size):
             east, north = _place(packed, stage * step, across[y])
             flat2 = (east - rules.threats[k, 0]) ** 2 + (north - rules.threats[k, 1]) ** 2
@@ -214,88 +221,11 @@ def _dynamic(
     return cells
 
 
-@compiled
-def leg_cost(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
-    """Cost of one leg, in m of path: its length and what it violates."""
-    length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-    steep = slope_excess(rules, a, b)
-    depth, _ = terrain_excess(rules, a, b)
-    total = length + SLOPE_COST * steep + DEPTH_COST * depth
-    kill, _ = exposures(rules, a, b)
-    if kill > 0.0:
-        total += KILL_COST * length * min(1.0, 0.1 + kill)
-    return total
-
-
-@compiled
-def _choose(rules: Rules, candidates: Floats) -> Ints:  # pragma: no cover - compiled
-    """Which of the candidates (w, c, 3) world m to take at each waypoint, so that the legs cost least."""
-    count, width, _ = candidates.shape
-    came = np.zeros((count, width), dtype=np.int64)
-    cost = np.zeros(width)
-    for i in range(1, count):
-        after = np.full(width, np.inf)
-        for k in range(width):
-            for j in range(width):
-                if cost[j] == np.inf:
-                    continue
-                a, b = candidates[i - 1, j], candidates[i, k]
-                # No leg costs less than its length.
-                least = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-                if cost[j] + least >= after[k]:
-                    continue
-                total = cost[j] + leg_cost(rules, a, b)
-                if total < after[k]:
-                    after[k] = total
-                    came[i, k] = j
-                if i == 1:
-                    break
-            if i == count - 1:
-                break
-        cost = after
-    out = np.zeros(count, dtype=np.int64)
-    for i in range(count - 1, 0, -1):
-        out[i - 1] = came[i, out[i]]
-    return out
-
-
-def fit_waypoints(rules: Rules, frame: Frame, route: Floats, waypoints: int, rounds: int = 2) -> Floats:
-    """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one an interval, tight as whole legs allow."""
-    edges = np.linspace(0.0, frame.length, waypoints - 1)
-    shares = np.linspace(0.1, 0.9, 9)
-    height = 20.0
-    candidates = np.empty((waypoints, shares.size * 3, 3))
-    for i in range(waypoints - 2):
-        along = edges[i] + shares * (edges[i + 1] - edges[i])
-        points = np.column_stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))])
-        for k, lift in enumerate((0.0, height, 3.0 * height)):
-            candidates[i + 1, k * shares.size : (k + 1) * shares.size] = points + np.array([0.0, 0.0, lift])
-    chosen = _pick(rules, frame, candidates)
-    span = edges[1] - edges[0]
-    offsets = np.array([[a, b, c] for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)], dtype=np.float64)
-    reach = np.array([0.25 * span, 0.2 * span, 40.0])
-    for _ in range(rounds):
-        candidates = np.repeat(chosen[:, None, :], len(offsets), axis=1)
-        candidates[1:-1] += offsets * reach
-        low, high = edges[:-1, None], edges[1:, None]
-        candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
-        candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], rules.floor, rules.ceiling)
-        chosen = _pick(rules, frame, candidates)
-        reach *= 0.7
-    return frame.restore(chosen)
-
-
-def _pick(rules: Rules, frame: Frame, candidates: Floats) -> Floats:
-    """Chosen candidates (w, 3), in rotated axes, the ends fixed."""
-    candidates[0], candidates[-1] = frame.rotate(rules.start), frame.rotate(rules.destination)
-    chosen = _choose(rules, np.ascontiguousarray(frame.restore(candidates)))
-    return candidates[np.arange(len(candidates)), chosen]
-
-
-def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int) -> list[Floats]:
-    """Seed paths (w, 3) world m: up to `each` different routes from a grid of each number of stages."""
+def routes(
+    rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int
+) -> Iterator[Floats]:
+    """Seed paths (w, 3) world m: up to `each` different routes from a grid of each number of stages, as found."""
     frame = rotated_frame(rules.start, rules.destination)
-    found: list[Floats] = []
     for number in stages:
         grid = make_grid(rules, frame, span, number)
         used: list[Floats] = []
@@ -304,5 +234,9 @@ def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple
             if route is None:
                 break
             used.append(route)
-            found.append(fit_waypoints(rules, frame, route, waypoints))
-    return found
+            yield fit_waypoints(rules, frame, route, waypoints)
+
+
+def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int) -> list[Floats]:
+    """All of `routes`."""
+    return list(routes(rules, span, waypoints, stages, each))

@@ -7,6 +7,7 @@ they stand for.
 from collections.abc import Callable
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
@@ -68,10 +69,20 @@ class Umda:
         mean, deviation = kept.mean(axis=0), kept.std(axis=0)
         if self._floor is not None:
             deviation = np.maximum(deviation, self._floor)
-        drawn = self._rng.normal(mean, deviation, (count, mean.size))
         if self._basis is None:
-            return self._redraw_each(drawn, mean, deviation)
-        return self._redraw_rows(drawn, mean, deviation, self._basis)
+            return self._redraw_each(self._rng.normal(mean, deviation, (count, mean.size)), mean, deviation)
+        back = self._basis.T
+        return self._redraw(lambda rows: _project(self._rng.normal(mean, deviation, (rows, mean.size)), back), count)
+
+    def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
+        """Rows of `draw`; those outside the box are drawn again, and then clipped."""
+        out = draw(count)
+        for _ in range(REDRAWS):
+            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
+            if rows.size == 0:
+                return out
+            out[rows] = draw(rows.size)
+        return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
         for _ in range(REDRAWS):
@@ -81,16 +92,29 @@ class Umda:
             drawn[rows, columns] = self._rng.normal(mean[columns], deviation[columns])
         return np.clip(drawn, self.lower, self.upper)
 
-    def _redraw_rows(self, drawn: Floats, mean: Floats, deviation: Floats, basis: Floats) -> Floats:
-        out = _project(drawn, basis.T)
-        for _ in range(REDRAWS):
-            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
-            if rows.size == 0:
-                return out
-            out[rows] = _project(self._rng.normal(mean, deviation, (rows.size, mean.size)), basis.T)
-        return np.clip(out, self.lower, self.upper)
-
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    # einsum without optimisation sums in a fixed order; BLAS may not, and a plan must not depend on the machine.
-    return np.asarray(np.einsum("nd,dk->nk", rows, basis, optimize=False))
+    return _product(np.ascontiguousarray(rows), np.ascontiguousarray(basis))
+
+
+@njit(cache=True)
+def _product(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
+    """Rows (n, d) times a basis (d, k) of which most entries are 0."""
+    # In a fixed order: BLAS sums as the machine has it, and the result must not depend on the machine.
+    size = basis.shape[1]
+    entries = np.empty((size, basis.shape[0]), dtype=np.int64)
+    filled = np.zeros(size, dtype=np.int64)
+    for k in range(size):
+        for d in range(basis.shape[0]):
+            if basis[d, k] != 0.0:
+                entries[k, filled[k]] = d
+                filled[k] += 1
+    out = np.empty((rows.shape[0], size))
+    for n in range(rows.shape[0]):
+        for k in range(size):
+            total = 0.0
+            for entry in range(filled[k]):
+                d = entries[k, entry]
+                total += rows[n, d] * basis[d, k]
+            out[n, k] = total
+    return out

@@ -111,7 +111,7 @@ def fit_polymap(
         packed = np.zeros((2 + 2 * size, size))
         packed[0, :2], packed[1, :2] = centre, half
         for block, values in enumerate(wanted):
-            solution = np.linalg.lstsq(basis, values, rcond=None)[0]
+            solution = _least_squares(basis, np.ascontiguousarray(values, dtype=np.float64))
             for (i, j), coefficient in zip(powers, solution, strict=True):
                 packed[2 + block * size + i, j] = coefficient
         got = _polymap_many(packed, centre[0] + half[0] * check_u, centre[1] + half[1] * check_v)
@@ -123,6 +123,35 @@ def fit_polymap(
     if best is None:  # pragma: no cover - the loop always runs
         raise ValueError("no polynomial was fitted")
     return best
+
+
+@compiled
+def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover - compiled
+    """Coefficients (k,) that bring basis (n, k) closest to values (n,): modified Gram-Schmidt."""
+    # By hand: LAPACK rounds as the machine has it, and a plan must not depend on the machine.
+    count, size = basis.shape
+    q, r = basis.copy(), np.zeros((size, size + 1))
+    rest = values.copy()
+    for k in range(size):
+        norm = 0.0
+        for n in range(count):
+            norm += q[n, k] * q[n, k]
+        for j in range(k + 1, size + 1):
+            dot = 0.0
+            for n in range(count):
+                dot += q[n, k] * (q[n, j] if j < size else rest[n])
+            r[k, j] = dot / norm
+            for n in range(count):
+                if j < size:
+                    q[n, j] -= r[k, j] * q[n, k]
+                else:
+                    rest[n] -= r[k, j] * q[n, k]
+    out = np.zeros(size)
+    for k in range(size - 1, -1, -1):
+        out[k] = r[k, size]
+        for j in range(k + 1, size):
+            out[k] -= r[k, j] * out[j]
+    return out
 
 
 @compiled

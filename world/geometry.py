@@ -130,8 +130,19 @@ def segment_exposure(
         length2 += step * step
         along += step * out
         start2 += out * out
+    return leave - enter, window_exposure(enter, leave, length2, along, start2, scale)
+
+
+@compiled
+def window_exposure(
+    enter: float, leave: float, length2: float, along: float, start2: float, scale: float
+) -> float:  # pragma: no cover - compiled
+    """Mean over a whole segment of (scale/d)^4 between two fractions of it: the integral of `segment_exposure`.
+
+    length2: squared length.  along: step times (start - centre).  start2: squared distance of the start.
+    """
     if length2 < 1e-12:
-        return leave - enter, (leave - enter) * scale**4 / max(start2, CLOSEST * CLOSEST) ** 2
+        return (leave - enter) * scale**4 / max(start2, CLOSEST * CLOSEST) ** 2
     length = math.sqrt(length2)
     middle = -along / length2
     h = math.sqrt(max(CLOSEST * CLOSEST, start2 - middle * middle * length2))
@@ -140,4 +151,4 @@ def segment_exposure(
     piece = s2 - s1
     first = piece * (h * h - s1 * s2) / ((h * h + s1 * s1) * (h * h + s2 * s2))
     total = (first + math.atan2(h * piece, h * h + s1 * s2) / h) / (2.0 * h * h)
-    return leave - enter, scale**4 * total / length
+    return scale**4 * total / length

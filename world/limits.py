@@ -93,25 +93,60 @@ def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pra
 
 
 @compiled
-def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
+def downwind(packed: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+    """East and north of the unit vector that the wind blows towards."""
+    return math.sin(packed[0, 3]), math.cos(packed[0, 3])
+
+
+@compiled
+def slopes_along(
+    packed: Floats, tail_share: float, cross_share: float, amsl: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Steepest climb and dive over the ground, rad, with these shares of the wind along and across the course."""
     count = int(packed[0, 6])
     wind = wind_speed_at(packed, amsl)
-    angle = packed[0, 3] - course
-    tail, cross = wind * math.cos(angle), wind * math.sin(angle)
-    heights = packed[0, 8 : 8 + count]
     k = 0
-    while k + 2 < count and heights[k + 1] <= amsl:
+    while k + 2 < count and packed[0, 9 + k] <= amsl:
         k += 1
     # By hand: numba's np.interp of one number costs a microsecond.
-    share = min(1.0, max(0.0, (amsl - heights[k]) / (heights[k + 1] - heights[k])))
+    share = min(1.0, max(0.0, (amsl - packed[0, 8 + k]) / (packed[0, 9 + k] - packed[0, 8 + k])))
     climb = packed[1, 8 + k] + share * (packed[1, 9 + k] - packed[1, 8 + k])
     dive = packed[2, 8 + k] + share * (packed[2, 9 + k] - packed[2, 8 + k])
-    up = ground_slope(climb, packed[0, 0], tail, cross)
-    down = ground_slope(dive, packed[0, 0], tail, cross)
+    up = ground_slope(climb, packed[0, 0], wind * tail_share, wind * cross_share)
+    down = ground_slope(dive, packed[0, 0], wind * tail_share, wind * cross_share)
     if math.isnan(up) or math.isnan(down):
         return 0.0, 0.0
     return up, down
+
+
+@compiled
+def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
+    angle = packed[0, 3] - course
+    return slopes_along(packed, math.cos(angle), math.sin(angle), amsl)
+
+
+@compiled
+def _turn_radius(
+    packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
+) -> float:  # pragma: no cover - compiled
+    """Arc radius between the unit courses u and v; w: downwind; side: of the turn, 0 for one flown either way."""
+    wind = wind_speed_at(packed, amsl)
+    if wind == 0.0:
+        # No way to be blown: the same speed on every course.
+        fastest = packed[0, 0]
+    else:
+        before = ground_speed(packed[0, 0], wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
+        after = ground_speed(packed[0, 0], wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
+        if math.isnan(before) or math.isnan(after):
+            return math.inf
+        fastest = max(before, after)
+        # The highest ground speed is downwind, if the turn passes through that course.
+        if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
+            fastest = max(fastest, packed[0, 0] + wind)
+    fastest += packed[0, 7]
+    radius: float = fastest * fastest / (GRAVITY * packed[0, 1])
+    return radius
 
 
 @compiled
@@ -124,19 +159,53 @@ def turn_radius_between(
     over the ground takes, swings by that much.
     """
     turn = wrap(course_out - course_in)
-    before, after = ground_speed_on(packed, course_in, amsl), ground_speed_on(packed, course_out, amsl)
-    if math.isnan(before) or math.isnan(after):
-        return math.inf
-    fastest = max(before, after)
-    # The highest ground speed is downwind, if the turn passes through that course.
-    down = wrap(packed[0, 3] - course_in)
+    ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
+    wx, wy = downwind(packed)
     # A U-turn may be flown either way.
-    around = abs(turn) > math.pi - 1e-6
-    if around or (turn > 0.0 and 0.0 < down < turn) or (turn < 0.0 and turn < down < 0.0):
-        fastest = max(fastest, ground_speed_on(packed, packed[0, 3], amsl))
-    fastest += packed[0, 7]
-    radius: float = fastest * fastest / (GRAVITY * packed[0, 1])
-    return radius
+    side = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
+    return _turn_radius(packed, ux, uy, vx, vy, amsl, side, wx, wy)
+
+
+@compiled
+def corner_tangent(
+    packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Length of leg that the fly-by arc between the unit courses u and v takes on either side, and its radius, m.
+
+    R tan(theta/2) = R |sin| / (1 + cos); 0 for no turn, inf for a U-turn.  w: `downwind`.
+    """
+    cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
+    if abs(cross) < 1e-9 and dot > 0.0:
+        return 0.0, 0.0
+    if abs(cross) < 1e-6 and dot < 0.0:
+        return math.inf, 0.0
+    radius = _turn_radius(packed, ux, uy, vx, vy, amsl, cross, wx, wy)
+    return radius * abs(cross) / (1.0 + dot), radius
+
+
+@compiled
+def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
+    """Tangent of the slope along a fly-by arc: the heights of its tangent points over the arc's own length.
+
+    tan_in, tan_out: of the legs.  tangent = radius x tan(theta/2): the arc, radius x theta, is shorter than its two
+    tangents, and so steeper: by 1.27 at 90 degrees.
+    """
+    if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
+        return 0.0
+    half = math.atan(tangent / radius)
+    return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
+
+
+@compiled
+def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
+    """Run after a fly-over turn (rad), in radii; its greatest up to this angle, so that it never falls with the angle.
+
+    With overshoot angle phi, cos phi = (1 + cos turn)/2, the track is back on the leg after sin turn + 2 sin phi.
+    """
+    # Where sin turn + 2 sin phi is greatest, 2 sqrt 2.
+    sharpest = min(turn, math.acos(-1.0 / 3.0))
+    back = 0.5 * (1.0 + math.cos(sharpest))
+    return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
 
 
 @compiled
@@ -147,17 +216,11 @@ def turn_tangents(packed: Floats, waypoints: Floats) -> Floats:  # pragma: no co
     """
     count = waypoints.shape[0]
     out = np.zeros(count)
+    wx, wy = downwind(packed)
     for i in range(1, count - 1):
         ux, uy = waypoints[i, 0] - waypoints[i - 1, 0], waypoints[i, 1] - waypoints[i - 1, 1]
         vx, vy = waypoints[i + 1, 0] - waypoints[i, 0], waypoints[i + 1, 1] - waypoints[i, 1]
-        if ux * ux + uy * uy < 1e-12 or vx * vx + vy * vy < 1e-12:
-            continue
-        turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
-        if turn < 1e-9:
-            continue
-        if turn > math.pi - 1e-6:
-            out[i] = math.inf
-            continue
-        radius = turn_radius_between(packed, math.atan2(ux, uy), math.atan2(vx, vy), waypoints[i, 2])
-        out[i] = radius * math.tan(0.5 * turn)
+        u, v = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
+        if u > 1e-6 and v > 1e-6:
+            out[i], _ = corner_tangent(packed, ux / u, uy / u, vx / v, vy / v, waypoints[i, 2], wx, wy)
     return out

@@ -1,9 +1,9 @@
 """A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -307,6 +307,45 @@ def with_flight(scenario: Scenario, aircraft: str | None, airspeed: float | None
     table = scenario.spec.flight.model_dump() | changes
     flight = _checked(lambda: FlightTable(**table), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": flight}), flight=flight)
+
+
+def with_threats(
+    scenario: Scenario,
+    added: Sequence[tuple[float, float, float, float]],
+    source: str,
+    kept: Sequence[ThreatTable] = (),
+) -> Scenario:
+    """Make the same scenario with more threats on its ground: east, north, kill and detection radius (m; 0 for none).
+
+    Their scales are the median shares of the radius of those that the scenario has, or a quarter and a third.
+    source: names them in messages.  kept: tables that come before them.  Raises ScenarioError for a threat that a
+    scenario file may not have either.
+    """
+
+    def share(radius: Floats, scale: Floats, default: float) -> float:
+        armed = radius > 0.0
+        return float(np.median(scale[armed] / radius[armed])) if armed.any() else default
+
+    known = scenario.threats
+    kill_share = share(known.kill_radius, known.kill_scale, 1.0 / 4.0)
+    seen_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
+    tables = [*scenario.spec.threats, *kept]
+    for number, (east, north, kill, seen) in enumerate(added):
+        data: dict[str, Any] = {"name": f"pop-up {len(kept) + number + 1}", "east_m": east, "north_m": north}
+        if kill != 0.0:
+            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_share}
+        if seen != 0.0:
+            data |= {"detection_radius_m": seen, "detection_scale_m": seen * seen_share}
+        tables.append(_checked(partial(ThreatTable, **data), source))
+    spec = scenario.spec.model_copy(update={"threats": tables})
+    return replace(scenario, spec=spec, threats=_threats(tables, source, scenario.origin, scenario.terrain))
+
+
+def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
+    """Make the same scenario with other keys of [planner].  Raises ScenarioError as a file with them would."""
+    table = scenario.planner.model_dump() | changes
+    changed = _checked(lambda: PlannerTable(**table), source)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed}), planner=changed)
 
 
 def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:

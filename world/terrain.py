@@ -73,10 +73,28 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
     j = min(int(col), cols - 2)
     v = row - i
     u = col - j
-    top = heights[i, j] * (1.0 - u) + heights[i, j + 1] * u
-    low = heights[i + 1, j] * (1.0 - u) + heights[i + 1, j + 1] * u
+    # Unsigned: numba would look whether each index counts from the end.
+    above, below, left, right = np.uintp(i), np.uintp(i + 1), np.uintp(j), np.uintp(j + 1)
+    top = heights[above, left] * (1.0 - u) + heights[above, right] * u
+    low = heights[below, left] * (1.0 - u) + heights[below, right] * u
     height: float = top * (1.0 - v) + low * v
     return height
+
+
+@compiled
+def steepest_slope(heights: Heights, pitch: float) -> float:  # pragma: no cover - compiled
+    """Steepest slope that the bilinear ground can have, m per m, from the steps between pixels and their pitch (m)."""
+    rows, cols = heights.shape
+    worst = 0.0
+    for i in range(rows - 1):
+        for j in range(cols - 1):
+            across = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
+            down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
+            steep = across * across + down * down
+            # NaN compares as less.
+            if steep > worst:
+                worst = steep
+    return math.sqrt(worst) / pitch
 
 
 @compiled

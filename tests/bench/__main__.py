@@ -1,138 +1,48 @@
-"""``make bench``: ratios measured side by side in one run, printed as a table and written to ``runs/bench.json``."""
+"""``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
+``python -m tests.bench [chain] [planner] [peers] [--runs N] [--seconds S]``: parts to measure (default: all), seeds of
+each whole planner run (15), and what OMPL is given (10 s).
+"""
+
+import argparse
 import json
+import os
 import platform
-import subprocess
-import sys
-import tempfile
-import time
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
+# One thread each: a linear algebra library that spreads over the cores would not be compared, it would be fed.
+for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")
 
-from flight.export import plan_mission
-from flight.fdm import Fdm
-from flight.simulate import FDM_HZ, simulate
-from logs.check import judge_flight
-from logs.reader import read_log
-from logs.recorder import Recorder
-from planfly.pipeline import load_vehicle, make_plan, make_setup
-from world.scenario import load_scenario
-
-ROUNDS = 5
-
-
-def best(work: Callable[[], object], rounds: int = ROUNDS, clock: Callable[[], float] = time.perf_counter) -> float:
-    """The shortest of a few runs, s: the one that the machine disturbed least.
-
-    clock: `time.process_time` for what is compared with a share of something else, on a machine that others use.
-    """
-    spent = []
-    for _ in range(rounds):
-        started = clock()
-        work()
-        spent.append(clock() - started)
-    return min(spent)
+PARTS = ("chain", "planner", "peers")
+TARGET = Path("runs") / "bench.json"
 
 
 def main() -> None:
-    scenario = load_scenario("jacksboro")
-    vehicle = load_vehicle(scenario)
-    plan = make_plan(scenario, vehicle, 1)
-    mission = plan_mission(plan, vehicle.airspeed, vehicle.max_bank)
-    setup = make_setup(scenario, vehicle, mission, 1, plan=plan)
-    flown = simulate(setup, vehicle.aircraft)
-    seconds = float(flown.track.time[-1])
-    steps = round(seconds * FDM_HZ)
+    """Measure the parts asked for and keep what the file holds of the others."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("parts", nargs="*", default=[], help=f"of {', '.join(PARTS)}; default: all")
+    parser.add_argument("--runs", type=int, default=15, help="seeds of each whole planner run")
+    parser.add_argument("--seconds", type=float, default=10.0, help="what OMPL is given")
+    args = parser.parse_args()
+    if unknown := set(args.parts) - set(PARTS):
+        parser.error(f"{', '.join(sorted(unknown))}: not a part")
+    # Imported here: the setting above must come first.
+    from tests.bench import chain, peers, planner
 
-    def bare() -> None:
-        fdm = Fdm(vehicle.aircraft, rate_hz=FDM_HZ)
-        trim = fdm.start(36.5, -84.2, 600.0, 0.0, vehicle.airspeed)
-        fdm.write(np.array(trim.commands()))
-        fdm.step(steps)
-
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "flight.mcap"
-
-        # As the flight hands them on: a second at a time.
-        rows = len(flown.track)
-        blocks = [flown.track.rows(start, min(rows, start + 60)) for start in range(0, rows, 60)]
-
-        def record(every: int = 1) -> None:
-            with Recorder(log, setup, every=every, batch=10) as recorder:
-                for block in blocks:
-                    recorder.write(block)
-                recorder.finish("completed", None)
-
-        times = {
-            "bare JSBSim": best(bare),
-            "flight": best(lambda: simulate(setup, vehicle.aircraft), clock=time.process_time),
-            "recording, 20 Hz": best(lambda: record(3), clock=time.process_time),
-            "recording": best(record, clock=time.process_time),
-            "reading the log": best(lambda: read_log(log)),
-            "judging": best(lambda: judge_flight(setup, flown.track, "completed")),
-            "planning": best(lambda: make_plan(scenario, vehicle, 1)),
-            "whole `planfly run`, new process": best(lambda: _run(Path(folder)), 2),
-            "`planfly --help`, new process": best(_help, 3),
-        }
-        size = log.stat().st_size
-        hour, hours = _long_flight(Path(folder))
-        times["`planfly check` of a long log"] = best(lambda: _planfly("check", str(hour)), 2)
-        out = str(Path(folder) / "report")
-        times["`planfly report` of a long log"] = best(
-            lambda: _planfly("report", str(hour), "--out", out, "--overwrite"), 2
-        )
-
-    ratios = {
-        "closed loop at 60 Hz / bare JSBSim at 120 Hz": times["flight"] / times["bare JSBSim"],
-        "recording at 20 Hz / flight": times["recording, 20 Hz"] / times["flight"],
-        "recording at 60 Hz / flight": times["recording"] / times["flight"],
-        "judging / flight": times["judging"] / times["flight"],
-        "flight time / time to fly it": seconds / times["flight"],
-        "flight time / whole run": seconds / times["whole `planfly run`, new process"],
+    TARGET.parent.mkdir(exist_ok=True)
+    kept = json.loads(TARGET.read_text(encoding="utf-8")) if TARGET.exists() else {}
+    record = {part: kept[part] for part in PARTS if part in kept}
+    record |= {"machine": platform.machine(), "python": platform.python_version(), "cores": os.cpu_count()}
+    work = {
+        "chain": chain.run,
+        "planner": lambda: planner.run(args.runs),
+        "peers": lambda: peers.run(args.seconds),
     }
-    print(f"jacksboro, seed 1: {seconds:.0f} s of flight, {len(flown.track)} rows; best of {ROUNDS}")
-    for name, value in times.items():
-        print(f"  {name:<48}{value:9.3f} s")
-    for name, value in ratios.items():
-        print(f"  {name:<48}{value:9.2f}")
-    hourly = size * 3600 / seconds / 1e6
-    print(f"  {'log size per flight hour, 60 Hz':<48}{hourly:9.1f} MB")
-    print(f"  {'the long log, hours of flight':<48}{hours:9.2f}")
-    target = Path("runs") / "bench.json"
-    target.parent.mkdir(exist_ok=True)
-    record_of = {
-        "machine": platform.machine(), "python": platform.python_version(),
-        "seconds": times, "ratios": ratios, "log_mb_per_hour": hourly,
-    }  # fmt: skip
-    target.write_text(json.dumps(record_of, indent=1) + "\n", encoding="utf-8")
-    print(f"written to {target}")
-
-
-def _run(folder: Path) -> None:
-    command = [sys.executable, "-m", "planfly", "run", "--out", str(folder / "run"), "--overwrite"]
-    subprocess.run(command, check=True, capture_output=True)
-
-
-def _planfly(*argv: str) -> None:
-    subprocess.run([sys.executable, "-m", "planfly", *argv], check=True, capture_output=True)
-
-
-def _long_flight(folder: Path) -> tuple[Path, float]:
-    """Fly five laps above the demo's ridges, in wind and turbulence: the log, and the hours in it."""
-    corners = [(36.56, -84.28), (36.56, -84.22), (36.60, -84.22), (36.60, -84.28)] * 5
-    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.58\t-84.25\t1150\t1"]
-    lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(corners, 1)]
-    mission, log = folder / "laps.waypoints", folder / "laps.mcap"
-    mission.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    weather = ("--wind", "5,250", "--turbulence", "light")
-    _planfly("fly", str(mission), "--terrain", "jacksboro", *weather, "--log", str(log))
-    return log, read_log(log).end_time / 3600.0
-
-
-def _help() -> None:
-    subprocess.run([sys.executable, "-m", "planfly", "--help"], check=True, capture_output=True)
+    for part in args.parts or PARTS:
+        record[part] = work[part]()
+        TARGET.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    print(f"\nwritten to {TARGET}")
 
 
 if __name__ == "__main__":

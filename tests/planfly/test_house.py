@@ -10,7 +10,20 @@ import pytest
 from planfly.cli import main
 
 ROOT = Path(__file__).parents[2]
-COMMANDS = ["run", "plan", "export", "fly", "check", "replay", "recover", "report", "compare", "scenarios"]
+COMMANDS = [
+    "run",
+    "plan",
+    "export",
+    "fly",
+    "check",
+    "replay",
+    "recover",
+    "report",
+    "compare",
+    "paper",
+    "serve",
+    "scenarios",
+]
 
 
 def test_the_import_contracts_hold() -> None:

@@ -1,0 +1,77 @@
+"""Planning at the command line: budgets, Ctrl-C with the best plan so far, and planning again in flight."""
+
+import argparse
+import signal
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+
+from flight.setup import make_limits
+from planfly.pipeline import Advance, Vehicle
+from planner.plan import Plan, read_plan
+from planner.replan import replan
+from planner.run import Stop
+from planner.search import plan_path
+from world.errors import ScenarioError
+from world.scenario import Scenario, with_planner, with_threats
+
+
+@contextmanager
+def best_so_far(seconds: float | None) -> Iterator[Stop]:
+    """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
+
+    A second Ctrl-C interrupts at once.
+    """
+    deadline = None if seconds is None else time.monotonic() + seconds
+    pressed = False
+
+    def press(_signal: int, _frame: FrameType | None) -> None:
+        nonlocal pressed
+        pressed = True
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    def stop() -> str:
+        if pressed:
+            return "interrupted"
+        return "budget" if deadline is not None and time.monotonic() >= deadline else ""
+
+    before = signal.signal(signal.SIGINT, press)
+    try:
+        yield stop
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Plan | None]:
+    """Scenario with what the command line adds to it, and the plan to start from, if any.
+
+    Threats that the old plan knew stay known.  Raises ScenarioError or MissionError.
+    """
+    evaluations, _ = args.budget if args.budget else (None, None)
+    if evaluations is not None:
+        scenario = with_planner(scenario, "--budget", budget=evaluations)
+    if args.old is None:
+        if args.at_leg is not None or args.add_threat:
+            option = "--at-leg" if args.at_leg is not None else "--add-threat"
+            raise ScenarioError(f"{option}: only with --from PLAN.json, the plan that is being flown")
+        return scenario, None
+    if args.at_leg is None:
+        raise ScenarioError("--from: --at-leg K is missing: the leg that is about to be flown")
+    old = read_plan(Path(args.old))
+    kept = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
+    return with_threats(scenario, args.add_threat or [], "--add-threat", kept), old
+
+
+def make_plan(
+    args: argparse.Namespace, scenario: Scenario, old: Plan | None, vehicle: Vehicle, seed: int, advance: Advance
+) -> Plan:
+    """Plan as the command line asks."""
+    limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+    with best_so_far(args.budget[1] if args.budget else None) as stop:
+        if old is None:
+            return plan_path(scenario, limits, seed=seed, algorithm=args.algorithm, progress=advance, stop=stop)
+        return replan(
+            scenario, limits, old, args.at_leg, seed=seed, algorithm=args.algorithm, progress=advance, stop=stop
+        )

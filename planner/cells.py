@@ -1,0 +1,110 @@
+"""Which threats may reach a place: lists by the cells of a grid, so that a judge asks only those nearby."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.compiled import compiled
+
+Floats = NDArray[np.float64]
+Short = NDArray[np.int32]
+
+# Side of a cell, as a share of the median reach; and cells of one grid, at most.
+CELL = 0.2
+MOST_CELLS = 300_000
+# Ground beyond the map that the grid covers, as a share of the map's sides.
+BEYOND = 0.1
+
+
+class Cells(NamedTuple):
+    """Lists of units by cell, in the form that the compiled functions take.
+
+    Cell c holds units[first[c] : first[c + 1]], in increasing order.  The last cell stands for all places outside the
+    grid and holds every unit.  west, south, side: m.  cols, rows: cells across and up.
+    """
+
+    first: Short
+    units: Short
+    west: float
+    south: float
+    side: float
+    cols: int
+    rows: int
+
+
+def make_cells(position: Floats, reach: Floats, bounds: Floats, spread: float = 0.0, slack: float = 0.0) -> Cells:
+    """Lists of the units (m, 3) whose horizontal reach (m,), where it is above 0, meets a cell.
+
+    bounds: (2, 2) map.  spread: cell sides by which each cell is widened for them.  slack: m, the same.
+    """
+    low, high = bounds[:, 0], bounds[:, 1]
+    low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
+    size = high - low
+    side = math.sqrt(float(size[0] * size[1]) / MOST_CELLS)
+    armed = reach[reach > 0.0]
+    if armed.size:
+        side = min(max(side, CELL * float(np.median(armed))), float(size.max()))
+    cols, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
+    widened = np.where(reach > 0.0, reach + spread * side + slack, 0.0)
+    first, units = _lists(np.ascontiguousarray(position), widened, float(low[0]), float(low[1]), side, cols, rows)
+    return Cells(first, units, float(low[0]), float(low[1]), side, cols, rows)
+
+
+@compiled
+def grid_of(cells: Cells) -> tuple[float, float, float, int, int]:  # pragma: no cover - compiled
+    """What `cell_at` takes of a grid."""
+    return cells.west, cells.south, 1.0 / cells.side, cells.cols, cells.rows
+
+
+@compiled
+def cell_at(
+    west: float, south: float, per_metre: float, cols: int, rows: int, east: float, north: float
+) -> int:  # pragma: no cover - compiled
+    """Number of the cell at a place, of a grid as `grid_of` gives it; per_metre: cells a metre."""
+    col, row = (east - west) * per_metre, (north - south) * per_metre
+    # Written so that NaN falls outside.
+    if col >= 0.0 and row >= 0.0 and col < cols and row < rows:
+        return int(row) * cols + int(col)
+    return cols * rows
+
+
+@compiled
+def _lists(
+    position: Floats, reach: Floats, west: float, south: float, side: float, cols: int, rows: int
+) -> tuple[Short, Short]:  # pragma: no cover - compiled
+    count = cols * rows
+    first = np.zeros(count + 2, dtype=np.int32)
+    units = np.empty(0, dtype=np.int32)
+    filled = first[:0].copy()
+    # Counted first, then filled.
+    for turn in range(2):
+        for k in range(position.shape[0]):
+            if reach[k] <= 0.0:
+                continue
+            x, y, r = (position[k, 0] - west) / side, (position[k, 1] - south) / side, reach[k] / side
+            # A hair wider, for what rounding would leave out.
+            r += 1e-6
+            for row in range(max(0, math.floor(y - r)), min(rows - 1, math.floor(y + r)) + 1):
+                dy = max(0.0, row - y, y - row - 1.0)
+                for col in range(max(0, math.floor(x - r)), min(cols - 1, math.floor(x + r)) + 1):
+                    dx = max(0.0, col - x, x - col - 1.0)
+                    if dx * dx + dy * dy <= r * r:
+                        cell = row * cols + col
+                        if turn == 0:
+                            first[cell + 1] += 1
+                        else:
+                            units[filled[cell]] = k
+                            filled[cell] += 1
+            if turn == 0:
+                first[count + 1] += 1
+            else:
+                units[filled[count]] = k
+                filled[count] += 1
+        if turn == 0:
+            for cell in range(count + 1):
+                first[cell + 1] += first[cell]
+            units = np.empty(first[count + 1], dtype=np.int32)
+            filled = first.copy()
+    return first, units

@@ -1,0 +1,161 @@
+"""A search under way: what it has evaluated, the best of it, and when it is to end."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.algorithms import Algorithm
+from planner.certify import certify
+from planner.criteria import paper_scores
+from planner.encoding import Encoding
+from planner.graded import graded_scores
+from planner.plan import Certificate
+from planner.polish import polish
+from planner.preference import NO_GOAL, Level, ranks
+from planner.problem import CERTIFIED_KILL_MARGIN, Problem
+from world.errors import ScenarioError
+
+Floats = NDArray[np.float64]
+Progress = Callable[[int, int, str], None]
+Stop = Callable[[], str]
+
+# Columns of the scores that a search ranks: four violations, then the four objectives.
+VIOLATIONS = Level((0, 1, 2, 3), (0.0, 0.0, 0.0, 0.0))
+LENGTH, KILL, DETECTION, HEIGHT = 4, 5, 6, 7
+# The order of the archive: what meets the constraints, then least kill exposure, then the shortest.
+ARCHIVE_LEVELS = (VIOLATIONS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
+ARCHIVE_SIZE = 24
+
+
+@dataclass(slots=True)
+class Archive:
+    """The best paths of all that were evaluated, best first: vectors (k, d) and scores (k, 8)."""
+
+    vectors: Floats
+    scores: Floats
+
+    def take(self, vectors: Floats, scores: Floats) -> None:
+        """Let new rows in; equal ranks keep their order, older first."""
+        fit = len(self.scores) == ARCHIVE_SIZE and not self.scores[:, :4].any()
+        if fit:
+            # Among rows that meet the constraints the order is by exposure, then by length.
+            last = self.scores[-1]
+            shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
+            rows = np.flatnonzero((shorter | (scores[:, KILL] < last[KILL])) & ~scores[:, :4].any(axis=1))
+            if not rows.size:
+                return
+            vectors, scores = vectors[rows], scores[rows]
+        every = np.concatenate([self.scores, scores])
+        joined = np.concatenate([self.vectors, vectors])
+        if fit:
+            order = np.lexsort((every[:, LENGTH], every[:, KILL]))[:ARCHIVE_SIZE]
+        else:
+            order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
+        self.vectors, self.scores = joined[order], every[order]
+
+
+@dataclass(slots=True)
+class Run:
+    """What attempts share: how much was evaluated, and what was seen after each generation.
+
+    stop: asked after each generation and each seed; a text ends the search and says why.  wanted: distance (m) from
+    missiles that the certificate of a finished path has.  ended: why the search ended.
+    """
+
+    problem: Problem
+    algorithm: Algorithm
+    encoding: Encoding
+    rng: np.random.Generator
+    progress: Progress | None
+    stop: Stop | None
+    first_safe: bool
+    wanted: float
+    archive: Archive = field(init=False)
+    evaluations: int = 0
+    done: int = 0
+    ended: str = "completed"
+    history: list[tuple[float, float, float]] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        """Begin with nothing."""
+        self.archive = Archive(np.empty((0, self.encoding.lower.size)), np.empty((0, 8)))
+
+    def evaluate(self, vectors: Floats) -> Floats:
+        """Scores (n, 8) of vectors (n, d); the archive sees them."""
+        paths = np.ascontiguousarray(self.encoding.decode(vectors))
+        violations: NDArray[np.generic]
+        if self.algorithm.graded:
+            violations, objectives = graded_scores(self.problem.search, paths)
+        else:
+            violations, objectives = paper_scores(self.problem.search, paths)
+        scores = np.concatenate([violations.astype(np.float64), objectives], axis=1)
+        self.evaluations += len(vectors)
+        self.archive.take(vectors, scores)
+        return scores
+
+    def polish(self, vector: Floats, most: int) -> Floats:
+        """Tighten a vector (d,) by a local search; the archive sees what it finds.  Gives the best scores (8,)."""
+        left = min(most, self._budget() - self.evaluations)
+        if left < 2:
+            return np.asarray(self.evaluate(vector[None])[0])
+        found, made = polish(self.problem.search, self.encoding, vector, int(left))
+        scores = self.evaluate(found)
+        # What is found was counted when it was found.
+        self.evaluations += made - len(found)
+        return np.asarray(scores[0])
+
+    def over(self) -> bool:
+        """Whether the search is to end now."""
+        if self.evaluations >= self._budget():
+            self.ended = "budget"
+        elif self.stop is not None:
+            self.ended = self.stop() or "completed"
+        return self.ended != "completed"
+
+    def safe_already(self) -> bool:
+        """Whether the first safe path was asked for, and is there."""
+        if not self.first_safe or not len(self.archive.scores) or self.archive.scores[0, :4].any():
+            return False
+        return self.finished(self.best_certified()[1])
+
+    def finished(self, certificate: Certificate) -> bool:
+        """Whether a path of this certificate is what the search is for."""
+        return certificate.ok and certificate.kill_distance >= self.wanted
+
+    def _budget(self) -> float:
+        most = self.problem.scenario.planner.budget
+        return math.inf if most is None else most
+
+    def note(self) -> None:
+        """Add the archive's best to the history."""
+        best = self.archive.scores[0]
+        missed = np.count_nonzero(best[:4]) if self.algorithm.graded else best[:4].sum()
+        self.history.append((best[LENGTH], best[KILL], float(missed)))
+
+    def report(self, left: int) -> None:
+        """Tell how far the search has come; left: generations that may follow."""
+        if self.progress is not None:
+            best = self.archive.scores[0]
+            remark = f"length ratio {best[LENGTH]:.4f}, kill exposure {best[KILL]:.3g}"
+            self.progress(self.done, self.done + left, "no feasible path yet" if best[:4].any() else remark)
+
+    def best_certified(self) -> tuple[Floats, Certificate]:
+        """First of the archive that is certified and out of reach; or certified and farthest; or the first."""
+        paths = np.ascontiguousarray(self.encoding.decode(self.archive.vectors))
+        first: tuple[Floats, Certificate] | None = None
+        reachable: tuple[Floats, Certificate] | None = None
+        for path in paths:
+            certificate = certify(self.problem, path)
+            if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
+                return path, certificate
+            first = first or (path, certificate)
+            least = -math.inf if reachable is None else reachable[1].kill_distance
+            if certificate.ok and certificate.kill_distance > least:
+                reachable = (path, certificate)
+        result = reachable or first
+        if result is None:  # pragma: no cover - an archive is never empty after an attempt
+            raise ScenarioError(f"{self.problem.scenario.name}: planner: nothing was evaluated")
+        return result

@@ -1,0 +1,112 @@
+"""OMPL's Informed RRT* on a scenario: ``python -m tests.bench.ompl_peer NAME SEED SECONDS`` prints one line of JSON.
+
+States are points of the map between floor and ceiling; a motion is valid if its leg meets slope, terrain and map and
+no missile reaches it, by the same compiled judge and margins that our search uses.  A tree of straight motions
+knows no turns: each path that is shorter than the last is certified, and the last that passes is reported.
+"""
+
+import sys
+import time
+
+import numpy as np
+from numpy.typing import NDArray
+from ompl import base as ob
+from ompl import geometric as og
+from ompl import util as ou
+
+from tests.bench.peers import Found, as_json, found
+from tests.bench.task import Task, graded_scores, is_safe, make_task
+
+Floats = NDArray[np.float64]
+
+# Between looks at the best cost so far, s.
+SLICE = 0.1
+
+
+class Motions(ob.MotionValidator):
+    """Judges motions in the direction of the mission; counts them, and the time they take."""
+
+    def __init__(self, information: object, task: Task) -> None:
+        super().__init__(information)
+        self.rules = task.problem.search
+        step = task.scenario.destination - task.scenario.start
+        self.east, self.north = float(step[0]), float(step[1])
+        self.leg = np.zeros((1, 2, 3))
+        self.count, self.nanoseconds = 0, 0
+
+    def checkMotion(self, one: list[float], two: list[float]) -> bool:
+        """The library's callback."""
+        began = time.process_time_ns()
+        # Climb and dive limits differ, and rewiring turns motions round: all are judged as they would be flown.
+        forward = (two[0] - one[0]) * self.east + (two[1] - one[1]) * self.north >= 0.0
+        valid = self.judge(one, two) if forward else self.judge(two, one)
+        self.count += 1
+        self.nanoseconds += time.process_time_ns() - began
+        return valid
+
+    def judge(self, one: list[float], two: list[float]) -> bool:
+        """Whether the leg violates nothing and no missile reaches it."""
+        for row, state in enumerate((one, two)):
+            for axis in range(3):
+                self.leg[0, row, axis] = state[axis]
+        violations, objectives = graded_scores(self.rules, self.leg)
+        return not violations.any() and float(objectives[0, 1]) == 0.0
+
+
+class Anywhere(ob.StateValidityChecker):
+    """States need no check of their own: every motion is judged whole."""
+
+    def isValid(self, _state: object) -> bool:
+        """The library's callback."""
+        return True
+
+
+def plan(task: Task, seed: int, seconds: float) -> Found:
+    """Run for so many seconds of CPU, compiled code warm; trace: the best cost after each slice that shortened it."""
+    ou.noOutputHandler()
+    ou.RNG.setSeed(seed)
+    rules = task.problem.search
+    space = ob.RealVectorStateSpace(3)
+    box = ob.RealVectorBounds(3)
+    low, high = [*rules.bounds[:, 0], rules.floor], [*rules.bounds[:, 1], rules.ceiling]
+    for axis in range(3):
+        box.setLow(axis, float(low[axis]))
+        box.setHigh(axis, float(high[axis]))
+    space.setBounds(box)
+    setup = og.SimpleSetup(space)
+    information = setup.getSpaceInformation()
+    states = Anywhere(information)
+    motions = Motions(information, task)
+    setup.setStateValidityChecker(states)
+    information.setMotionValidator(motions)
+    ends = [space.allocState(), space.allocState()]
+    for state, point in zip(ends, (task.scenario.start, task.scenario.destination), strict=True):
+        for axis in range(3):
+            state[axis] = float(point[axis])
+    setup.setStartAndGoalStates(ends[0], ends[1], 1.0)
+    setup.setPlanner(og.InformedRRTstar(information))
+    setup.setup()
+    motions.judge(ends[0], ends[1])
+    straight = float(np.linalg.norm(task.scenario.destination - task.scenario.start))
+    trace: list[tuple[float, float]] = []
+    path, certified = np.stack([task.scenario.start, task.scenario.destination]), False
+    is_safe(task.certificate(path))
+    began = time.process_time()
+    while time.process_time() - began < seconds:
+        setup.solve(SLICE)
+        if not setup.haveExactSolutionPath():
+            continue
+        ratio = float(setup.getSolutionPath().length()) / straight
+        if not trace or ratio < trace[-1][1]:
+            trace.append((time.process_time() - began, ratio))
+            latest = np.array([[state[axis] for axis in range(3)] for state in setup.getSolutionPath().getStates()])
+            latest[-1] = task.scenario.destination
+            safe = is_safe(task.certificate(latest))
+            if safe or not certified:
+                path, certified = latest, safe
+    spent = time.process_time() - began
+    return found(task, path, spent, motions.count, motions.nanoseconds / 1e9, trace)
+
+
+if __name__ == "__main__":
+    print(as_json(plan(make_task(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]))))

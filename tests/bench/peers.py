@@ -1,0 +1,228 @@
+"""Peers on the same problem and evaluation function: NSGA-II (pymoo), CMA-ES (cmaes), Informed RRT* (ompl)."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.bench.task import (
+    PROBLEMS,
+    Task,
+    best_known,
+    is_safe,
+    make_task,
+    scalar,
+    seed_vectors,
+    smooth_axes,
+)
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What one run of a peer came to.
+
+    path: (w, 3) world m as lists.  safe: re-certified under all four constraints, and out of every missile's reach.
+    checks: paths evaluated, or motions checked.  callback_share: of the time, what was spent in our judge as called
+    from the peer.  trace: (seconds, length ratio) each time the peer's own best got shorter.
+    """
+
+    path: list[list[float]]
+    length_ratio: float
+    safe: bool
+    problems: list[str]
+    seconds: float
+    checks: int
+    callback_share: float
+    trace: list[tuple[float, float]]
+
+
+def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, trace: Any = ()) -> Found:
+    """Certify a peer's path and put its numbers together."""
+    certificate = task.certificate(path)
+    problems = list(certificate.problems)
+    if certificate.kill_distance <= 0.0:
+        problems.append(f"{-certificate.kill_distance:.1f} m inside a missile's sphere")
+    share = inside / seconds if seconds > 0.0 else 0.0
+    return Found(
+        path.tolist(), task.length_ratio(path), is_safe(certificate), problems, seconds, checks, share, list(trace)
+    )
+
+
+def best_path(task: Task, vectors: Floats) -> Floats:
+    """The first certified safe path of vectors (n, d), in the order of their scalar cost; or the first of all."""
+    order = np.argsort(scalar(*task.scores(vectors)), kind="stable")
+    paths = task.encoding.decode(vectors[order])
+    return next((path for path in paths if is_safe(task.certificate(path))), paths[0])
+
+
+def run_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
+    """CMA-ES in the smooth basis, from our best coarse seed or from the straight line; it restarts."""
+    from cmaes import CMA
+
+    started, inside = time.process_time(), 0.0
+    basis, reach = smooth_axes(task)
+    low, high = task.encoding.lower, task.encoding.upper
+    if seeded:
+        home = seed_vectors(task)[0]
+    else:
+        home, sigma = 0.5 * (low + high), 1.0
+        share = np.linspace(0.0, 1.0, task.encoding.waypoints)[1:-1]
+        home[1::3] = 0.0
+        home[2::3] = task.scenario.start[2] + share * (task.scenario.destination[2] - task.scenario.start[2])
+    best, best_cost, kept, trace, done, restarts = home, np.inf, [home], [], 0, 0
+    size = int(4 + 3 * np.log(home.size)) * 2
+    search = CMA(mean=np.zeros(home.size), sigma=sigma, seed=seed, population_size=size)
+    while done < evaluations:
+        asked = np.array([search.ask() for _ in range(size)])
+        vectors = home + np.einsum("nk,dk->nd", asked * reach, basis)
+        clipped = np.clip(vectors, low, high)
+        before = time.process_time()
+        costs = scalar(*task.scores(clipped))
+        inside += time.process_time() - before
+        done += size
+        outside = np.abs((vectors - clipped) / (high - low)).sum(axis=1)
+        with warnings.catch_warnings():
+            # A population of equal costs scales by nothing inside the library.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            search.tell(list(zip(asked, costs + outside, strict=True)))
+        row = int(np.argmin(costs))
+        if costs[row] < best_cost:
+            best, best_cost = clipped[row], costs[row]
+            kept = [*kept[-30:], best]
+            if best_cost < 10.0:
+                trace.append((time.process_time() - started, float(best_cost)))
+        if search.should_stop() or search._sigma < 1e-5:
+            restarts += 1
+            home = best
+            search = CMA(mean=np.zeros(home.size), sigma=0.02, seed=seed + 1000 * restarts, population_size=size)
+    path = best_path(task, np.array(kept))
+    return found(task, path, time.process_time() - started, done, inside, trace)
+
+
+def run_nsga2(task: Task, seed: int, evaluations: int) -> Found:
+    """NSGA-II as pymoo ships it: length and kill exposure, four constraints, the paper's population."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.optimize import minimize
+
+    started = time.process_time()
+    spent = [0.0, 0]
+
+    class Paths(PymooProblem):
+        def _evaluate(self, x: Floats, out: dict[str, Floats], *_args: object, **_more: object) -> None:
+            before = time.process_time()
+            violations, objectives = task.scores(x)
+            spent[0] += time.process_time() - before
+            spent[1] += len(x)
+            out["F"], out["G"] = objectives[:, :2], violations
+
+    problem = Paths(
+        n_var=task.encoding.lower.size, n_obj=2, n_ieq_constr=4, xl=task.encoding.lower, xu=task.encoding.upper
+    )
+    size = task.scenario.planner.population
+    algorithm = NSGA2(pop_size=size, n_offsprings=size // 2)
+    result = minimize(problem, algorithm, ("n_eval", evaluations), seed=seed, verbose=False)
+    vectors = np.atleast_2d(result.X) if result.X is not None else result.pop.get("X")
+    return found(task, best_path(task, vectors), time.process_time() - started, int(spent[1]), spent[0])
+
+
+def run_ompl(task: Task, seed: int, seconds: float) -> Found:
+    """Informed RRT* for so many seconds, in a process of its own: its bindings talk at exit."""
+    command = [sys.executable, "-m", "tests.bench.ompl_peer", task.scenario.name, str(seed), str(seconds)]
+    result = subprocess.run(command, check=True, capture_output=True, text=True)
+    return Found(**json.loads(result.stdout.splitlines()[-1]))
+
+
+def run(seconds: float) -> dict[str, Any]:
+    """Every peer once on each problem, seed 1, the paper's budget; OMPL so many seconds of CPU.  Prints a table."""
+    print("\nPeers on the hard set, seed 1: same problem, evaluation function and certificate; one core, CPU s, warm")
+    print(f"  {'problem':<9}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in judge':>9}")
+    record: dict[str, Any] = {}
+    for number in PROBLEMS:
+        task = make_task(f"hard-{number:02d}")
+        known = best_known(task.scenario.name)
+        task.scores(task.encoding.lower[None])
+        rows: dict[str, Callable[[], Found]] = {
+            "planfly, default": partial(run_ours, task, 1),
+            "cmaes, our seeds and basis": partial(run_cmaes, task, 1, task.evaluations),
+            "cmaes, our basis, no seeds": partial(run_cmaes, task, 1, task.evaluations, seeded=False),
+            "pymoo NSGA-II": partial(run_nsga2, task, 1, task.evaluations),
+            "ompl InformedRRTstar": partial(run_ompl, task, 1, seconds),
+        }
+        ours: Found | None = None
+        for name, work in rows.items():
+            package = name.split()[0].rstrip(",")
+            if package != "planfly" and find_spec(package) is None:
+                print(f"  {task.scenario.name:<9}{name:<28}  not measured: package {package} is missing (make bench)")
+                record[f"{task.scenario.name} {name}"] = "missing package"
+                continue
+            if package != "ompl":
+                work()
+            item = work()
+            ours = ours or item
+            _print_row(task.scenario.name, name, item, known)
+            entry = {key: value for key, value in asdict(item).items() if key != "path"}
+            if package == "ompl":
+                entry["seconds_to_2_percent"] = _time_to(item, 1.02 * known)
+                entry["to_2_percent_over_ours"] = _compare(entry["seconds_to_2_percent"], ours, known)
+            record[f"{task.scenario.name} {name}"] = entry
+    return record
+
+
+def _print_row(problem: str, name: str, item: Found, known: float) -> None:
+    print(
+        f"  {problem:<9}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
+        f"{item.length_ratio / known:>8.4f}{item.seconds:>8.2f}{item.checks:>9}{100 * item.callback_share:>8.0f}%"
+    )
+    if not item.safe:
+        print(f"  {'':<9}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
+
+
+def _time_to(item: Found, ratio: float) -> float | None:
+    """First time in the trace at which the length ratio is at most this, s."""
+    return next((seconds for seconds, length in item.trace if length <= ratio), None)
+
+
+def _compare(seconds: float | None, ours: Found | None, known: float) -> float | None:
+    if ours is None:
+        return None
+    mine = _time_to(ours, 1.02 * known)
+    words = ["never" if value is None else f"{value:.2f} s" for value in (seconds, mine)]
+    print(f"  {'':<9}{'':<28}  to within 2 % of best known: {words[0]}, ours {words[1]}")
+    return None if seconds is None or mine is None else seconds / mine
+
+
+def run_ours(task: Task, seed: int) -> Found:
+    """The default planner; its trace from its progress reports."""
+    from planfly.pipeline import make_plan
+
+    started = time.process_time()
+    trace: list[tuple[float, float]] = []
+
+    def see(_done: float, _whole: float, remark: str) -> None:
+        seen = re.match(r"length ratio ([\d.]+), kill exposure 0$", remark)
+        if seen and (not trace or float(seen[1]) < trace[-1][1]):
+            trace.append((time.process_time() - started, float(seen[1])))
+
+    plan = make_plan(task.scenario, task.vehicle, seed, advance=see)
+    spent = time.process_time() - started
+    # The last polish reports nothing; what it came to stands at the end.
+    trace.append((spent, task.length_ratio(plan.waypoints)))
+    return found(task, plan.waypoints, spent, plan.evaluations, 0.0, trace)
+
+
+def as_json(item: Found) -> str:
+    """The run as one line of JSON."""
+    return json.dumps(asdict(item))

@@ -1,0 +1,115 @@
+"""One planning problem as every optimiser in the benchmarks sees it: a box, one judge, one certificate."""
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.setup import make_limits
+from planfly.pipeline import Vehicle, load_vehicle
+from planner.certify import certify
+from planner.encoding import ENCODINGS, Encoding, rotated_vectors
+from planner.graded import graded_scores
+from planner.plan import Certificate
+from planner.problem import Problem, make_problem
+from planner.sampling import bridge_basis, bridge_modes
+from planner.seeding import seeds
+from world.scenario import Scenario, from_spec, load_scenario
+
+Floats = NDArray[np.float64]
+
+PROBLEMS = (7, 15, 30, 60)
+# Grids that seed a peer: stages of each, and routes from each.
+GRIDS, ROUTES = (52, 80), 2
+BEST_KNOWN = Path(__file__).parents[1] / "authorities" / "best_known.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A scenario in the form of the compiled judges, in the rotated encoding."""
+
+    scenario: Scenario
+    vehicle: Vehicle
+    problem: Problem
+    encoding: Encoding
+
+    @property
+    def evaluations(self) -> int:
+        """The paper's evaluation budget: the first population, then half of it in each generation."""
+        table = self.scenario.planner
+        return table.population + table.generations * (table.population // 2)
+
+    def scores(self, vectors: Floats) -> tuple[Floats, Floats]:
+        """Graded violations (n, 4) and objectives (n, 4): what the default planner's search ranks."""
+        return graded_scores(self.problem.search, np.ascontiguousarray(self.encoding.decode(vectors)))
+
+    def certificate(self, path: Floats) -> Certificate:
+        """The continuous check of a path (w, 3), all four constraints."""
+        return certify(self.problem, np.ascontiguousarray(path))
+
+    def length_ratio(self, path: Floats) -> float:
+        """Length of a path (w, 3) over the straight distance, in three dimensions (eq. 8)."""
+        legs = np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum()
+        return float(legs / np.sqrt(((self.scenario.destination - self.scenario.start) ** 2).sum()))
+
+
+def is_safe(certificate: Certificate) -> bool:
+    """Whether all four constraints hold everywhere and no missile reaches the path."""
+    return certificate.ok and certificate.kill_distance > 0.0
+
+
+@cache
+def make_task(name: str) -> Task:
+    """The task of an embedded scenario."""
+    scenario = load_scenario(name)
+    vehicle = load_vehicle(scenario)
+    problem = make_problem(scenario, make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank))
+    return Task(scenario, vehicle, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
+
+
+def best_known(name: str) -> float:
+    """Length ratio of the best certified path that is known, NaN where none is (tests/authorities/best_known.json)."""
+    known = json.loads(BEST_KNOWN.read_text(encoding="utf-8"))
+    return float(known[name]["length_ratio"]) if name in known else float("nan")
+
+
+def with_planner(scenario: Scenario, **changes: object) -> Scenario:
+    """The same scenario with other keys in ``[planner]``."""
+    spec = scenario.spec
+    return from_spec(spec.model_copy(update={"planner": spec.planner.model_copy(update=changes)}), scenario.name)
+
+
+def seed_vectors(task: Task) -> Floats:
+    """Our coarse seeds as vectors (n, d), best first: no violation, then least kill exposure, then the shortest."""
+    low, high = task.encoding.lower, task.encoding.upper
+    span = (float(low[1::3].min()), float(high[1::3].max()))
+    paths = seeds(task.problem.search, span, task.encoding.waypoints, GRIDS, ROUTES)
+    vectors = rotated_vectors(task.problem.space, task.encoding, np.array(paths))
+    return np.asarray(vectors[np.argsort(scalar(*task.scores(vectors)), kind="stable")])
+
+
+def scalar(violations: Floats, objectives: Floats) -> Floats:
+    """One number (n,) for optimisers that know no constraints, in the default planner's order.
+
+    Below 100: no violation; below 10: no kill exposure either, and the number is the length ratio.
+    """
+    missed = (violations * np.array([1.0, 1.0, 1.0, 0.01])).sum(axis=1)
+    kill, length = objectives[:, 1], objectives[:, 0]
+    safe = np.where(kill > 0.0, 10.0 + 80.0 * kill / (1.0 + kill), np.minimum(length, 9.9))
+    return np.where((violations > 0.0).any(axis=1), 100.0 + missed, safe)
+
+
+def smooth_axes(task: Task) -> tuple[Floats, Floats]:
+    """Directions (d, d) of the smooth basis and how far paths reach along each (d,), m."""
+    inner = task.encoding.waypoints - 2
+    _, deviations = bridge_modes(inner)
+    low, high = task.encoding.lower.reshape(inner, 3), task.encoding.upper.reshape(inner, 3)
+    reach = np.empty((inner, 3))
+    reach[:, 0] = 0.3 * (high[:, 0] - low[:, 0])
+    grow = np.sqrt((inner + 1) / 2.0)
+    reach[:, 1] = deviations * grow * 0.25 * np.median(high[:, 1] - low[:, 1])
+    reach[:, 2] = deviations * grow * 0.25 * np.median(high[:, 2] - low[:, 2])
+    return bridge_basis(inner), reach.ravel()
