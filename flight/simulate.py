@@ -75,13 +75,13 @@ def simulate(
     variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
     Raises FlightError for a flight that cannot start.
     """
-    flight = _Flight(setup, aircraft, variation)
+    flight = Flight(setup, aircraft, variation)
     blocks: list[Track] = []
     ended = ""
     while not ended:
         rows, ended = flight.block(round(BLOCK / TICK))
         if len(rows):
-            block = _as_track(rows)
+            block = as_track(rows)
             blocks.append(block)
             if sink is not None:
                 sink(block)
@@ -90,10 +90,10 @@ def simulate(
     return Flown(join_tracks(blocks), ended, flight.path)
 
 
-class _Flight:
-    """One flight in progress."""
+class Flight:
+    """One flight in progress, advanced by `block`: `simulate` in one go, the live vehicle in step with a clock."""
 
-    def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None) -> None:
+    def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> None:
         scenario, limits = setup.scenario, limits_of(setup)
         self.path = fly_by_path(setup.route, limits)
         self.speeds = setup.route.airspeed
@@ -194,7 +194,8 @@ class _Flight:
         return rows, ""
 
 
-def _as_track(rows: Floats) -> Track:
+def as_track(rows: Floats) -> Track:
+    """Rows of `Flight.block`, (t, ROW), as a track."""
     values, at = [], 0
     for columns in COLUMNS.values():
         values.append(rows[:, at] if columns == 1 else rows[:, at : at + columns])
