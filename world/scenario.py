@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
+from aircraft.catalog import is_folder
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
@@ -131,7 +132,7 @@ def from_spec(
 ) -> Scenario:
     """Make a scenario of a checked file, or of what `Scenario.to_json` gave.
 
-    source: names the file in messages.  base: folder that relative terrain paths count from.  terrain: an
+    source: names the file in messages.  base: folder that relative paths count from.  terrain: an
     elevation file that replaces the scenario's own.  ground: terrain already at hand (from a log).
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
@@ -156,6 +157,9 @@ def from_spec(
             ground = read_terrain(raster, origin, bounds, MARGIN)
         else:
             ground = _made_terrain(spec.terrain, bounds)
+    if is_folder(spec.flight.aircraft):
+        folder = str(Path(base or "", spec.flight.aircraft).resolve())
+        spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft": folder})})
     # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
     place = _checked(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
     area = spec.area or _checked(

@@ -54,7 +54,7 @@ def test_unknown_name_lists_the_known_ones(name: str) -> None:
 
 
 def test_names() -> None:
-    assert aircraft_names() == ("aerosonde",)
+    assert aircraft_names() == ("aerosonde", "c172x")
 
 
 @pytest.mark.parametrize(
