@@ -76,6 +76,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run_and_plan(command)
     _add_export_and_fly(command)
     _add_log_commands(command)
+    _add_aircraft(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser
 
@@ -165,6 +166,17 @@ def _add_log_commands(command: _Command) -> None:
         "--out", metavar="DIR", help="where the files go (default: <log>-report beside the log, replaced)"
     )
     _overwrite(report)
+
+
+def _add_aircraft(command: _Command) -> None:
+    aircraft = command(
+        "aircraft", "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
+        "planfly aircraft aerosonde --out aerosonde",
+    )  # fmt: skip
+    aircraft.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)")
+    aircraft.add_argument("--out", metavar="DIR", help="where the pictures go (default: runs/aircraft-NAME, replaced)")
+    aircraft.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
+    _overwrite(aircraft)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

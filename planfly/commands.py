@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from planfly.aircraft_command import aircraft
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import prepare_folder, refuse_existing
 from planfly.progress import progress
@@ -250,4 +251,5 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "replay": replay,
     "report": report,
     "scenarios": scenarios,
+    "aircraft": aircraft,
 }
