@@ -1,7 +1,7 @@
 """The flight-dynamics model: one JSBSim instance behind packed arrays in SI units.
 
-The only file that knows JSBSim, and the only one with feet and slugs.  JSBSim never says that anything is wrong: after
-a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state it reads.
+The only file that imports JSBSim; feet and slugs stay in it and in `flight.properties`.  JSBSim never says that
+anything is wrong: after a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state it reads.
 """
 
 import contextlib
@@ -15,80 +15,38 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import jsbsim
 import numpy as np
 
 from aircraft.catalog import Aircraft
 from aircraft.model import Command
+from flight.engine import Engine
 from flight.model_check import check_model
+from flight.properties import (
+    FLAT_DENSITY,
+    FLAT_PLANET,
+    FOOT,
+    GUST,
+    HEIGHT,
+    IC_MOTION,
+    IC_PLACE,
+    OWN,
+    POUND,
+    RATE_FACTORS,
+    RATES,
+    SLUG_FT3,
+    STATE,
+    TERRAIN,
+    WIND,
+)
 from flight.state import STATE_SIZE, S
 from flight.trim import START, Floats, T, Trim, air_velocity, body_axes, euler, from_vector, solve
 from world.errors import FlightError
 
 JSBSIM_VERSION: str = jsbsim.__version__
 
-_FOOT = 0.3048
-_SLUG_FT3 = 515.3788183931961  # kg/m^3 in one slug/ft^3
-_POUND = 0.45359237
-
-# The property behind each row of the state that is the same for all models, and its factor to SI.
-_STATE = {
-    S.TIME: ("simulation/sim-time-sec", 1.0),
-    S.LATITUDE: ("position/lat-geod-rad", 1.0),
-    S.LONGITUDE: ("position/long-gc-rad", 1.0),
-    # Above the ellipsoid along its radius: within 3 cm of the geodetic height up to 4000 m.
-    S.AMSL: ("position/h-sl-ft", _FOOT),
-    S.V_NORTH: ("velocities/v-north-fps", _FOOT),
-    S.V_EAST: ("velocities/v-east-fps", _FOOT),
-    S.V_DOWN: ("velocities/v-down-fps", _FOOT),
-    S.ROLL: ("attitude/phi-rad", 1.0),
-    S.PITCH: ("attitude/theta-rad", 1.0),
-    S.YAW: ("attitude/psi-rad", 1.0),
-    S.P: ("velocities/p-rad_sec", 1.0),
-    S.Q: ("velocities/q-rad_sec", 1.0),
-    S.R: ("velocities/r-rad_sec", 1.0),
-    S.AIRSPEED: ("velocities/vt-fps", _FOOT),
-    S.ALPHA: ("aero/alpha-rad", 1.0),
-    S.BETA: ("aero/beta-rad", 1.0),
-    S.ACCEL_N: ("accelerations/Nz", 1.0),
-    S.WIND_NORTH: ("atmosphere/total-wind-north-fps", _FOOT),
-    S.WIND_EAST: ("atmosphere/total-wind-east-fps", _FOOT),
-    S.WIND_DOWN: ("atmosphere/total-wind-down-fps", _FOOT),
-}
-# The rows that each model has properties of its own for, in the order of `aircraft.model.Model.readings`.
-_OWN = (S.ELEVATOR, S.AILERON, S.RUDDER, S.THROTTLE, S.CURRENT, S.POWER)
-_WIND = tuple(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down"))
-_GUST = tuple(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down"))
-_IC_PLACE = ("ic/lat-geod-deg", "ic/long-gc-deg", "ic/terrain-elevation-ft", "ic/h-sl-ft")
-_IC_MOTION = (
-    *("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"),
-    *("ic/vn-fps", "ic/ve-fps", "ic/vd-fps"),
-    *("ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec"),
-)
-_RATES = (
-    *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
-    *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),
-    *("velocities/phidot-rad_sec", "velocities/thetadot-rad_sec"),
-)
 _PACK: Callable[..., None] = struct.Struct(f"{STATE_SIZE}d").pack_into
-_RATE_FACTORS = np.array([_FOOT] * 3 + [1.0] * 5)
-# An engine's speed settles in steps of this, s; at most so many; rates within this, ft/s^2 and rad/s^2, are steady.
-_SETTLE_STEP, _SETTLE_STEPS, _SETTLED = 0.2, 300, 1e-10
-_RATE_STEPS = 6
-_TERRAIN = "position/terrain-elevation-asl-ft"
-_HEIGHT = "position/h-agl-ft"
-# A sphere so large that it is flat, and does not turn: the book's world, for validation.
-_FLAT_PLANET = """<planet name="flat">
-  <semimajor_axis unit="M">1e9</semimajor_axis>
-  <semiminor_axis unit="M">1e9</semiminor_axis>
-  <rotation_rate unit="RAD/SEC">0</rotation_rate>
-  <GM unit="M3/SEC2">9.81e18</GM>
-  <J2>0</J2>
-</planet>
-"""
-_FLAT_DENSITY = 1.2682
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +77,7 @@ class Links:
     gusts: tuple[Callable[[float], object], ...]
     terrain: Callable[[float], object]
     run: Callable[[], object]
-    feet: float = 1.0 / _FOOT
+    feet: float = 1.0 / FOOT
 
 
 class Fdm:
@@ -150,25 +108,25 @@ class Fdm:
         self._manager = self._exec.get_property_manager()
         if flat_earth:
             # The atmosphere looks for this name at every step, so here a new property is meant.
-            self._exec.set_property_value("atmosphere/override/density", _FLAT_DENSITY / _SLUG_FT3)
+            self._exec.set_property_value("atmosphere/override/density", FLAT_DENSITY / SLUG_FT3)
         self._set("simulation/gravity-model", 0.0 if flat_earth else 1.0)
         self._knob("motor/braking", float(motor_braking), 0.0)
         self._vary(variation or Variation())
-        state = _STATE | {
-            row: (reading.name, reading.factor) for row, reading in zip(_OWN, aircraft.model.readings, strict=True)
+        state = STATE | {
+            row: (reading.name, reading.factor) for row, reading in zip(OWN, aircraft.model.readings, strict=True)
         }
         self._readers = [self._getter(state[row][0]) for row in S]
         self._factors = np.array([state[row][1] for row in S])
         self._writers = [self._commander(command) for command in aircraft.model.commands]
-        self._winds = [self._setter(name) for name in _WIND]
-        self._gusts = [self._setter(name) for name in _GUST]
-        self._ic_place = [self._setter(name) for name in _IC_PLACE]
-        self._ic_motion = [self._setter(name) for name in _IC_MOTION]
-        self._rates = [self._getter(name) for name in _RATES]
-        self._terrain = self._setter(_TERRAIN)
-        self._height = self._getter(_HEIGHT)
+        self._winds = [self._setter(name) for name in WIND]
+        self._gusts = [self._setter(name) for name in GUST]
+        self._ic_place = [self._setter(name) for name in IC_PLACE]
+        self._ic_motion = [self._setter(name) for name in IC_MOTION]
+        self._rates = [self._getter(name) for name in RATES]
+        self._terrain = self._setter(TERRAIN)
+        self._height = self._getter(HEIGHT)
         self._run = self._exec.run
-        self._engine = _Engine(self._exec, self.dt, self._getter, self._setter) if aircraft.model.settles else None
+        self._engine = Engine(self._exec, self.dt, self._getter, self._setter) if aircraft.model.settles else None
         self._wind = np.zeros(3)
         self._heading = 0.0
         # lat_deg, lon_deg, terrain amsl: far below, where neither ground effect nor wheels matter.
@@ -209,7 +167,7 @@ class Fdm:
         if variation.mass != 1.0:
             extra = (variation.mass - 1.0) * self.aircraft.mass
             there = self._getter("inertia/pointmass-weight-lbs")()
-            self._set("inertia/pointmass-weight-lbs", there + extra / _POUND)
+            self._set("inertia/pointmass-weight-lbs", there + extra / POUND)
         self._knob("aero/drag-factor", variation.drag, 1.0)
         self._knob("aero/control-factor", variation.control, 1.0)
         if variation.parasite_drag is not None:
@@ -287,16 +245,16 @@ class Fdm:
     def set_wind(self, north: float, east: float, down: float) -> None:
         """Set the steady wind, m/s, the way the air moves."""
         for setter, value in zip(self._winds, (north, east, down), strict=True):
-            setter(value / _FOOT)
+            setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
         """Set what adds to the steady wind, m/s, the way the air moves."""
         for setter, value in zip(self._gusts, (north, east, down), strict=True):
-            setter(value / _FOOT)
+            setter(value / FOOT)
 
     def set_terrain(self, amsl: float) -> None:
         """Set the ground's height below the aircraft, m above sea level."""
-        self._terrain(amsl / _FOOT)
+        self._terrain(amsl / FOOT)
 
     def links(self) -> Links:
         """The bound nodes of this instance."""
@@ -311,7 +269,7 @@ class Fdm:
 
     def height(self) -> float:
         """Height above the ground last set, m; negative under ground, where JSBSim flies on."""
-        return self._height() * _FOOT
+        return self._height() * FOOT
 
     # What trims and linearisation need.
 
@@ -328,7 +286,7 @@ class Fdm:
     def place(self, amsl: float) -> None:
         """Move the point of evaluation for `balance` and `derivatives` to this height; ends any flight."""
         lat_deg, lon_deg, terrain = self._at
-        for setter, value in zip(self._ic_place, (lat_deg, lon_deg, terrain / _FOOT, amsl / _FOOT), strict=True):
+        for setter, value in zip(self._ic_place, (lat_deg, lon_deg, terrain / FOOT, amsl / FOOT), strict=True):
             setter(value)
         self.set_gust(*self._wind)
         self._exec.set_trim_status(True)
@@ -364,61 +322,14 @@ class Fdm:
     ) -> Floats:
         # Trim status lets the actuators through unlagged.
         self.write(commands)
-        for setter, value in zip(self._ic_motion, (*angles, *(velocity / _FOOT), *pqr), strict=True):
+        for setter, value in zip(self._ic_motion, (*angles, *(velocity / FOOT), *pqr), strict=True):
             setter(value)
         self._exec.run_ic()
         if self._engine:
             self._engine.settle(spin=settle)
             self._exec.run_ic()
-        rates: Floats = np.array([rate() for rate in self._rates]) * _RATE_FACTORS
+        rates: Floats = np.array([rate() for rate in self._rates]) * RATE_FACTORS
         return rates
-
-
-class _Engine:
-    """A running engine, whose speed is a state of its own: it turns until it is steady while the aircraft stands still.
-
-    hold: before measuring.  settle: let the engine take up its speed for the air and the throttle that are set.
-    release: for the flight.
-    """
-
-    def __init__(
-        self, fdm: jsbsim.FGFDMExec, dt: float, getter: Callable[[str], Any], setter: Callable[[str], Any]
-    ) -> None:
-        self._exec, self._dt = fdm, dt
-        kinds = ("rate/rotational", "rate/translational", "position/rotational", "position/translational")
-        names = [f"simulation/integrator/{kind}" for kind in kinds]
-        self._integrators = [setter(name) for name in names]
-        self._usual = [getter(name)() for name in names]
-        self._rates = [getter(name) for name in _RATES[:6]]
-        self._freeze = setter("propulsion/fuel_freeze")
-        self._start = setter("propulsion/set-running")
-        self._running = False
-
-    def hold(self) -> None:
-        for integrator in self._integrators:
-            integrator(0.0)
-        self._freeze(1.0)
-        if not self._running:
-            self._exec.run_ic()
-            self._start(-1.0)
-            self._running = True
-
-    def settle(self, *, spin: bool) -> None:
-        # Without spin, only what follows its own derivative (the lift of a changing angle of attack) settles.
-        self._exec.set_dt(_SETTLE_STEP if spin else 0.0)
-        before = np.zeros(6)
-        for _ in range(_SETTLE_STEPS if spin else _RATE_STEPS):
-            self._exec.run()
-            now = np.array([rate() for rate in self._rates])
-            if np.abs(now - before).max() < _SETTLED:
-                break
-            before = now
-        self._exec.set_dt(self._dt)
-
-    def release(self) -> None:
-        for integrator, usual in zip(self._integrators, self._usual, strict=True):
-            integrator(usual)
-        self._freeze(0.0)
 
 
 def _nothing() -> float:
@@ -446,10 +357,9 @@ def _load(aircraft: Aircraft, dt: float, flat_earth: bool) -> jsbsim.FGFDMExec:
         fdm.set_systems_path(str(folder))
         fdm.set_dt(dt)
         if flat_earth:
-            with tempfile.TemporaryDirectory() as folder:
-                planet = Path(folder) / "flat.xml"
-                planet.write_text(_FLAT_PLANET, encoding="utf-8")
-                fdm.load_planet(str(planet), False)
+            planet = Path(copy) / "flat.xml"
+            planet.write_text(FLAT_PLANET, encoding="utf-8")
+            fdm.load_planet(str(planet), False)
         try:
             loaded = fdm.load_model(aircraft.name)
         except (jsbsim.BaseError, RuntimeError, ValueError, OSError) as error:

@@ -107,7 +107,8 @@ def name_modes(a: Floats, airspeed: float) -> tuple[Mode, ...]:
     # Speeds as angles, so that the parts of an eigenvector can be compared.
     sizes = np.abs(vectors) / np.array([airspeed] * 3 + [1.0] * 5)[:, None]
     share = (sizes[_LONGITUDINAL] ** 2).sum(axis=0) / (sizes**2).sum(axis=0)
-    along, aside = [], []
+    along: list[complex] = []
+    aside: list[complex] = []
     for k in np.argsort(-np.abs(roots), kind="stable"):
         # One of each pair.
         if roots[k].imag >= 0.0:
