@@ -41,6 +41,7 @@ from flight.properties import (
     WIND,
 )
 from flight.state import STATE_SIZE, S
+from flight.trial import try_model
 from flight.trim import START, Floats, T, Trim, air_velocity, body_axes, euler, from_vector, solve
 from world.errors import FlightError
 
@@ -86,6 +87,7 @@ class Fdm:
     rate_hz: steps a second.  motor_braking: whether the motor may brake the propeller (current below zero).
     flat_earth: the book's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane that does not
     turn, for validation; degrees of latitude are then 157 times longer.  Otherwise WGS84 and the standard atmosphere.
+    tried: whether somebody's model is known not to abort JSBSim; otherwise `flight.trial` finds out.
 
     Raises FlightError for a model that is missing, refused by `flight.model_check`, or not loadable, and for a property
     that the model reads or we need and nobody defines.
@@ -99,12 +101,13 @@ class Fdm:
         motor_braking: bool = False,
         flat_earth: bool = False,
         variation: Variation | None = None,
+        tried: bool = False,
     ) -> None:
         if not 0.0 < rate_hz < math.inf:
             raise FlightError(f"rate_hz = {rate_hz} is not a positive number")
         self.aircraft = aircraft
         self.dt = 1.0 / rate_hz
-        self._exec = _load(aircraft, self.dt, flat_earth)
+        self._exec = _load(aircraft, self.dt, flat_earth, tried or aircraft.embedded)
         self._manager = self._exec.get_property_manager()
         if flat_earth:
             # The atmosphere looks for this name at every step, so here a new property is meant.
@@ -337,7 +340,7 @@ def _nothing() -> float:
     return 0.0
 
 
-def _load(aircraft: Aircraft, dt: float, flat_earth: bool) -> jsbsim.FGFDMExec:
+def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsim.FGFDMExec:
     with _silence(), tempfile.TemporaryDirectory() as copy:
         fdm = jsbsim.FGFDMExec(copy)
         fdm.set_debug_level(0)
@@ -347,6 +350,8 @@ def _load(aircraft: Aircraft, dt: float, flat_earth: bool) -> jsbsim.FGFDMExec:
             aircraft.model_folders,
             shipped=aircraft.model.shipped,
         )
+        if not tried:
+            try_model(aircraft)
         # JSBSim only ever sees a copy of what was checked: some models write files into their own folder.
         folder = Path(copy) / aircraft.name
         folder.mkdir()
