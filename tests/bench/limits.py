@@ -27,14 +27,16 @@ BANK = math.radians(30.0)
 # the height stays within this (m).
 SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
 # A turn is held if the track stays within this of the fly-by path (m; the verdict lets it swing out by 5 m) and the
-# mean bank of three seconds exceeds the limit by at most this: in a steady turn on a 30 degree arc it is 31 degrees.
-CROSS_HELD, BANK_HELD = 2.0, math.radians(1.5)
+# mean bank of two seconds exceeds the limit by at most this: in a steady turn on a 30 degree arc it is 31 degrees.
+CROSS_HELD, BANK_HELD = 2.0, math.radians(2.0)
 _BISECTIONS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Limit:
     """One limit, predicted and flown.  Slopes in rad, positive in the direction of their name; legs in m.
+
+    same_way: whether both turns of a leg go the same way round.
 
     optimistic: by how much more was predicted than flown; negative where the prediction is on the safe side.
     conservative: by which share of the flown limit the prediction stays inside it.
@@ -45,6 +47,7 @@ class Limit:
     wind_from: float
     predicted: float
     flown: float
+    same_way: bool = True
 
     @property
     def optimistic(self) -> float:
@@ -157,14 +160,14 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
             return False
         late = flown.track.time > 5.0
         bank = flown.track.attitude[late, 0].astype(np.float64)
-        width = round(3.0 / float(np.median(np.diff(flown.track.time))))
+        width = round(2.0 / float(np.median(np.diff(flown.track.time))))
         mean = np.abs(np.convolve(bank, np.full(width, 1.0 / width), "valid")).max()
         return bool(np.abs(flown.track.cross_track[late]).max() <= CROSS_HELD and mean <= BANK + BANK_HELD)
 
     far = points(4000.0)
     limits = limits_of(made_setup(far, aircraft, wind, wind_from))
     predicted = float(turn_tangents(limits.packed(aircraft.airspeed), far).sum())
-    return Limit("leg", wind, wind_from, predicted, bisect(holds, 2.0 * predicted, 0.4 * predicted))
+    return Limit("leg", wind, wind_from, predicted, bisect(holds, 2.0 * predicted, 0.4 * predicted), same_way)
 
 
 def calm_limits(*, whole: bool) -> list[Limit]:
