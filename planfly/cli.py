@@ -93,6 +93,19 @@ def _world(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
 
 
+def _steering(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--guidance",
+        choices=("path", "l1", "vector-field"),
+        help="who steers: planfly's own (path), L1 as ArduPlane flies it, or Beard and McLain's vector field",
+    )
+    parser.add_argument(
+        "--nav",
+        choices=("perfect", "rtk", "gnss"),
+        help="how well guidance knows where it is: errors of 0, 0.05 or 1.5 m on each axis",
+    )
+
+
 def _add_run_and_plan(command: _Command) -> None:
     run = command("run", "plan, export, fly, log, judge and report", "planfly run jacksboro --seed 3 --out my-run")
     run.add_argument(
@@ -106,6 +119,7 @@ def _add_run_and_plan(command: _Command) -> None:
     run.add_argument(
         "--seed", metavar="N", type=_seed, help="of planner and turbulence (default: the scenario's, or 1)"
     )
+    _steering(run)
     _overwrite(run)
     plan = command("plan", "plan only", "planfly plan jacksboro --seed 3 --out plan.json")
     plan.add_argument("scenario", metavar="SCENARIO", help="TOML file or embedded name")
@@ -139,6 +153,7 @@ def _add_export_and_fly(command: _Command) -> None:
     fly.add_argument("--wind", metavar="SPEED,FROM", type=_wind, help="steady wind, m/s and degrees it blows from")
     fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=_seed, help="of the turbulence (default: the plan's, or 1)")
+    _steering(fly)
     _overwrite(fly)
 
 

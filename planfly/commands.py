@@ -12,7 +12,7 @@ from planfly.files import prepare_folder, refuse_existing
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, with_wind
+from world.scenario import Scenario, embedded_scenarios, load_scenario, with_flight, with_wind
 
 RUNS = Path("runs")
 MCAP_MAGIC = b"\x89MCAP"
@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     from planfly.results import print_verdict, write_missions, write_pictures, write_verdict
     from planner.plan import plan_json
 
-    scenario = load_scenario(args.scenario)
+    scenario = with_flight(load_scenario(args.scenario), guidance=args.guidance, nav=args.nav)
     seed = choose_seed(scenario, args.seed)
     vehicle = load_vehicle(scenario)
     folder = Path(args.out) if args.out else _default_folder(scenario.name, seed)
@@ -106,7 +106,7 @@ def fly(args: argparse.Namespace) -> int:
     from planfly.pipeline import fly as fly_setup
     from planfly.results import print_verdict, print_warnings
 
-    opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, wind=_wind(args))
+    opened = open_mission(Path(args.mission), args.scenario, args.terrain, seed=args.seed, change=_changes(args))
     default = _default_folder(opened.name, opened.setup.seed) / "flight.mcap"
     target = _target(args.log, default, args.overwrite)
     print_warnings(opened.setup.mission.warnings)
@@ -234,10 +234,11 @@ def _default_folder(name: str, seed: int) -> Path:
     return RUNS / f"{safe}-seed{seed}"
 
 
-def _wind(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
+def _changes(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
     def change(scenario: Scenario) -> Scenario:
         speed, source = args.wind if args.wind else (None, None)
-        return with_wind(scenario, speed, None if source is None else math.radians(source), args.turbulence)
+        blown = with_wind(scenario, speed, None if source is None else math.radians(source), args.turbulence)
+        return with_flight(blown, guidance=args.guidance, nav=args.nav)
 
     return change
 

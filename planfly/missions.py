@@ -29,39 +29,39 @@ def open_mission(
     terrain: str | None,
     *,
     seed: int | None = None,
-    wind: Callable[[Scenario], Scenario] = lambda scenario: scenario,
+    change: Callable[[Scenario], Scenario] = lambda scenario: scenario,
 ) -> OpenedMission:
     """Read a plan.json, .waypoints or .plan, in its own, a named or a made scenario.
 
     terrain: replaces the scenario's.  seed: of the turbulence; None takes the plan's, the scenario's, or 1.
-    wind: changes the scenario's wind.  Raises MissionError, ScenarioError or TerrainError.
+    change: of the scenario's wind or guidance.  Raises MissionError, ScenarioError or TerrainError.
     """
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected")
     if path.suffix.lower() == ".json":
-        return _open_plan(path, scenario_name, terrain, seed, wind)
+        return _open_plan(path, scenario_name, terrain, seed, change)
     mission = read_mission(path)
     if scenario_name is not None:
         scenario = load_scenario(scenario_name, terrain)
     else:
         scenario = foreign_scenario(mission, terrain)
-    scenario = wind(scenario)
+    scenario = change(scenario)
     vehicle = load_vehicle(scenario)
     number = seed if seed is not None else scenario.planner.seed or 1
     return OpenedMission(make_setup(scenario, vehicle, mission, number), vehicle, path.stem)
 
 
 def _open_plan(
-    path: Path, scenario_name: str | None, terrain: str | None, seed: int | None, wind: Callable[[Scenario], Scenario]
+    path: Path, scenario_name: str | None, terrain: str | None, seed: int | None, change: Callable[[Scenario], Scenario]
 ) -> OpenedMission:
     made = read_plan(path, terrain=terrain)
     # The plan's waypoints are in the map of the scenario it was made for; another scenario judges its mission.
-    own = wind(made.scenario)
+    own = change(made.scenario)
     vehicle = load_vehicle(own)
     mission = plan_mission(made, vehicle.airspeed, vehicle.max_bank, source=str(path))
     number = seed if seed is not None else made.seed
     if scenario_name is not None:
-        other = wind(load_scenario(scenario_name, terrain))
+        other = change(load_scenario(scenario_name, terrain))
         vehicle = load_vehicle(other)
         return OpenedMission(make_setup(other, vehicle, mission, number), vehicle, path.stem)
     return OpenedMission(make_setup(own, vehicle, mission, number, plan=made), vehicle, own.name)

@@ -125,6 +125,9 @@ def make_setup(
         battery=vehicle.battery,
         seed=seed,
         plan=plan,
+        guidance=scenario.flight.guidance,
+        nav=scenario.flight.nav,
+        guidance_hz=scenario.flight.guidance_hz,
     )
 
 

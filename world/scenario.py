@@ -268,6 +268,16 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     return replace(scenario, spec=spec, wind=wind)
 
 
+def with_flight(scenario: Scenario, **changes: str | None) -> Scenario:
+    """Make the same scenario with other entries of [flight]; None keeps what it has.
+
+    Raises ScenarioError for a value that a scenario file may not have either.
+    """
+    given = {key: value for key, value in changes.items() if value is not None}
+    table = _checked(lambda: FlightTable(**(scenario.flight.model_dump() | given)), f"{scenario.name}: flight")
+    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
+
+
 def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
     if table.kind == "flat":
         return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * MARGIN)
