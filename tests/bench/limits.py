@@ -29,7 +29,7 @@ SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
 # A turn is held if the track stays within this of the fly-by path (m; the verdict lets it swing out by 5 m) and the
 # mean bank of two seconds exceeds the limit by at most this: in a steady turn on a 30 degree arc it is 31 degrees.
 CROSS_HELD, BANK_HELD = 2.0, math.radians(2.0)
-_BISECTIONS = 8
+_BISECTIONS = 7
 
 
 @dataclass(frozen=True, slots=True)

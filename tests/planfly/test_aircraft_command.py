@@ -52,12 +52,10 @@ def test_the_aerosonde(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
 
 
 def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
-    descents = []
-    for more in ([], ["--motor-braking"]):
-        assert main(["aircraft", "aerosonde", *more]) == 0
-        rows = _rows(capsys.readouterr().out, "steepest climb / descent to the air")
-        descents.append(float(next(row for row in rows if float(row[0]) == 24.0)[3]))
-    assert descents[1] > descents[0] + 5.0
+    assert main(["aircraft", "aerosonde", "--motor-braking"]) == 0
+    rows = _rows(capsys.readouterr().out, "steepest climb / descent to the air")
+    # Without, it is 7.5 degrees.
+    assert float(next(row for row in rows if float(row[0]) == 24.0)[3]) > 12.5
     assert sorted(path.name for path in Path("runs/aircraft-aerosonde").iterdir()) == PICTURES
 
 
