@@ -70,11 +70,10 @@ class _Reader:
     def _refuse(self, what: str) -> None:
         raise FlightError(f"{self.file}:{self._parser.CurrentLineNumber}: {what}; the model is refused")
 
-    def _doctype(self, *_: object) -> None:
-        # JSBSim's own files name a document type without entities.
-        if self._cut:
-            return
-        self._refuse("a document type declaration may expand without end")
+    def _doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
+        # One that only names a document type is never read; JSBSim's own files hold a few harmless entities.
+        if internal and not self._cut:
+            self._refuse("a document type declaration may expand without end")
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         depth = len(self._path)

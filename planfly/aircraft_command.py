@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly.cli import FLYABLE
-from planfly.files import prepare_folder
+from planfly.files import prepare_folder, refuse_folder
 from planfly.progress import progress
 from world.errors import PlanflyError
 from world.files import write_whole
@@ -37,6 +37,7 @@ def aircraft(args: argparse.Namespace) -> int:
     except ValueError as error:
         raise PlanflyError(str(error)) from error
     folder = Path(args.out) if args.out else Path("runs") / f"aircraft-{chosen.name}"
+    refuse_folder(folder, named=bool(args.out), overwrite=args.overwrite)
     # Everything is worked out before anything is written.
     pictures = _portray(chosen, identity, motor_braking=args.motor_braking)
     prepare_folder(folder, named=bool(args.out), overwrite=args.overwrite)

@@ -1,12 +1,13 @@
 """JSBSim's c172x through the same wrapper: its engine, its controls, its fuel, and nothing that it writes."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from aircraft.catalog import jsbsim_folder, load_aircraft
+from aircraft.catalog import jsbsim_folder, load_aircraft, read_aircraft
 from flight.fdm import Fdm, Variation
 from flight.gains import load_gains
 from flight.model_check import check_model
@@ -143,3 +144,22 @@ def test_the_channels_of_another_stock_model_are_cut_out() -> None:
 def test_it_has_gains_of_its_own() -> None:
     assert load_gains(CESSNA).reference_airspeed == CESSNA.airspeed
     assert load_gains(CESSNA) != load_gains(load_aircraft("aerosonde"))
+
+
+def test_a_model_of_ones_own_may_bring_in_files_of_its_folder(tmp_path: Path) -> None:
+    # The Cessna again, as a person would keep it: engine, propeller and autopilot beside the model.
+    folder = tmp_path / "mine"
+    (folder / "Systems").mkdir(parents=True)
+    for name, data in check_model(CESSNA.model_file, lambda _: True, CESSNA.model_folders, shipped=True).items():
+        text = data.decode()
+        # Entities are refused in a model that is not JSBSim's own.
+        for entity, value in re.findall(r'<!ENTITY\s+(\w+)\s+"([^"]*)"', text):
+            text = text.replace(f"&{entity};", value)
+        text = re.sub(r"<!DOCTYPE.*?\]>", "", text, flags=re.DOTALL)
+        inside = folder / "Systems" if name in {"Autopilot.xml", "GNCUtilities.xml"} else folder
+        (inside / name.replace("c172x", "mine")).write_text(text, encoding="utf-8")
+    table = (CESSNA.folder / "c172x.toml").read_text(encoding="utf-8").replace("shipped_by_jsbsim = true", "")
+    (folder / "mine.toml").write_text(table, encoding="utf-8")
+    mine, stock = straight(Fdm(read_aircraft(folder)), 50.0, 600.0), straight(Fdm(CESSNA), 50.0, 600.0)
+    assert mine is not None
+    assert mine == stock
