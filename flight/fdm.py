@@ -4,15 +4,10 @@ The only file that imports JSBSim; feet and slugs stay in it and in `flight.prop
 anything is wrong: after a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state it reads.
 """
 
-import contextlib
-import io
 import math
-import os
 import struct
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -40,6 +35,7 @@ from flight.properties import (
     TERRAIN,
     WIND,
 )
+from flight.quiet import silence
 from flight.state import STATE_SIZE, S
 from flight.trial import try_model
 from flight.trim import START, Floats, T, Trim, air_velocity, body_axes, euler, from_vector, solve
@@ -341,7 +337,7 @@ def _nothing() -> float:
 
 
 def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsim.FGFDMExec:
-    with _silence(), tempfile.TemporaryDirectory() as copy:
+    with silence(), tempfile.TemporaryDirectory() as copy:
         fdm = jsbsim.FGFDMExec(copy)
         fdm.set_debug_level(0)
         files = check_model(
@@ -373,22 +369,3 @@ def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsi
     if not loaded:
         raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model")
     return fdm
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Send standard output nowhere: JSBSim prints its banner whatever its debug level, by either way out.
-
-    Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
-    """
-    sys.stdout.flush()
-    saved = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        with contextlib.redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(saved, 1)
-        os.close(nowhere)
-        os.close(saved)
