@@ -53,7 +53,7 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
         if aircraft.battery_voltage == 0.0:
             idle = "throttle closed"
         else:
-            idle = "the motor brakes" if envelope.motor_braking else "no current: the motor does not brake"
+            idle = "the motor brakes" if envelope.motor_braking else "without current (the motor does not brake)"
         told = f"JSBSim trims; climbs at full throttle, descents: {idle}; shaded: the speeds that guidance uses"
         _title(figure, f"{aircraft.title}: what it can do in steady flight", told)
         _slopes(axes[0, 0], aircraft, envelope)
