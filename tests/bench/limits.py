@@ -167,7 +167,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
     far = points(4000.0)
     limits = limits_of(made_setup(far, aircraft, wind, wind_from))
     predicted = float(turn_tangents(limits.packed(aircraft.airspeed), far).sum())
-    return Limit("leg", wind, wind_from, predicted, bisect(holds, 2.0 * predicted, 0.4 * predicted), same_way)
+    return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
 
 
 def calm_limits(*, whole: bool) -> list[Limit]:

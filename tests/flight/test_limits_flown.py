@@ -8,8 +8,6 @@ import pytest
 from tests.bench.limits import Limit, calm_limits, wind_limits
 
 WHOLE = bool(os.environ.get("PLANFLY_SOAK"))
-# Rolling from one bank to the other takes room that the rule T1 + T2 does not count, m at 25 m/s.
-REVERSAL = 7.0
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +38,5 @@ def test_calm_legs(calm: list[Limit]) -> None:
 def test_in_wind_the_prediction_is_on_the_safe_side_but_not_by_much(windy: list[Limit]) -> None:
     assert {limit.kind for limit in windy} == {"climb", "dive", "leg"}
     for limit in windy:
-        allowed = REVERSAL if limit.kind == "leg" and not limit.same_way else 0.0
-        assert limit.optimistic <= allowed, limit
+        assert limit.optimistic <= 0.0, limit
         assert limit.conservative <= 0.30, limit
