@@ -29,6 +29,7 @@ class Gains:
     airframe, from its coefficients.  pitch_rate_gain, yaw_rate_gain: damping.
 
     The rivals' have defaults.  l1_*: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
+    side_gain, side_lag: how much of the sideways acceleration that the bank does not explain is answered, and its lag.
     field_approach: course to the path far from it.  field_path, field_orbit: how the vector field closes in on a line
     and on an orbit.  field_course, field_course_integral: bank per course error.
     """
@@ -65,6 +66,8 @@ class Gains:
     field_orbit: float = 4.0
     field_course: float = 2.0
     field_course_integral: float = 0.2
+    side_gain: float = 0.0
+    side_lag: float = 0.3
 
     def packed(self) -> Floats:
         """(g,) the fields in order."""

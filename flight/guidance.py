@@ -97,6 +97,12 @@ def _along_path(
     push = rate_gain * (wanted_rate - rate) - gains[G.CROSS_TRACK_INTEGRAL] * memory[M.CROSS_TRACK_SUM]
     # The lift's horizontal part is square to the heading, the acceleration wanted is square to the course.
     crab = math.cos(wrap(ground_course - state[S.YAW]))
+    if memory[M.LAST_EAST] != 0.0 or memory[M.LAST_NORTH] != 0.0:
+        gained = (place[3] - memory[M.LAST_EAST]) * place[4] - (place[4] - memory[M.LAST_NORTH]) * place[3]
+        unexplained = gained / (speed * dt) - GRAVITY * math.tan(state[S.ROLL]) * crab
+        memory[M.SIDE] += (unexplained - memory[M.SIDE]) * min(1.0, dt / gains[G.SIDE_LAG])
+    memory[M.LAST_EAST], memory[M.LAST_NORTH] = place[3], place[4]
+    push -= gains[G.SIDE_GAIN] * memory[M.SIDE]
     wanted = math.atan((speed * speed * curvature + push) / (GRAVITY * max(0.5, crab)))
     bank: float = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
     if bank == wanted and abs(cross) < 20.0:

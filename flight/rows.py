@@ -38,6 +38,8 @@ class G(IntEnum):
     FIELD_ORBIT = 29
     FIELD_COURSE = 30
     FIELD_COURSE_INTEGRAL = 31
+    SIDE_GAIN = 32
+    SIDE_LAG = 33
 
 
 class Lateral(IntEnum):
@@ -74,6 +76,9 @@ class M(IntEnum):
     L1_LEG = 20  # the leg that L1 is on
     L1_SUM = 21  # rad
     COURSE_SUM = 22  # rad s, of the vector field
+    LAST_EAST = 23  # m/s over the ground, a tick ago
+    LAST_NORTH = 24
+    SIDE = 25  # m/s^2 to the right that the bank does not explain
 
 
 MEMORY_SIZE = len(M)

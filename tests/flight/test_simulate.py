@@ -21,6 +21,7 @@ from flight.fdm import Variation
 from flight.setup import FlightSetup
 from flight.simulate import BANK_RESERVE, Flight, simulate
 from flight.track import COLUMNS, Track, join_tracks
+from tests.flight.conftest import standard
 from world.errors import FlightError
 from world.frames import GeoOrigin, to_map
 
@@ -28,16 +29,6 @@ Floats = NDArray[np.float64]
 MakeSetup = Callable[..., FlightSetup]
 ROOT = Path(__file__).parents[2]
 TICK = 1 / 60
-
-
-def standard() -> Floats:
-    """13 km with turns up to 45 degrees, climbs to 6 and dives to 5."""
-    way, course = [np.array([0.0, 0.0, 500.0])], 0.3
-    for turn, slope in ((0, 0), (40, 6), (-45, -5), (30, 4), (45, -3), (-35, 0), (-45, 6), (20, -5), (45, 0)):
-        course += math.radians(turn)
-        up = math.tan(math.radians(slope))
-        way.append(way[-1] + 1450.0 * np.array([math.sin(course), math.cos(course), up]))
-    return np.array(way)
 
 
 def _within(track: Track, cross: tuple[float, float], height: tuple[float, float]) -> None:
