@@ -5,7 +5,11 @@ import math
 import tomllib
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
+
+from aircraft.model import OURS, Model, read_model
 
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
@@ -27,9 +31,10 @@ _KEYS = {
     "surface_rate_deg_s": ("surface_rate", _DEGREE),
     "surface_lag_s": ("surface_lag", 1.0),
     "motor_lag_s": ("motor_lag", 1.0),
-    "battery_v": ("battery_voltage", 1.0),
-    "battery_wh": ("battery_energy", 3600.0),
 }
+# What it carries: one of these pairs.
+_BATTERY = ("battery_v", "battery_wh")
+_FUEL = ("fuel_kg", "fuel_mj_per_kg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +45,8 @@ class Aircraft:
     airspeed, airspeed_min, airspeed_max, stall_speed: m/s, true airspeed; cruise, the range guidance may use,
     and the slowest level trim at sea level.  max_bank: rad, for planned turns.  max_pitch: rad, commanded, either way.
     max_elevator, max_aileron, max_rudder: rad, either way.  surface_rate: rad/s.  surface_lag, motor_lag: s, first
-    order.  battery_voltage: V.  battery_energy: J.
+    order.  battery_voltage: V, 0 for an aircraft that burns fuel.  battery_energy: J, of the battery, or the heat of
+    the fuel.  model: the properties of the JSBSim model.
     """
 
     name: str
@@ -63,11 +69,33 @@ class Aircraft:
     motor_lag: float
     battery_voltage: float
     battery_energy: float
+    model: Model = OURS
 
     @property
     def model_file(self) -> Path:
         """The JSBSim model."""
-        return self.folder / f"{self.name}.xml"
+        folder = jsbsim_folder() / "aircraft" / self.name if self.model.shipped else self.folder
+        return folder / f"{self.name}.xml"
+
+    @property
+    def model_folders(self) -> tuple[Path, ...]:
+        """Where the files that the model brings in may stand."""
+        if self.model.shipped:
+            root = jsbsim_folder()
+            return (root / "aircraft" / self.name, root / "engine", root / "systems")
+        inner = ("Engines", "engine", "Systems", "systems")
+        return (self.folder, *(self.folder / name for name in inner))
+
+    @property
+    def embedded(self) -> bool:
+        """Whether it ships with planfly."""
+        return self.folder.parent == _ROOT
+
+
+def jsbsim_folder() -> Path:
+    """The folder of JSBSim's own models, found without importing it."""
+    spec = find_spec("jsbsim")
+    return Path(spec.origin if spec and spec.origin else "jsbsim").parent
 
 
 def aircraft_names() -> tuple[str, ...]:
@@ -86,6 +114,19 @@ def load_aircraft(name: str) -> Aircraft:
     return read_aircraft(_ROOT / name)
 
 
+def find_aircraft(name: str) -> Aircraft:
+    """Return the aircraft of this name, or the one in this folder if the name has a slash.
+
+    Raises ValueError as `load_aircraft` does.
+    """
+    return read_aircraft(Path(name)) if is_folder(name) else load_aircraft(name)
+
+
+def is_folder(name: str) -> bool:
+    """Whether a scenario's aircraft is a folder, not a name: it has a slash."""
+    return "/" in name or "\\" in name
+
+
 def read_aircraft(folder: Path) -> Aircraft:
     """Return the aircraft described by ``<folder>/<folder's name>.toml``.
 
@@ -101,32 +142,51 @@ def read_aircraft(folder: Path) -> Aircraft:
     title = table.pop("title", folder.name)
     if not isinstance(title, str):
         raise ValueError(f"{file}: title = {title!r} is not a text")
-    if missing := sorted(_KEYS.keys() - table.keys()):
-        raise ValueError(f"{file}: missing {', '.join(missing)}")
-    if unknown := sorted(table.keys() - _KEYS.keys()):
-        raise ValueError(f"{file}: unknown key {', '.join(unknown)}")
-    values = {}
-    for key, (field, factor) in _KEYS.items():
-        value = table[key]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
-            raise ValueError(f"{file}: {key} = {value!r} is not a positive number")
-        values[field] = value * factor
+    try:
+        model = read_model(table.pop("model")) if "model" in table else OURS
+        values = _numbers(table)
+    except ValueError as error:
+        raise ValueError(f"{file}: {error}") from None
     if not values["stall_speed"] <= values["airspeed_min"] <= values["airspeed"] <= values["airspeed_max"]:
         raise ValueError(
             f"{file}: stall_speed_mps <= airspeed_min_mps <= airspeed_mps <= airspeed_max_mps does not hold:"
             f" {values['stall_speed']}, {values['airspeed_min']}, {values['airspeed']}, {values['airspeed_max']}"
         )
-    return Aircraft(name=folder.name, title=title, folder=folder, **values)
+    return Aircraft(name=folder.name, title=title, folder=folder, model=model, **values)
+
+
+def _numbers(table: dict[str, Any]) -> dict[str, float]:
+    """The numeric fields of `Aircraft`; ValueError without the file's name."""
+    store = _FUEL if set(_FUEL) & table.keys() else _BATTERY
+    if missing := sorted({*_KEYS, *store} - table.keys()):
+        raise ValueError(f"missing {', '.join(missing)}")
+    if unknown := sorted(table.keys() - {*_KEYS, *store}):
+        raise ValueError(f"unknown key {', '.join(unknown)}")
+    for key, value in table.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+            raise ValueError(f"{key} = {value!r} is not a positive number")
+    values = {field: table[key] * factor for key, (field, factor) in _KEYS.items()}
+    first, second = (float(table[key]) for key in store)
+    # Watt hours to joules, or kilograms of fuel times megajoules a kilogram.
+    values["battery_voltage"], values["battery_energy"] = (
+        (first, second * 3600.0) if store is _BATTERY else (0.0, first * second * 1e6)
+    )
+    return values
 
 
 def model_hash(aircraft: Aircraft) -> str:
     """SHA-256, as hex, over the names and contents of the model's XML and TOML files.
 
     Any change of the model changes it, so a cached envelope or an old log can say which model it belongs to.
-    Other files in the folder, such as guidance gains, do not count.
+    Other files in the folder, such as guidance gains, do not count.  Raises ValueError for a file that cannot be read.
     """
-    files = tuple(aircraft.folder / f"{aircraft.name}.{suffix}" for suffix in ("toml", "xml"))
-    return _hash_files(files, tuple((file.stat().st_mtime_ns, file.stat().st_size) for file in files))
+    folders = {aircraft.model_file.parent, *(() if aircraft.model.shipped else aircraft.model_folders)}
+    models = sorted({file.resolve() for folder in folders if folder.is_dir() for file in folder.glob("*.xml")})
+    files = (aircraft.folder / f"{aircraft.name}.toml", *(models or (aircraft.model_file,)))
+    try:
+        return _hash_files(files, tuple((file.stat().st_mtime_ns, file.stat().st_size) for file in files))
+    except OSError as error:
+        raise ValueError(f"{error.filename}: the aircraft model cannot be read: {error.strerror}") from None
 
 
 @cache

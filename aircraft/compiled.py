@@ -14,6 +14,7 @@ import numba
 from platformdirs import user_cache_dir
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
+_Result = TypeVar("_Result")
 _ROOMS = ("aircraft", "world", "planner", "flight", "logs")
 
 
@@ -37,6 +38,27 @@ if not _settings.CACHE_DIR:
 def compiled(kernel: _Kernel) -> _Kernel:
     """Compile a function of numbers and arrays to machine code on first use, and keep it.
 
-    Division is that of IEEE 754, as in NumPy: a test for zero at each division costs a judge a third of its time.
+    A division by zero gives infinity or NaN, as in numpy: looking for it costs a tenth of the guidance's time.
     """
     return cast("_Kernel", numba.njit(cache=True, error_model="numpy")(kernel))
+
+
+def compiled_views(kernel: _Kernel) -> _Kernel:
+    """Do the same with a function that makes no arrays but views of its arguments, and returns none.
+
+    It does not count references to them, which takes longer than a hundred sums.
+    """
+    njit: Any = numba.njit  # its types leave this option out
+    return cast("_Kernel", njit(cache=True, error_model="numpy", _nrt=False)(kernel))
+
+
+def entry(kernel: Callable[..., _Result], *arguments: object) -> Callable[..., _Result]:
+    """Give a kernel's machine code for arguments of these types, without the dispatcher that looks at every call's.
+
+    It takes arguments of just these types, and checks none: for a loop that always passes the same arrays.
+    """
+    dispatcher: Any = kernel
+    typeof: Any = numba.typeof
+    signature = tuple(typeof(argument) for argument in arguments)
+    dispatcher.compile(signature)
+    return cast("Callable[..., _Result]", dispatcher.overloads[signature].entry_point)

@@ -16,9 +16,9 @@ from flight.trim import Floats, Trim, fastest, full_throttle, idle, slowest
 from world.files import write_whole
 
 # Any change of what the file holds or of how it is computed counts this up.
-_SCHEMA = 2
-_AIRSPEED = np.arange(16.0, 37.0, 2.0)
-_AMSL = np.arange(0.0, 9001.0, 500.0)
+_SCHEMA = 3
+_SPEEDS = 11
+_AMSL = np.arange(0.0, 9001.0, 1000.0)
 _TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
 
 
@@ -31,7 +31,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     """
     file = cache_file(aircraft, motor_braking)
     key = _key(aircraft, motor_braking)
-    tables = _read(file, key)
+    tables = _read(file, key, _airspeeds(aircraft))
     if tables is None:
         tables = compute_tables(aircraft, motor_braking)
         _write(file, key, tables)
@@ -57,15 +57,16 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     In still standard atmosphere at 45 degrees latitude on a course due north.
     """
     fdm = Fdm(aircraft, motor_braking=motor_braking)
-    climb = np.full((_AIRSPEED.size, _AMSL.size), math.nan)
+    airspeeds = _airspeeds(aircraft)
+    climb = np.full((airspeeds.size, _AMSL.size), math.nan)
     descent = climb.copy()
     slow, fast = np.full(_AMSL.size, math.nan), np.full(_AMSL.size, math.nan)
     for j, amsl in enumerate(_AMSL.tolist()):
         up: Trim | None = None
         down: Trim | None = None
         # From fast to slow: the last ones may not exist, and each trim starts from its neighbour's.
-        for i in reversed(range(_AIRSPEED.size)):
-            airspeed = float(_AIRSPEED[i])
+        for i in reversed(range(airspeeds.size)):
+            airspeed = float(airspeeds[i])
             if found := full_throttle(fdm, airspeed, amsl, up):
                 up, climb[i, j] = found, found.climb
             if found := idle(fdm, airspeed, amsl, down):
@@ -76,13 +77,18 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
             slow[j] = found.airspeed
     # A trim is good to about 1e-11; nine decimals are the same on every machine.
     return {
-        "airspeed": _AIRSPEED,
+        "airspeed": airspeeds,
         "amsl": _AMSL,
         "climb": climb.round(9),
         "descent": descent.round(9),
         "level_speed_min": slow.round(9),
         "level_speed_max": fast.round(9),
     }
+
+
+def _airspeeds(aircraft: Aircraft) -> Floats:
+    """(v,) from the stall to 5 m/s above the fastest that guidance may use, m/s."""
+    return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _SPEEDS)
 
 
 def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
@@ -95,7 +101,7 @@ def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
     }
 
 
-def _read(file: Path, key: dict[str, Any]) -> dict[str, Floats] | None:
+def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
     """Return the tables of a cache file, or None if it is not whole, sound and for this key."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
@@ -105,11 +111,11 @@ def _read(file: Path, key: dict[str, Any]) -> dict[str, Floats] | None:
         tables = {name: np.array(content["tables"][name], dtype=np.float64) for name in _TABLES}
     except (OSError, ValueError, KeyError, TypeError):
         return None
-    grid = (_AIRSPEED.size, _AMSL.size)
-    shapes = {"climb": grid, "descent": grid, "airspeed": _AIRSPEED.shape}
+    grid = (airspeeds.size, _AMSL.size)
+    shapes = {"climb": grid, "descent": grid, "airspeed": airspeeds.shape}
     if any(tables[name].shape != shapes.get(name, _AMSL.shape) for name in _TABLES):
         return None
-    if not (np.array_equal(tables["airspeed"], _AIRSPEED) and np.array_equal(tables["amsl"], _AMSL)):
+    if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _AMSL)):
         return None
     return tables
 

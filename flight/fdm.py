@@ -1,18 +1,13 @@
 """The flight-dynamics model: one JSBSim instance behind packed arrays in SI units.
 
-The only file that knows JSBSim, and the only one with feet and slugs.  JSBSim never says that anything is wrong: after
-a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state it reads.
+The only file that imports JSBSim; feet and slugs stay in it and in `flight.properties`.  JSBSim never says that
+anything is wrong: after a NaN, under ground or after a crash it runs on.  Whoever steps it checks the state it reads.
 """
 
-import contextlib
-import io
 import math
-import os
 import struct
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,93 +15,66 @@ import jsbsim
 import numpy as np
 
 from aircraft.catalog import Aircraft
+from aircraft.model import Command
+from flight.engine import Engine
 from flight.model_check import check_model
-from flight.state import STATE_SIZE, C, S
-from flight.trim import Floats, T, Trim, air_velocity, body_axes, euler, from_vector, solve
+from flight.properties import (
+    FLAT_DENSITY,
+    FLAT_PLANET,
+    FOOT,
+    GUST,
+    HEIGHT,
+    IC_MOTION,
+    IC_PLACE,
+    OWN,
+    POUND,
+    RATE_FACTORS,
+    RATES,
+    SLUG_FT3,
+    STATE,
+    TERRAIN,
+    WIND,
+)
+from flight.quiet import silence
+from flight.state import STATE_SIZE, S
+from flight.trial import try_model
+from flight.trim import START, Floats, T, Trim, air_velocity, body_axes, euler, from_vector, solve
 from world.errors import FlightError
 
 JSBSIM_VERSION: str = jsbsim.__version__
 
-_FOOT = 0.3048
-_SLUG_FT3 = 515.3788183931961  # kg/m^3 in one slug/ft^3
-_POUND = 0.45359237
-
-# The property behind each row of the state, and its factor to SI.
-_STATE = {
-    S.TIME: ("simulation/sim-time-sec", 1.0),
-    S.LATITUDE: ("position/lat-geod-rad", 1.0),
-    S.LONGITUDE: ("position/long-gc-rad", 1.0),
-    # Above the ellipsoid along its radius: within 3 cm of the geodetic height up to 4000 m.
-    S.AMSL: ("position/h-sl-ft", _FOOT),
-    S.V_NORTH: ("velocities/v-north-fps", _FOOT),
-    S.V_EAST: ("velocities/v-east-fps", _FOOT),
-    S.V_DOWN: ("velocities/v-down-fps", _FOOT),
-    S.ROLL: ("attitude/phi-rad", 1.0),
-    S.PITCH: ("attitude/theta-rad", 1.0),
-    S.YAW: ("attitude/psi-rad", 1.0),
-    S.P: ("velocities/p-rad_sec", 1.0),
-    S.Q: ("velocities/q-rad_sec", 1.0),
-    S.R: ("velocities/r-rad_sec", 1.0),
-    S.AIRSPEED: ("velocities/vt-fps", _FOOT),
-    S.ALPHA: ("aero/alpha-rad", 1.0),
-    S.BETA: ("aero/beta-rad", 1.0),
-    S.ELEVATOR: ("surface/elevator-rad", 1.0),
-    S.AILERON: ("surface/aileron-rad", 1.0),
-    S.RUDDER: ("surface/rudder-rad", 1.0),
-    S.THROTTLE: ("motor/throttle-norm", 1.0),
-    S.CURRENT: ("motor/battery-current-a", 1.0),
-    S.POWER: ("motor/battery-power-w", 1.0),
-    S.ACCEL_N: ("accelerations/Nz", 1.0),
-    S.WIND_NORTH: ("atmosphere/total-wind-north-fps", _FOOT),
-    S.WIND_EAST: ("atmosphere/total-wind-east-fps", _FOOT),
-    S.WIND_DOWN: ("atmosphere/total-wind-down-fps", _FOOT),
-}
-_COMMAND = {
-    C.ELEVATOR: "command/elevator-rad",
-    C.AILERON: "command/aileron-rad",
-    C.RUDDER: "command/rudder-rad",
-    C.THROTTLE: "command/throttle-norm",
-}
-_WIND = tuple(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down"))
-_GUST = tuple(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down"))
-_IC_PLACE = ("ic/lat-geod-deg", "ic/long-gc-deg", "ic/terrain-elevation-ft", "ic/h-sl-ft")
-_IC_MOTION = (
-    *("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"),
-    *("ic/vn-fps", "ic/ve-fps", "ic/vd-fps"),
-    *("ic/p-rad_sec", "ic/q-rad_sec", "ic/r-rad_sec"),
-)
-_RATES = (
-    *(f"accelerations/{axis}dot-ft_sec2" for axis in "uvw"),
-    *(f"accelerations/{axis}dot-rad_sec2" for axis in "pqr"),
-    *("velocities/phidot-rad_sec", "velocities/thetadot-rad_sec"),
-)
 _PACK: Callable[..., None] = struct.Struct(f"{STATE_SIZE}d").pack_into
-_RATE_FACTORS = np.array([_FOOT] * 3 + [1.0] * 5)
-_TERRAIN = "position/terrain-elevation-asl-ft"
-_HEIGHT = "position/h-agl-ft"
-# A sphere so large that it is flat, and does not turn: the book's world, for validation.
-_FLAT_PLANET = """<planet name="flat">
-  <semimajor_axis unit="M">1e9</semimajor_axis>
-  <semiminor_axis unit="M">1e9</semiminor_axis>
-  <rotation_rate unit="RAD/SEC">0</rotation_rate>
-  <GM unit="M3/SEC2">9.81e18</GM>
-  <J2>0</J2>
-</planet>
-"""
-_FLAT_DENSITY = 1.2682
 
 
 @dataclass(frozen=True, slots=True)
 class Variation:
     """What differs from the model as published, for validation and robustness: factors, and the parasite drag itself.
 
-    parasite_drag: None keeps the model's own.  control: on the moments of the surfaces.
+    parasite_drag: None keeps the model's own.  control: on the moments of the surfaces.  volts: of the battery.
     """
 
     mass: float = 1.0
     drag: float = 1.0
     control: float = 1.0
     parasite_drag: float | None = None
+    volts: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """The bound nodes themselves, in JSBSim's units, for the one loop that cannot afford `Fdm`'s conversions.
+
+    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI.  commands: setters in
+    the order of `flight.state.C`.  gusts: setters north, east and down, ft/s.  terrain: setter, ft.  feet: in a metre.
+    """
+
+    getters: tuple[Callable[[], float], ...]
+    factors: Floats
+    commands: tuple[Callable[[float], object], ...]
+    gusts: tuple[Callable[[float], object], ...]
+    terrain: Callable[[float], object]
+    run: Callable[[], object]
+    feet: float = 1.0 / FOOT
 
 
 class Fdm:
@@ -115,6 +83,7 @@ class Fdm:
     rate_hz: steps a second.  motor_braking: whether the motor may brake the propeller (current below zero).
     flat_earth: the book's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane that does not
     turn, for validation; degrees of latitude are then 157 times longer.  Otherwise WGS84 and the standard atmosphere.
+    tried: whether somebody's model is known not to abort JSBSim; otherwise `flight.trial` finds out.
 
     Raises FlightError for a model that is missing, refused by `flight.model_check`, or not loadable, and for a property
     that the model reads or we need and nobody defines.
@@ -128,33 +97,39 @@ class Fdm:
         motor_braking: bool = False,
         flat_earth: bool = False,
         variation: Variation | None = None,
+        tried: bool = False,
     ) -> None:
         if not 0.0 < rate_hz < math.inf:
             raise FlightError(f"rate_hz = {rate_hz} is not a positive number")
         self.aircraft = aircraft
         self.dt = 1.0 / rate_hz
-        self._exec = _load(aircraft, self.dt, flat_earth)
+        self._exec = _load(aircraft, self.dt, flat_earth, tried or aircraft.embedded)
         self._manager = self._exec.get_property_manager()
         if flat_earth:
             # The atmosphere looks for this name at every step, so here a new property is meant.
-            self._exec.set_property_value("atmosphere/override/density", _FLAT_DENSITY / _SLUG_FT3)
+            self._exec.set_property_value("atmosphere/override/density", FLAT_DENSITY / SLUG_FT3)
         self._set("simulation/gravity-model", 0.0 if flat_earth else 1.0)
-        self._set("motor/braking", float(motor_braking))
+        self._knob("motor/braking", float(motor_braking), 0.0)
         self._vary(variation or Variation())
-        self._readers = [self._getter(_STATE[row][0]) for row in S]
-        self._factors = np.array([_STATE[row][1] for row in S])
-        self._writers = [self._setter(_COMMAND[row]) for row in C]
-        self._winds = [self._setter(name) for name in _WIND]
-        self._gusts = [self._setter(name) for name in _GUST]
-        self._ic_place = [self._setter(name) for name in _IC_PLACE]
-        self._ic_motion = [self._setter(name) for name in _IC_MOTION]
-        self._rates = [self._getter(name) for name in _RATES]
-        self._terrain = self._setter(_TERRAIN)
-        self._height = self._getter(_HEIGHT)
+        state = STATE | {
+            row: (reading.name, reading.factor) for row, reading in zip(OWN, aircraft.model.readings, strict=True)
+        }
+        self._readers = [self._getter(state[row][0]) for row in S]
+        self._factors = np.array([state[row][1] for row in S])
+        self._writers = [self._commander(command) for command in aircraft.model.commands]
+        self._winds = [self._setter(name) for name in WIND]
+        self._gusts = [self._setter(name) for name in GUST]
+        self._ic_place = [self._setter(name) for name in IC_PLACE]
+        self._ic_motion = [self._setter(name) for name in IC_MOTION]
+        self._rates = [self._getter(name) for name in RATES]
+        self._terrain = self._setter(TERRAIN)
+        self._height = self._getter(HEIGHT)
         self._run = self._exec.run
+        self._engine = Engine(self._exec, self.dt, self._getter, self._setter) if aircraft.model.settles else None
         self._wind = np.zeros(3)
         self._heading = 0.0
-        self._at = (45.0, 0.0, 0.0)  # lat_deg, lon_deg, terrain amsl
+        # lat_deg, lon_deg, terrain amsl: far below, where neither ground effect nor wheels matter.
+        self._at = (45.0, 0.0, -1000.0)
 
     def _node(self, name: str) -> jsbsim.FGPropertyNode:
         node = self._manager.get_node(name) if self._manager.hasNode(name) else None
@@ -163,6 +138,8 @@ class Fdm:
         return node
 
     def _getter(self, name: str) -> Callable[[], float]:
+        if not name:
+            return _nothing
         getter: Callable[[], float] = self._node(name).get_double_value
         return getter
 
@@ -170,17 +147,32 @@ class Fdm:
         setter: Callable[[float], object] = self._node(name).set_double_value
         return setter
 
+    def _commander(self, command: Command) -> Callable[[float], object]:
+        """A setter in rad, or of the throttle, for a property that may count otherwise."""
+        setter, above, below = self._setter(command.name), command.above, command.below
+        if above == below == 1.0:
+            return setter
+        return lambda value: setter(value * (above if value > 0.0 else below))
+
     def _set(self, name: str, value: float) -> None:
         self._setter(name)(value)
+
+    def _knob(self, name: str, value: float, usual: float) -> None:
+        """Set a property that a model need not have while its value is the usual one."""
+        if value != usual or self._manager.hasNode(name):
+            self._set(name, value)
 
     def _vary(self, variation: Variation) -> None:
         if variation.mass != 1.0:
             extra = (variation.mass - 1.0) * self.aircraft.mass
-            self._set("inertia/pointmass-weight-lbs", extra / _POUND)
-        self._set("aero/drag-factor", variation.drag)
-        self._set("aero/control-factor", variation.control)
+            there = self._getter("inertia/pointmass-weight-lbs")()
+            self._set("inertia/pointmass-weight-lbs", there + extra / POUND)
+        self._knob("aero/drag-factor", variation.drag, 1.0)
+        self._knob("aero/control-factor", variation.control, 1.0)
         if variation.parasite_drag is not None:
             self._set("aero/parasite-drag", variation.parasite_drag)
+        if variation.volts != 1.0:
+            self._set("motor/battery-v", variation.volts * self.aircraft.battery_voltage)
 
     def start(
         self,
@@ -215,13 +207,16 @@ class Fdm:
         self._wind = wind
         self._heading = math.atan2(velocity[1], velocity[0])
         self.place(amsl)
-        values = solve(self.balance, {T.AIRSPEED: airspeed, T.CLIMB: climb}, self.surface_limits())
+        held = {T.AIRSPEED: airspeed, T.CLIMB: climb}
+        values = solve(self.balance, held, self.surface_limits(), self.first_guess())
         if values is None:
             raise FlightError(
                 f"{self.aircraft.name} holds no steady flight at {airspeed:.1f} m/s,"
                 f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level"
             )
         self.balance(values)
+        if self._engine:
+            self._engine.release()
         self._exec.set_trim_status(False)
         self._exec.set_sim_time(0.0)
         # While the initial conditions ran, the wind stood in the gusts, because they overwrite the wind.
@@ -249,20 +244,31 @@ class Fdm:
     def set_wind(self, north: float, east: float, down: float) -> None:
         """Set the steady wind, m/s, the way the air moves."""
         for setter, value in zip(self._winds, (north, east, down), strict=True):
-            setter(value / _FOOT)
+            setter(value / FOOT)
 
     def set_gust(self, north: float, east: float, down: float) -> None:
         """Set what adds to the steady wind, m/s, the way the air moves."""
         for setter, value in zip(self._gusts, (north, east, down), strict=True):
-            setter(value / _FOOT)
+            setter(value / FOOT)
 
     def set_terrain(self, amsl: float) -> None:
         """Set the ground's height below the aircraft, m above sea level."""
-        self._terrain(amsl / _FOOT)
+        self._terrain(amsl / FOOT)
+
+    def links(self) -> Links:
+        """The bound nodes of this instance."""
+        return Links(
+            getters=tuple(self._readers),
+            factors=self._factors,
+            commands=tuple(self._writers),
+            gusts=tuple(self._gusts),
+            terrain=self._terrain,
+            run=self._run,
+        )
 
     def height(self) -> float:
         """Height above the ground last set, m; negative under ground, where JSBSim flies on."""
-        return self._height() * _FOOT
+        return self._height() * FOOT
 
     # What trims and linearisation need.
 
@@ -270,13 +276,21 @@ class Fdm:
         """Elevator, aileron and rudder limits, rad, either way."""
         return self.aircraft.max_elevator, self.aircraft.max_aileron, self.aircraft.max_rudder
 
+    def first_guess(self) -> Floats:
+        """(8,) a trim vector to start from: level at cruise."""
+        guess = START.copy()
+        guess[T.AIRSPEED] = self.aircraft.airspeed
+        return guess
+
     def place(self, amsl: float) -> None:
         """Move the point of evaluation for `balance` and `derivatives` to this height; ends any flight."""
         lat_deg, lon_deg, terrain = self._at
-        for setter, value in zip(self._ic_place, (lat_deg, lon_deg, terrain / _FOOT, amsl / _FOOT), strict=True):
+        for setter, value in zip(self._ic_place, (lat_deg, lon_deg, terrain / FOOT, amsl / FOOT), strict=True):
             setter(value)
         self.set_gust(*self._wind)
         self._exec.set_trim_status(True)
+        if self._engine:
+            self._engine.hold()
 
     def balance(self, values: Floats) -> Floats:
         """(6,) body accelerations, m/s^2 and rad/s^2, of the steady flight with this trim vector (8,)."""
@@ -284,62 +298,74 @@ class Fdm:
         alpha = values[T.ALPHA]
         air = axes @ np.array([math.cos(alpha), 0.0, math.sin(alpha)]) * values[T.AIRSPEED]
         commands = values[[T.ELEVATOR, T.AILERON, T.RUDDER, T.THROTTLE]]
-        return self._evaluate(euler(axes), air + self._wind, (0.0, 0.0, 0.0), commands)[:6]
+        return self._evaluate(euler(axes), air + self._wind, (0.0, 0.0, 0.0), commands, settle=True)[:6]
 
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
-        """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands (4,)."""
+        """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands (4,).
+
+        An engine keeps the speed at which the last `balance` left it.
+        """
         roll, pitch = states[6], states[7]
         axes = body_axes(self._heading, pitch, roll, 0.0)
         return self._evaluate(
             (roll, pitch, self._heading), axes @ states[:3] + self._wind, tuple(states[3:6]), commands
         )
 
-    def _evaluate(self, angles: Sequence[float], velocity: Floats, pqr: Sequence[float], commands: Floats) -> Floats:
+    def _evaluate(
+        self,
+        angles: Sequence[float],
+        velocity: Floats,
+        pqr: Sequence[float],
+        commands: Floats,
+        settle: bool = False,
+    ) -> Floats:
         # Trim status lets the actuators through unlagged.
         self.write(commands)
-        for setter, value in zip(self._ic_motion, (*angles, *(velocity / _FOOT), *pqr), strict=True):
+        for setter, value in zip(self._ic_motion, (*angles, *(velocity / FOOT), *pqr), strict=True):
             setter(value)
         self._exec.run_ic()
-        rates: Floats = np.array([rate() for rate in self._rates]) * _RATE_FACTORS
+        if self._engine:
+            self._engine.settle(spin=settle)
+            self._exec.run_ic()
+        rates: Floats = np.array([rate() for rate in self._rates]) * RATE_FACTORS
         return rates
 
 
-def _load(aircraft: Aircraft, dt: float, flat_earth: bool) -> jsbsim.FGFDMExec:
-    with _silence():
-        fdm = jsbsim.FGFDMExec(str(aircraft.folder.parent))
+def _nothing() -> float:
+    """What an aircraft without this quantity reads."""
+    return 0.0
+
+
+def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsim.FGFDMExec:
+    with silence(), tempfile.TemporaryDirectory() as copy:
+        fdm = jsbsim.FGFDMExec(copy)
         fdm.set_debug_level(0)
-        for kind in ("aircraft", "engine", "systems"):
-            getattr(fdm, f"set_{kind}_path")(str(aircraft.folder.parent))
+        files = check_model(
+            aircraft.model_file,
+            fdm.get_property_manager().hasNode,
+            aircraft.model_folders,
+            shipped=aircraft.model.shipped,
+        )
+        if not tried:
+            try_model(aircraft)
+        # JSBSim only ever sees a copy of what was checked: some models write files into their own folder.
+        folder = Path(copy) / aircraft.name
+        folder.mkdir()
+        for name, data in files.items():
+            (folder / name).write_bytes(data)
+        fdm.set_aircraft_path(copy)
+        fdm.set_engine_path(str(folder))
+        fdm.set_systems_path(str(folder))
         fdm.set_dt(dt)
-        check_model(aircraft.model_file, fdm.get_property_manager().hasNode)
         if flat_earth:
-            with tempfile.TemporaryDirectory() as folder:
-                planet = Path(folder) / "flat.xml"
-                planet.write_text(_FLAT_PLANET, encoding="utf-8")
-                fdm.load_planet(str(planet), False)
+            planet = Path(copy) / "flat.xml"
+            planet.write_text(FLAT_PLANET, encoding="utf-8")
+            fdm.load_planet(str(planet), False)
         try:
             loaded = fdm.load_model(aircraft.name)
         except (jsbsim.BaseError, RuntimeError, ValueError, OSError) as error:
-            raise FlightError(f"{aircraft.model_file}: JSBSim: {' '.join(str(error).split())}") from None
+            said = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
+            raise FlightError(f"{aircraft.model_file}: JSBSim: {said}") from None
     if not loaded:
         raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model")
     return fdm
-
-
-@contextmanager
-def _silence() -> Iterator[None]:
-    """Send standard output nowhere: JSBSim prints its banner whatever its debug level, by either way out.
-
-    Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
-    """
-    sys.stdout.flush()
-    saved = os.dup(1)
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 1)
-        with contextlib.redirect_stdout(io.StringIO()):
-            yield
-    finally:
-        os.dup2(saved, 1)
-        os.close(nowhere)
-        os.close(saved)

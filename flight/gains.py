@@ -2,7 +2,7 @@
 
 import math
 import tomllib
-from dataclasses import dataclass, fields
+from dataclasses import MISSING, dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,11 @@ class Gains:
     roll_rate_gain, aileron_per_roll_rate, roll_integral: aileron per rad/s of roll rate error, per rad/s of
     steady roll rate, and per rad s of roll error.  alpha_per_g, elevator_per_alpha, elevator_per_pitch_rate: the
     airframe, from its coefficients.  pitch_rate_gain, yaw_rate_gain: damping.
+
+    The rivals' have defaults.  l1_*: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
+    side_gain, side_lag: how much of the sideways acceleration that the bank does not explain is answered, and its lag.
+    field_approach: course to the path far from it.  field_path, field_orbit: how the vector field closes in on a line
+    and on an orbit.  field_course, field_course_integral: bank per course error.
     """
 
     reference_airspeed: float
@@ -53,13 +58,23 @@ class Gains:
     elevator_per_pitch_rate: float
     pitch_rate_gain: float
     yaw_rate_gain: float
+    l1_period: float = 17.0
+    l1_damping: float = 0.75
+    l1_integral: float = 0.02
+    field_approach: float = math.radians(60.0)
+    field_path: float = 0.05
+    field_orbit: float = 4.0
+    field_course: float = 2.0
+    field_course_integral: float = 0.2
+    side_gain: float = 0.0
+    side_lag: float = 0.3
 
     def packed(self) -> Floats:
         """(g,) the fields in order."""
         return np.array([getattr(self, item.name) for item in fields(self)])
 
 
-_UNITS = ("_rad_s", "_1_s3", "_1_s2", "_1_s", "_deg", "_mps", "_s")
+_UNITS = ("_rad_s", "_1_s3", "_1_s2", "_1_s", "_1_m", "_deg", "_mps", "_s")
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
@@ -77,9 +92,10 @@ def load_gains(aircraft: Aircraft) -> Gains:
             raise FlightError(f"{file}: {key} = {value!r} is not a finite number")
         name = next((key.removesuffix(unit) for unit in _UNITS if key.endswith(unit)), key)
         values[name] = math.radians(value) if key.endswith("_deg") else float(value)
-    wanted = [item.name for item in fields(Gains)]
-    if sorted(values) != sorted(wanted):
-        missing, unknown = sorted(set(wanted) - set(values)), sorted(set(values) - set(wanted))
+    known = {item.name for item in fields(Gains)}
+    wanted = {item.name for item in fields(Gains) if item.default is MISSING}
+    missing, unknown = sorted(wanted - set(values)), sorted(set(values) - known)
+    if missing or unknown:
         raise FlightError(
             f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
         )

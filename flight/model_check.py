@@ -5,7 +5,7 @@ names a property which does not exist aborts the process, at the first step or w
 """
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.parsers import expat
 
@@ -18,13 +18,30 @@ _NAMELESS = frozenset({"fdm_config", "location", "pointmass", "channel", "axis",
 _NAME = re.compile(r"-?\s*([A-Za-z_][\w./\[\]-]*)\Z")
 
 
-class _Reader:
-    """Collects property names from one file's XML events and stops at the first forbidden element."""
+# Made by JSBSim while it loads an engine, a tank or a wheel, so that they cannot be looked up before.
+_MADE_BY_PARTS = re.compile(
+    r"-?(propulsion/(engine|tank)|gear/unit|fcs/(throttle|mixture|advance|feather|propeller-feather)-(cmd|pos)-norm)"
+)
+_PARTS = frozenset({"engine", "tank", "contact", "thruster"})
 
-    def __init__(self, file: Path) -> None:
+
+class _Reader:
+    """Collects property names from one file's XML events and stops at the first forbidden element.
+
+    main: whether it is the model itself, not a file that it brings in.  cut: whether ``<input>`` and ``<output>``
+    channels are noted to be cut out, instead of refused.
+    """
+
+    def __init__(self, file: Path, *, main: bool = True, cut: bool = False) -> None:
         self.file = file
+        self.data = b""
         self.read_names: dict[str, int] = {}  # with the line of the first use
         self.made_names: set[str] = set()
+        self.brings: dict[str, str] = {}  # file names, and where they are named
+        self.has_parts = False
+        self._main, self._cut = main, cut
+        self._cutting = -1  # the byte at which the channel that is being cut begins
+        self._spans: list[tuple[int, int]] = []
         self._path: list[str] = []
         self._text: list[str] = []
         self._declares = False
@@ -36,39 +53,63 @@ class _Reader:
 
     def read(self) -> None:
         try:
-            self._parser.Parse(self.file.read_bytes(), True)
+            self.data = self.file.read_bytes()
+            self._parser.Parse(self.data, True)
         except OSError as error:
             raise FlightError(f"{self.file}: the aircraft model cannot be read: {error.strerror}") from None
         except expat.ExpatError as error:
             raise FlightError(f"{self.file}: not well-formed XML: {error}") from None
 
+    def without_channels(self) -> bytes:
+        """The file's bytes with blanks for the channels, so that lines keep their numbers."""
+        data = bytearray(self.data)
+        for start, end in self._spans:
+            data[start:end] = bytes(byte if byte == 10 else 32 for byte in data[start:end])
+        return bytes(data)
+
     def _refuse(self, what: str) -> None:
         raise FlightError(f"{self.file}:{self._parser.CurrentLineNumber}: {what}; the model is refused")
 
-    def _doctype(self, *_: object) -> None:
-        self._refuse("a document type declaration may expand without end")
+    def _doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
+        # One that only names a document type is never read; JSBSim's own files hold a few harmless entities.
+        if internal and not self._cut:
+            self._refuse("a document type declaration may expand without end")
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         depth = len(self._path)
-        if depth == 0 and name != "fdm_config":
+        self._path.append(name)
+        self._text = []
+        if self._cutting >= 0:
+            return
+        if self._main and depth == 0 and name != "fdm_config":
             self._refuse(f"the root element is <{name}>, not <fdm_config>")
         # Inside a flight control component, <input> and <output> hold a property's name and no attribute.
         if name in {"input", "output"} and (depth < 3 or attributes):
-            self._refuse(f"<{name}> opens a port or writes a file")
+            if not self._cut:
+                self._refuse(f"<{name}> opens a port or writes a file")
+            self._cutting = self._parser.CurrentByteIndex
+            return
         if "file" in attributes:
-            self._refuse(f'<{name} file="{attributes["file"]}"> brings in another file, unseen')
+            where = f'{self.file}:{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
+            self.brings.setdefault(attributes["file"], where)
+        self.has_parts |= name in _PARTS
         # Functions and flight control components make a property of their name; the latter put fcs/ before a bare one.
         if name not in _NAMELESS and (made := attributes.get("name")):
             self.made_names |= {made, "fcs/" + made.lower().replace(" ", "-")}
         # A <property> right below a section declares one, everywhere else it reads one.
-        self._declares = name == "property" and depth == 2
-        self._path.append(name)
-        self._text = []
+        self._declares = name == "property" and depth == (2 if self._main else 1)
 
     def _end(self, name: str) -> None:
         self._path.pop()
         match = _NAME.fullmatch("".join(self._text).strip())
         self._text = []
+        if self._cutting >= 0:
+            if name in {"input", "output"} and len(self._path) < 3:
+                # An empty-element tag ends where it began; otherwise the parser stands before the end tag.
+                here = self._parser.CurrentByteIndex
+                self._spans.append((self._cutting, self.data.index(b">", here) + 1))
+                self._cutting = -1
+            return
         if match is None:
             return
         if self._declares or name == "output":
@@ -80,16 +121,54 @@ class _Reader:
         self._text.append(text)
 
 
-def check_model(file: Path, provided: Callable[[str], bool]) -> None:
-    """Refuse a model that is unsafe to give to JSBSim.
+def check_model(
+    file: Path, provided: Callable[[str], bool], folders: Sequence[Path] = (), *, shipped: bool = False
+) -> dict[str, bytes]:
+    """Refuse a model that is unsafe to give to JSBSim, and return its files by name, as JSBSim may read them.
 
-    provided: whether JSBSim itself has a property of this name before a model is loaded.
+    provided: whether JSBSim itself has a property of this name before a model is loaded.  folders: where the files that
+    the model brings in may stand.  shipped: the model is JSBSim's own: its channels are cut out, and its names
+    are known to be sound.
     Raises FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
-    declaration, for an ``<input>`` or ``<output>`` channel, for an element that includes another file, and for a
+    declaration, for an ``<input>`` or ``<output>`` channel, for a file brought in that is not in the folders, and for a
     property that is read and that neither JSBSim nor the model makes.
     """
-    reader = _Reader(file)
+    readers = {file.name: _read(file, main=True, cut=shipped)}
+    waiting = dict(readers[file.name].brings)
+    while waiting:
+        name, where = waiting.popitem()
+        found = _find(name, folders)
+        if found is None:
+            raise FlightError(f"{where} brings in another file, which is not in the aircraft's folder")
+        if found.name not in readers:
+            readers[found.name] = _read(found, main=False, cut=shipped)
+            waiting |= readers[found.name].brings
+    if not shipped:
+        _check_names(list(readers.values()), provided)
+    return {name: reader.without_channels() for name, reader in readers.items()}
+
+
+def _read(file: Path, *, main: bool, cut: bool) -> _Reader:
+    reader = _Reader(file, main=main, cut=cut)
     reader.read()
-    for name, line in reader.read_names.items():
-        if name not in reader.made_names and not provided(name):
-            raise FlightError(f"{file}:{line}: property {name} is read, and neither JSBSim nor the model makes it")
+    return reader
+
+
+def _find(name: str, folders: Sequence[Path]) -> Path | None:
+    """The file of this name, with or without its suffix; never outside the folders."""
+    if Path(name).name != name or name.startswith("."):
+        return None
+    names = (name, f"{name}.xml")
+    return next((folder / one for folder in folders for one in names if (folder / one).is_file()), None)
+
+
+def _check_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) -> None:
+    made = set().union(*(reader.made_names for reader in readers))
+    parts = any(reader.has_parts for reader in readers)
+    for reader in readers:
+        for name, line in reader.read_names.items():
+            if name in made or (parts and _MADE_BY_PARTS.match(name)) or provided(name):
+                continue
+            raise FlightError(
+                f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model makes it"
+            )

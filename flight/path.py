@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance import profile
+from flight.path_kernels import profile
 from flight.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns
 from world.limits import BLEND_ACCELERATION, Limits

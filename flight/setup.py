@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from aircraft.envelope import Envelope
 from flight.mission import Mission
@@ -9,6 +10,7 @@ from flight.route import Route
 from planner.plan import Plan
 from world.limits import Limits
 from world.scenario import Scenario
+from world.scenario_file import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +19,8 @@ class FlightSetup:
 
     airspeed: m/s.  max_bank: rad.  battery: Wh.  mission_text: the mission as a .waypoints file, as flown.
     plan: None for a mission that a person brought.  seed: of the run; the turbulence's stream comes from it
-    unless the scenario's wind has its own.
+    unless the scenario's wind has its own.  guidance: the law that steers.  nav: how well it knows where it is, a key
+    of `flight.navigation.ERRORS`.  guidance_hz: how often it steers, and how many rows the track has a second.
     """
 
     scenario: Scenario
@@ -31,6 +34,9 @@ class FlightSetup:
     battery: float
     seed: int
     plan: Plan | None = None
+    guidance: Guidance = "path"
+    nav: Navigation = "perfect"
+    guidance_hz: Literal[30, 60] = 60
 
 
 def limits_of(setup: FlightSetup) -> Limits:

@@ -1,6 +1,7 @@
 """The flight: JSBSim under guidance along a route, over its terrain, until its end or its failure."""
 
 import math
+import struct
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -8,23 +9,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
-from aircraft.compiled import compiled
+from aircraft.compiled import entry
+from flight.arena import ROW, Arena, K, Table
 from flight.chart import Chart, Ground
-from flight.fdm import Fdm, Variation
+from flight.fdm import Fdm, Links, Variation
 from flight.gains import load_gains
-from flight.guidance import MEMORY_SIZE, M, guide
+from flight.navigation import ERRORS, NAV_STATES, start_navigation
 from flight.path import FlyByPath, fly_by_path
+from flight.rows import Lateral, M
 from flight.setup import FlightSetup, limits_of
-from flight.state import COMMAND_SIZE, STATE_SIZE, C, S
-from flight.track import COLUMNS, Track, join_tracks
+from flight.state import S
+from flight.tick import ENDS, tick
+from flight.track import COLUMNS, Track
 from flight.trim import straight
-from flight.turbulence import GUST_STATES, start_gusts, step_gusts
+from flight.turbulence import GUST_STATES, start_gusts
 from world.errors import FlightError
-from world.frames import polymap, to_geo
-from world.geometry import leg_courses, wrap
+from world.frames import to_geo
+from world.geometry import leg_courses, signed_turns
 from world.limits import Limits, ground_speed_on
-from world.streams import TURBULENCE, stream
-from world.terrain import Heights, ground_height
+from world.streams import NAVIGATION, TURBULENCE, stream
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -32,28 +35,16 @@ Progress = Callable[[float, float], None]
 Sink = Callable[[Track], None]
 
 FDM_HZ = 120.0
-STEPS_A_TICK = 2
-TICK = STEPS_A_TICK / FDM_HZ
+# Of the usual guidance, s; `Flight.dt` is a flight's own.
+TICK = 1.0 / 60.0
 # Rows that are handed on at a time, s of flight.
 BLOCK = 1.0
 # Bank that guidance may add to the planned turns' to correct an error, rad.
-BANK_RESERVE = math.radians(2.5)
-STEEPEST_BANK = math.radians(75.0)
+BANK_RESERVE = math.radians(3.5)
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
 PATIENCE = 1.5
 PATIENCE_SECONDS = 60.0
-ROW = sum(COLUMNS.values())
-# A flight that passes the end of its route further than this from it, m, has missed it.
-_FAR = 100.0
-
-_ENDS = {
-    1: "completed",
-    2: "departure: the state is not a number",
-    3: "ground contact",
-    4: "departure: bank beyond 75 degrees",
-    5: "departure: airspeed below the stall",
-    6: "missed: passed the end of the route more than 100 m from it",
-}
+LAWS = {"path": Lateral.PATH, "l1": Lateral.L1, "vector-field": Lateral.VECTOR_FIELD}
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,18 +71,16 @@ def simulate(
     Raises FlightError for a flight that cannot start.
     """
     flight = Flight(setup, aircraft, variation)
-    blocks: list[Track] = []
+    blocks: list[Floats] = []
     ended = ""
     while not ended:
-        rows, ended = flight.block(round(BLOCK / TICK))
-        if len(rows):
-            block = as_track(rows)
-            blocks.append(block)
-            if sink is not None:
-                sink(block)
+        rows, ended = flight.block(round(BLOCK / flight.dt))
+        blocks.append(rows)
+        if sink is not None and len(rows):
+            sink(as_track(rows))
         if progress is not None:
             progress(min(flight.memory[M.DISTANCE], flight.path.length), flight.path.length)
-    return Flown(join_tracks(blocks), ended, flight.path)
+    return Flown(as_track(np.concatenate(blocks)), ended, flight.path)
 
 
 def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
@@ -112,30 +101,59 @@ class Flight:
         self.path = fly_by_path(setup.route, limits)
         self.speeds = setup.route.airspeed
         gains = load_gains(aircraft)
-        self.gains = gains.packed()
         self.terrain = Ground(scenario.terrain)
         self.chart = Chart.around(setup)
-        wind = scenario.wind
-        self.wind = np.array(
-            [wind.speed, wind.from_course + math.pi, wind.gradient, wind.reference_amsl, W20[wind.turbulence]]
-        )
+        self.steps = round(FDM_HZ / setup.guidance_hz)
+        self.dt = self.steps / FDM_HZ
+        self.arena = Arena(gains, round(BLOCK / self.dt), self._tables(setup))
+        self.memory, self.commands = self.arena.memory, self.arena.commands
         braking = scenario.flight.motor_braking
         self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking, variation=variation)
-        self.state, self.commands = np.zeros(STATE_SIZE), np.zeros(COMMAND_SIZE)
-        # What one tick leaves for the next: wind, gusts, ground and energy, see `_tick`.
-        self.air = np.zeros(7)
-        self.memory = np.zeros(MEMORY_SIZE)
         self.memory[M.MAX_BANK] = limits.max_bank + BANK_RESERVE
+        self.memory[M.GUIDANCE] = LAWS[setup.guidance]
         # Guidance knows the model; it is not told how the aircraft differs from it.
         self._start(setup, gains.reference_airspeed, Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking))
-        seed = wind.seed if wind.seed is not None else setup.seed
-        self.random = stream(seed, TURBULENCE)
-        self.gusts = np.zeros(GUST_STATES)
-        start_gusts(self.random.standard_normal(GUST_STATES), self.gusts)
-        self.slowest = 0.94 * aircraft.stall_speed
-        self.ticks = 0
+        self._disturb(setup)
+        links = self.fdm.links()
+        self.arena.factors[:] = links.factors
+        self._read, self._links = _reader(links, self.arena), links
+        self._tick = entry(tick, self.arena.packed, self.arena.tables, self.terrain.heights)
+        constants = self.arena.constants
+        constants[K.LONGITUDE] = self.chart.position.packed[0, 1]
+        constants[K.DT], constants[K.SLOWEST] = self.dt, 0.94 * aircraft.stall_speed
         slow = _slowest_leg(setup, limits)
-        self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / TICK)
+        self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / self.dt)
+
+    def _tables(self, setup: FlightSetup) -> dict[Table, Floats]:
+        route = setup.route
+        turns = np.concatenate([[0.0], np.abs(signed_turns(route.waypoints)), [0.0]])
+        return {
+            Table.POSITION: self.chart.position.packed,
+            Table.ANGLE: self.chart.angle.packed,
+            Table.TO_PIXEL: self.terrain.packed,
+            Table.PIECES: self.path.pieces,
+            Table.NODES: self.path.nodes,
+            Table.CORNERS: np.column_stack([route.waypoints[:, :2], turns, route.fly_over, route.acceptance]),
+            Table.SPEEDS: self.speeds[:, np.newaxis],
+        }
+
+    def _disturb(self, setup: FlightSetup) -> None:
+        """Set the wind, and start turbulence and navigation's error."""
+        wind, arena = setup.scenario.wind, self.arena
+        to = wind.from_course + math.pi
+        arena.wind[:] = (
+            *(wind.speed, math.cos(to), math.sin(to)),
+            *(wind.gradient, wind.reference_amsl, W20[wind.turbulence]),
+        )
+        # What blows is set as a gust, all of it: three nodes a tick, not six; none in still air.
+        self.windy = bool(wind.speed or wind.gradient or W20[wind.turbulence])
+        self.random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
+        start_gusts(self.random.standard_normal(GUST_STATES), arena.gusts)
+        sigma, time_constant = ERRORS[setup.nav]
+        arena.constants[K.NAV_SIGMA], arena.constants[K.NAV_TIME] = sigma, time_constant
+        self.nav_random = stream(setup.seed, NAVIGATION) if sigma else None
+        if self.nav_random is not None:
+            start_navigation(self.nav_random.standard_normal(NAV_STATES), arena.nav)
 
     def _start(self, setup: FlightSetup, reference: float, model: Fdm) -> None:
         points = setup.route.waypoints
@@ -172,6 +190,9 @@ class Flight:
         if trimmed is None:
             raise FlightError(f"{setup.mission.source}: {problem}") from problem
         self.commands[:] = trimmed.commands()
+        self.arena.air[:2] = wind[:2]
+        self.fdm.set_wind(0.0, 0.0, 0.0)
+        self.fdm.set_gust(*wind)
         memory = self.memory
         memory[M.TRIM_ELEVATOR], memory[M.TRIM_ALPHA] = level.elevator, level.alpha
         memory[M.TRIM_THROTTLE] = (straight(model, speed, up) or level).throttle
@@ -179,33 +200,74 @@ class Flight:
 
     def block(self, count: int) -> tuple[Floats, str]:
         """Fly up to ``count`` ticks: their rows, and how the flight ended ("" while it goes on)."""
-        rows = np.zeros((count, ROW))
-        noise = self.random.standard_normal((count, 3))
-        fdm, state, commands, memory = self.fdm, self.state, self.commands, self.memory
-        chart, ground = self.chart, self.terrain
-        pieces, nodes = self.path.pieces, self.path.nodes
-        air = self.air
-        for k in range(count):
-            fdm.read(state)
-            status = _tick(
-                state, chart.position.packed, chart.angle.packed, ground.heights, ground.packed, pieces, nodes,
-                self.speeds, self.gains, memory, commands, self.wind, self.gusts, noise[k], self.slowest,
-                self.ticks * TICK, rows[k], air,
-            )  # fmt: skip
-            if status == 2:
-                return rows[:k], _ENDS[2]
-            if status:
-                return rows[: k + 1], _ENDS[status]
-            self.ticks += 1
-            if self.ticks >= self.most_ticks:
-                return rows[: k + 1], f"time limit: not finished after {self.ticks * TICK:.0f} s"
-            fdm.write(commands)
-            fdm.set_wind(air[0], air[1], 0.0)
-            fdm.set_gust(air[2], air[3], air[4])
-            if ground.known:
-                fdm.set_terrain(air[5])
-            fdm.step(STEPS_A_TICK)
+        parts: list[Floats] = []
+        ended = ""
+        size = len(self.arena.noise)
+        while count > 0 and not ended:
+            rows, ended = self._second(min(count, size))
+            parts.append(rows)
+            count -= size
+        return (parts[0] if len(parts) == 1 else np.concatenate([np.empty((0, ROW)), *parts])), ended
+
+    def _second(self, count: int) -> tuple[Floats, str]:
+        """Do the same with as many ticks as the arena has room for."""
+        noise, constants = self.arena.noise, self.arena.constants
+        noise[:count, :3] = self.random.standard_normal((count, 3))
+        if self.nav_random is not None:
+            noise[:count, 3:] = self.nav_random.standard_normal((count, 3))
+        left = self.most_ticks - int(constants[K.TICK])
+        constants[K.ROW] = 0.0
+        status = self._fly(min(count, left))
+        rows = self.arena.rows[: int(constants[K.ROW])].copy()
+        if status:
+            return rows, ENDS[status]
+        if left <= count:
+            return rows, f"time limit: not finished after {self.most_ticks * self.dt:.0f} s"
         return rows, ""
+
+    def _fly(self, count: int) -> int:
+        """Fly ``count`` ticks into the arena's rows; returns the last tick's status."""
+        read, tick_once, run = self._read, self._tick, self._links.run
+        elevator, aileron, rudder, throttle = self._links.commands
+        gust_north, gust_east, gust_down = self._links.gusts
+        set_terrain, feet = self._links.terrain, self._links.feet
+        arena, tables, heights = self.arena.packed, self.arena.tables, self.terrain.heights
+        windy, known, steps = self.windy, self.terrain.known, (None,) * self.steps
+        for _ in range(count):
+            read()
+            status, e, a, r, t, north, east, down, ground = tick_once(arena, tables, heights)
+            if status:
+                return status
+            elevator(e)
+            aileron(a)
+            rudder(r)
+            throttle(t)
+            if windy:
+                gust_north(north * feet)
+                gust_east(east * feet)
+                gust_down(down * feet)
+            if known:
+                set_terrain(ground * feet)
+            for _ in steps:
+                run()
+        return 0
+
+
+def _reader(links: Links, arena: Arena) -> Callable[[], None]:
+    """Make a function that fills the arena's state, in JSBSim's units; time and winds are known without asking."""
+    # Each by its name, as a closure: a loop over a list of them takes three times as long.
+    lat, lon, up, v_n, v_e, v_d, roll, pitch, yaw, p, q, r, speed, alpha, beta = links.getters[S.LATITUDE : S.ELEVATOR]
+    elevator, aileron, rudder, throttle, current, power, load = links.getters[S.ELEVATOR : S.WIND_NORTH]
+    pack: Callable[..., None] = struct.Struct(f"{S.WIND_NORTH - S.LATITUDE}d").pack_into
+    state = arena.state[S.LATITUDE : S.WIND_NORTH]
+
+    def read() -> None:
+        pack(
+            state, 0, lat(), lon(), up(), v_n(), v_e(), v_d(), roll(), pitch(), yaw(), p(), q(), r(), speed(), alpha(),
+            beta(), elevator(), aileron(), rudder(), throttle(), current(), power(), load(),
+        )  # fmt: skip
+
+    return read
 
 
 def as_track(rows: Floats) -> Track:
@@ -215,98 +277,3 @@ def as_track(rows: Floats) -> Track:
         values.append(rows[:, at] if columns == 1 else rows[:, at : at + columns])
         at += columns
     return Track(*values)  # type: ignore[arg-type]  # Track gives each array its own type
-
-
-@compiled
-def _tick(
-    state: Floats, position: Floats, angle: Floats, heights: Heights, to_pixel: Floats, pieces: Floats, nodes: Floats,
-    speeds: Floats, gains: Floats, memory: Floats, commands: Floats, wind: Floats, gusts: Floats, noise: Floats,
-    slowest: float, time: float, row: Floats, air: Floats,
-) -> int:  # pragma: no cover - compiled  # fmt: skip
-    """Judge the state, guide, make the wind for the next tick, and fill a row of the track.
-
-    air: (7,) wind north and east, gust north, east and down (m/s), ground below (m, the last that was known), energy
-    used (Wh).
-    Returns a key of `_ENDS`, or 0 to fly on.
-    """
-    for value in state:
-        if not math.isfinite(value):
-            return 2
-    # About the chart's middle, so that a flight may cross the 180th meridian.
-    state[S.LONGITUDE] = position[0, 1] + wrap(state[S.LONGITUDE] - position[0, 1])
-    east, north = polymap(position, state[S.LATITUDE], state[S.LONGITUDE])
-    turn, _ = polymap(angle, state[S.LATITUDE], state[S.LONGITUDE])
-    cos, sin = math.cos(turn), math.sin(turn)
-    up = state[S.AMSL]
-    place = np.array([
-        east, north, up,
-        state[S.V_EAST] * cos + state[S.V_NORTH] * sin,
-        state[S.V_NORTH] * cos - state[S.V_EAST] * sin,
-    ])  # fmt: skip
-    state[S.YAW] = wrap(state[S.YAW] + turn)
-    ground = ground_height(heights, to_pixel, east, north)
-    clearance = up - ground
-    guide(state, place, pieces, nodes, speeds, gains, memory, commands, TICK)
-    _wind(state, wind, gusts, noise, clearance, up, turn, air)
-    air[5] = ground if not math.isnan(ground) else air[5]
-    air[6] += state[S.POWER] * TICK / 3600.0
-    _fill(row, state, place, commands, memory, time, air[6], clearance, cos, sin)
-    if clearance <= 0.0:
-        return 3
-    if abs(state[S.ROLL]) > STEEPEST_BANK:
-        return 4
-    if state[S.AIRSPEED] < slowest:
-        return 5
-    if memory[M.DONE] > 0.0:
-        return 1 if abs(memory[M.CROSS_TRACK]) <= _FAR and abs(memory[M.HEIGHT_ERROR]) <= _FAR else 6
-    return 0
-
-
-@compiled
-def _wind(
-    state: Floats, wind: Floats, gusts: Floats, noise: Floats, clearance: float, up: float, turn: float, air: Floats
-) -> None:  # pragma: no cover - compiled
-    """Mean wind at this height and the next gust, true north, east and down, into ``air``.
-
-    wind: speed, map course it blows to, gradient, reference height, w20.  turn: map course of true north, rad.
-    """
-    speed = max(0.0, wind[0] + wind[2] * (up - wind[3]))
-    cos, sin = math.cos(wind[1] - turn), math.sin(wind[1] - turn)
-    air[0], air[1] = speed * cos, speed * sin
-    air[2] = air[3] = air[4] = 0.0
-    if wind[4] > 0.0:
-        # Over unknown ground the scales of 300 m and above hold.
-        height = clearance if not math.isnan(clearance) else 1000.0
-        along, across, down = step_gusts(gusts, noise, wind[4], height, state[S.AIRSPEED], TICK)
-        air[2] = along * cos - across * sin
-        air[3] = along * sin + across * cos
-        air[4] = down
-
-
-@compiled
-def _fill(
-    row: Floats, state: Floats, place: Floats, commands: Floats, memory: Floats, time: float, energy: float,
-    clearance: float, cos: float, sin: float,
-) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """One row of the track, in the order of `flight.track.COLUMNS`."""
-    row[0] = time
-    row[1:4] = place[:3]
-    row[4:6] = place[3:5]
-    row[6] = -state[S.V_DOWN]
-    row[7:10] = state[S.ROLL : S.YAW + 1]
-    row[10:13] = state[S.P : S.R + 1]
-    row[13] = state[S.AIRSPEED]
-    row[14:16] = state[S.ALPHA : S.BETA + 1]
-    row[16:20] = state[S.ELEVATOR : S.THROTTLE + 1]
-    row[20:24] = commands[C.ELEVATOR : C.THROTTLE + 1]
-    row[24] = state[S.WIND_EAST] * cos + state[S.WIND_NORTH] * sin
-    row[25] = state[S.WIND_NORTH] * cos - state[S.WIND_EAST] * sin
-    row[26] = -state[S.WIND_DOWN]
-    row[27] = state[S.ACCEL_N]
-    row[28] = state[S.CURRENT]
-    row[29] = energy
-    row[30] = memory[M.LEG]
-    row[31] = memory[M.CROSS_TRACK]
-    row[32] = memory[M.HEIGHT_ERROR]
-    row[33] = memory[M.SPEED_COMMAND]
-    row[34] = clearance

@@ -35,7 +35,7 @@ class T(IntEnum):
 # Of the order of one step of Newton's method; also the scale of the finite differences.
 _STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
 _DIFFERENCE = 1e-5
-_START = np.array([25.0, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
+START = np.array([25.0, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 _CONVERGED = 1e-8  # m/s^2 and rad/s^2
 _ITERATIONS = 40
 
@@ -95,6 +95,9 @@ class Simulator(Protocol):
     def surface_limits(self) -> tuple[float, float, float]:
         """Elevator, aileron and rudder limits, rad, either way."""
 
+    def first_guess(self) -> Floats:
+        """(8,) a trim vector to start from."""
+
     def derivatives(self, states: Floats, commands: Floats) -> Floats:
         """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands."""
 
@@ -110,7 +113,7 @@ def solve(
     balance: trim vector -> (6,) accelerations.  limits: of elevator, aileron, rudder.  start: (8,) first guess.
     Newton's method with one-sided differences; a step is cut to `_STEP` and halved while it makes things worse.
     """
-    values = (_START if start is None else start).copy()
+    values = (START if start is None else start).copy()
     for row, value in held.items():
         values[row] = value
     free = np.array([row for row in T if row not in held])
@@ -155,7 +158,8 @@ def trim(simulator: Simulator, amsl: float, held: dict[T, float], near: Trim | N
     near: a trim to start from.
     """
     simulator.place(amsl)
-    values = solve(simulator.balance, held, simulator.surface_limits(), near.vector() if near else None)
+    start = near.vector() if near else simulator.first_guess()
+    values = solve(simulator.balance, held, simulator.surface_limits(), start)
     return None if values is None else from_vector(values, amsl)
 
 

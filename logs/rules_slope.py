@@ -138,7 +138,8 @@ def _saturation(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float
     throttle = track.controls[rows, 3]
     full = throttle >= _FULL
     idle = throttle <= _IDLE
-    if not shape.setup.envelope.motor_braking:
+    # An aircraft that burns fuel draws no current at all.
+    if not shape.setup.envelope.motor_braking and track.current.any():
         idle |= (track.current[rows] <= _NO_CURRENT) & ~full
     commanded = float(shape.setup.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded

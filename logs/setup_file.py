@@ -11,7 +11,7 @@ import math
 import platform
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
@@ -34,7 +34,7 @@ from logs.terrain_piece import pack_terrain, unpack_terrain
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
 from world.scenario import Scenario, from_spec
-from world.scenario_file import first_error
+from world.scenario_file import Guidance, Navigation, first_error
 from world.terrain import Terrain
 
 SCHEMA = "planfly.log/1"
@@ -65,6 +65,9 @@ class _Setup(SetupModel):
     battery_wh: Finite
     seed: Annotated[int, Field(ge=0)]
     foreign: bool
+    guidance: Guidance
+    nav: Navigation
+    guidance_hz: Literal[30, 60]
     mission: MissionFile
     route: RouteFile
     envelope: EnvelopeFile
@@ -117,6 +120,9 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         battery_wh=setup.battery,
         seed=setup.seed,
         foreign=setup.scenario.foreign,
+        guidance=setup.guidance,
+        nav=setup.nav,
+        guidance_hz=setup.guidance_hz,
         mission=mission_file(setup.mission),
         route=route_file(setup.route),
         envelope=envelope_file(setup.envelope),
@@ -157,6 +163,9 @@ def unpack_setup(pieces: dict[str, bytes], source: str) -> StoredSetup:
         battery=file.battery_wh,
         seed=file.seed,
         plan=_plan(listed, source, terrain) if PLAN in listed else None,
+        guidance=file.guidance,
+        nav=file.nav,
+        guidance_hz=file.guidance_hz,
     )
     return StoredSetup(setup, file.versions)
 

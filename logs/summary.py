@@ -8,6 +8,16 @@ from logs.verdict import Finding, Prediction
 # Failed findings that the first line names.
 _NAMED = 4
 _UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
+_GUIDANCE = {
+    "path": "planfly's guidance on the fly-by path",
+    "l1": "L1 as ArduPlane flies it, along the legs",
+    "vector-field": "Beard and McLain's vector field on the fly-by path",
+}
+_NAV = {
+    "perfect": "exact",
+    "rtk": "with RTK's error (0.05 m on each axis)",
+    "gnss": "with GNSS's error (1.5 m on each axis)",
+}
 # What ends a flight, then what a plan may be mended by.
 _ORDER = (
     "departure",
@@ -105,6 +115,8 @@ def summary_text(
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
+    if level == "flown":
+        lines.append(f"Flown by: {_GUIDANCE[setup.guidance]}; navigation {_NAV[setup.nav]}")
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     if prediction is not None:

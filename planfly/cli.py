@@ -145,6 +145,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_log_commands(command)
     _add_serve(command)
     _add_paper(command)
+    _add_aircraft(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser
 
@@ -168,6 +169,19 @@ def _flown_by(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _steering(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--guidance",
+        choices=("path", "l1", "vector-field"),
+        help="who steers: planfly's own (path), L1 as ArduPlane flies it, or Beard and McLain's vector field",
+    )
+    parser.add_argument(
+        "--nav",
+        choices=("perfect", "rtk", "gnss"),
+        help="how well guidance knows where it is: errors of 0, 0.05 or 1.5 m on each axis",
+    )
+
+
 def _add_run_and_plan(command: _Command) -> None:
     run = command("run", "plan, export, fly, log, judge and report", "planfly run jacksboro --seed 3 --out my-run")
     run.add_argument(
@@ -188,6 +202,7 @@ def _add_run_and_plan(command: _Command) -> None:
         default=0,
         help="where it does not fly, tighten and try again, up to N times",
     )
+    _steering(run)
     _overwrite(run)
     # Names and summaries only: what they stand for is imported with the command.
     from planner.algorithms import algorithm_lines
@@ -256,6 +271,7 @@ def _add_export_and_fly(command: _Command) -> None:
         "--log-hz", metavar="HZ", type=int, choices=(60, 30, 20, 10), default=60,
         help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is that of these rows",
     )  # fmt: skip
+    _steering(fly)
     _overwrite(fly)
 
 
@@ -386,6 +402,17 @@ def _add_paper(command: _Command) -> None:
     paper.add_argument("--jobs", metavar="N", type=_positive_count, help="processes (default: one a core)")
     paper.add_argument("--out", metavar="DIR", help="where tables and figures go (default: runs/paper, replaced)")
     _overwrite(paper)
+
+
+def _add_aircraft(command: _Command) -> None:
+    aircraft = command(
+        "aircraft", "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
+        "planfly aircraft aerosonde --out aerosonde",
+    )  # fmt: skip
+    aircraft.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)")
+    aircraft.add_argument("--out", metavar="DIR", help="where the pictures go (default: runs/aircraft-NAME, replaced)")
+    aircraft.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
+    _overwrite(aircraft)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

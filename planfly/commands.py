@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planfly import log_commands
+from planfly.aircraft_command import aircraft
 from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import default_folder, prepare_folder, refuse_existing, refuse_folder
 from planfly.progress import progress
@@ -182,10 +183,17 @@ def _change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
     """What the command's options change in a scenario: aircraft, airspeed, and for a flight the wind."""
 
     def change(scenario: Scenario) -> Scenario:
-        flown = with_flight(scenario, args.aircraft, args.airspeed)
+        given = {
+            "aircraft": args.aircraft,
+            "airspeed_mps": args.airspeed,
+            "guidance": getattr(args, "guidance", None),
+            "nav": getattr(args, "nav", None),
+        }
         speed, source = getattr(args, "wind", None) or (None, None)
         turbulence = getattr(args, "turbulence", None)
-        return with_wind(flown, speed, None if source is None else math.radians(source), turbulence)
+        return with_wind(
+            with_flight(scenario, **given), speed, None if source is None else math.radians(source), turbulence
+        )
 
     return change
 
@@ -203,4 +211,5 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], int]] = {
     "report": log_commands.report,
     "compare": log_commands.compare,
     "scenarios": scenarios,
+    "aircraft": aircraft,
 }

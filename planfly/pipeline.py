@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from aircraft.catalog import Aircraft, load_aircraft
+from aircraft.catalog import Aircraft, find_aircraft, model_hash
 from aircraft.envelope import Envelope
 from flight.envelope import load_envelope
 from flight.export import plan_mission
@@ -85,7 +85,8 @@ def load_vehicle(scenario: Scenario) -> Vehicle:
     """The scenario's aircraft.  Raises ScenarioError for an unknown one or a speed it cannot fly."""
     table = scenario.flight
     try:
-        aircraft = load_aircraft(table.aircraft)
+        aircraft = find_aircraft(table.aircraft)
+        model_hash(aircraft)
     except ValueError as error:
         raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
     airspeed = aircraft.airspeed if table.airspeed_mps is None else table.airspeed_mps
@@ -131,6 +132,9 @@ def make_setup(
         battery=vehicle.battery,
         seed=seed,
         plan=plan,
+        guidance=scenario.flight.guidance,
+        nav=scenario.flight.nav,
+        guidance_hz=scenario.flight.guidance_hz,
     )
 
 

@@ -15,18 +15,22 @@ from planfly.refine import refine
 from planfly.results import print_verdict, write_missions, write_pictures, write_verdict
 from planner.plan import plan_json
 from world.files import write_whole
-from world.scenario import Scenario, load_scenario
+from world.scenario import Scenario, load_scenario, with_flight
 
 
 def run(args: argparse.Namespace) -> Verdict:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
-    scenario = load_scenario(args.scenario)
+    scenario = with_flight(load_scenario(args.scenario), guidance=args.guidance, nav=args.nav)
     seed = choose_seed(scenario, args.seed)
     load_vehicle(scenario)
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
     if args.out:
         refuse_folder(folder, args.overwrite)
-    command = f"planfly run {args.scenario} --seed {seed}" + (f" --refine {args.refine}" if args.refine else "")
+    command = f"planfly run {args.scenario} --seed {seed}" + "".join(
+        f" --{name} {value}"
+        for name, value in (("refine", args.refine), ("guidance", args.guidance), ("nav", args.nav))
+        if value
+    )
     cleared = False
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:

@@ -156,8 +156,13 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
 
 @compiled
 def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Both components of a packed `PolyMap` at one point (Horner's scheme)."""
-    size = packed.shape[1]
+    """Both components of a packed `PolyMap` at one point."""
+    return polymap_within(packed, packed.shape[1], x, y)
+
+
+@compiled
+def polymap_within(packed: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Do the same with a `PolyMap` of this size in the first columns of a wider table (Horner's scheme)."""
     a = (x - packed[0, 0]) / packed[1, 0]
     b = (y - packed[0, 1]) / packed[1, 1]
     u = 0.0

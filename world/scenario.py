@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
+from aircraft.catalog import is_folder
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
@@ -131,7 +132,7 @@ def from_spec(
 ) -> Scenario:
     """Make a scenario of a checked file, or of what `Scenario.to_json` gave.
 
-    source: names the file in messages.  base: folder that relative terrain paths count from.  terrain: an
+    source: names the file in messages.  base: folder that relative paths count from.  terrain: an
     elevation file that replaces the scenario's own.  ground: terrain already at hand (from a log).
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
@@ -156,6 +157,9 @@ def from_spec(
             ground = read_terrain(raster, origin, bounds, MARGIN)
         else:
             ground = _made_terrain(spec.terrain, bounds)
+    if is_folder(spec.flight.aircraft):
+        folder = str(Path(base or "", spec.flight.aircraft).resolve())
+        spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft": folder})})
     # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
     place = _checked(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
     area = spec.area or _checked(
@@ -292,21 +296,14 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
     return replace(scenario, spec=spec, wind=wind)
 
 
-def with_flight(scenario: Scenario, aircraft: str | None, airspeed: float | None) -> Scenario:
-    """Make the same scenario with another aircraft or airspeed (m/s); None keeps what it has.
+def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
+    """Make the same scenario with other entries of [flight]; None keeps what it has.
 
-    Raises ScenarioError for values that a scenario file may not have either.
+    Raises ScenarioError for a value that a scenario file may not have either.
     """
-    changes: dict[str, Any] = {}
-    if aircraft is not None:
-        changes["aircraft"] = aircraft
-    if airspeed is not None:
-        changes["airspeed_mps"] = airspeed
-    if not changes:
-        return scenario
-    table = scenario.spec.flight.model_dump() | changes
-    flight = _checked(lambda: FlightTable(**table), f"{scenario.name}: flight")
-    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": flight}), flight=flight)
+    given = {key: value for key, value in changes.items() if value is not None}
+    table = _checked(lambda: FlightTable(**(scenario.flight.model_dump() | given)), f"{scenario.name}: flight")
+    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 
 
 def with_threats(

@@ -48,6 +48,8 @@ Course = Annotated[float, _within(-360.0, 360.0)]
 Radius = Annotated[float, _within(0.0, 200_000.0, above=True)]
 Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_no_line_break)]
 FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(_no_line_break)]
+Guidance = Literal["path", "l1", "vector-field"]
+Navigation = Literal["perfect", "rtk", "gnss"]
 Seed = Annotated[int, _within(0, 2**63 - 1)]
 Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 
@@ -208,12 +210,14 @@ class PlannerTable(_Table):
 
 
 class FlightTable(_Table):
-    """[flight]."""
+    """[flight].  guidance: the law that steers.  nav: how well guidance knows where it is, see `flight.navigation`."""
 
-    aircraft: Name = "aerosonde"
+    aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
     airspeed_mps: Annotated[float, _within(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, _within(5.0, 60.0)] = 30.0
-    guidance: Literal["path"] = "path"
+    guidance: Guidance = "path"
+    guidance_hz: Literal[30, 60] = 60
+    nav: Navigation = "perfect"
     fly_over: bool = False
     motor_braking: bool = False
     battery_wh: Annotated[float, _within(0.0, 100_000.0, above=True)] | None = None

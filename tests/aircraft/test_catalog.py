@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from aircraft.catalog import Aircraft, aircraft_names, load_aircraft, model_hash, read_aircraft
+from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, model_hash, read_aircraft
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_unknown_name_lists_the_known_ones(name: str) -> None:
 
 
 def test_names() -> None:
-    assert aircraft_names() == ("aerosonde",)
+    assert aircraft_names() == ("aerosonde", "c172x")
 
 
 @pytest.mark.parametrize(
@@ -101,10 +101,57 @@ def test_hash_follows_the_models_files(folder: Path, file: str) -> None:
     assert model_hash(aircraft) != before
 
 
+def test_a_battery_or_fuel(folder: Path) -> None:
+    battery, cessna = load_aircraft("aerosonde"), load_aircraft("c172x")
+    assert battery.battery_voltage == 44.4
+    assert cessna.battery_voltage == 0.0
+    assert cessna.battery_energy == pytest.approx(117.9 * 43.5e6)
+    _edit(folder, "battery_v = 44.4", "fuel_kg = 2")
+    with pytest.raises(ValueError, match=r"missing fuel_mj_per_kg$"):
+        read_aircraft(folder)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("model = 3", r"model = 3 is not a table$"),
+        ("[model]\ncolour = 3", r"model: unknown key colour$"),
+        ("[model]\nengine_settles = 1", r"model\.engine_settles = 1 is not true or false$"),
+        ("[model.command]\nflap = 1", r"model\.command: unknown key flap$"),
+        ("[model.command]\nelevator = 1", r"model\.command\.elevator = 1 is not a property and 2 number"),
+        ('[model.command]\nelevator = ["a b", 1, 1]', r"is not a property and 2 number"),
+        ('[model.command]\nelevator = ["a", 1, 0]', r"is not a property and 2 number"),
+        ('[model.reading]\npower = ["a", true]', r"is not a property and 1 number"),
+        ('[model.reading]\npower = ["a"]', r"is not a property and 1 number"),
+        ('[model.reading]\npower = ["a", inf]', r"is not a property and 1 number"),
+    ],
+)
+def test_bad_model_tables(folder: Path, text: str, message: str) -> None:
+    file = folder / "aerosonde.toml"
+    # A top-level key has to stand before the first table.
+    file.write_text(text + "\n" + file.read_text() if text.startswith("model") else file.read_text() + "\n" + text)
+    with pytest.raises(ValueError, match=message) as caught:
+        read_aircraft(folder)
+    assert str(caught.value).startswith(f"{file}: ")
+
+
+def test_names_and_folders(tmp_path: Path, folder: Path) -> None:
+    assert find_aircraft("aerosonde").embedded
+    assert not find_aircraft(str(folder)).embedded
+    with pytest.raises(ValueError, match=r"nowhere\.toml: No such file"):
+        find_aircraft(str(tmp_path / "nowhere"))
+    (folder / "aerosonde.xml").unlink()
+    with pytest.raises(ValueError, match=r"aerosonde\.xml: the aircraft model cannot be read"):
+        model_hash(read_aircraft(folder))
+
+
 def test_metadata_agrees_with_the_trims() -> None:
     from flight.fdm import Fdm
     from flight.trim import fastest, slowest
 
+    cessna = slowest(Fdm(load_aircraft("c172x")), 0.0)
+    assert cessna is not None
+    assert cessna.airspeed == pytest.approx(load_aircraft("c172x").stall_speed, abs=0.1)
     aircraft: Aircraft = load_aircraft("aerosonde")
     fdm = Fdm(aircraft)
     slow, fast = slowest(fdm, 0.0), fastest(fdm, 0.0)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from flight.envelope import load_envelope
@@ -23,8 +23,23 @@ def aerosonde() -> Aircraft:
     return load_aircraft("aerosonde")
 
 
+def standard() -> NDArray[np.float64]:
+    """13 km with turns up to 45 degrees, climbs to 6 and dives to 5."""
+    way, course = [np.array([0.0, 0.0, 500.0])], 0.3
+    for turn, slope in ((0, 0), (40, 6), (-45, -5), (30, 4), (45, -3), (-35, 0), (-45, 6), (20, -5), (45, 0)):
+        course += math.radians(turn)
+        up = math.tan(math.radians(slope))
+        way.append(way[-1] + 1450.0 * np.array([math.sin(course), math.cos(course), up]))
+    return np.array(way)
+
+
 @pytest.fixture(scope="session")
 def make_setup(aerosonde: Aircraft) -> MakeSetup:
+    """See `setup_maker`."""
+    return setup_maker(aerosonde)
+
+
+def setup_maker(aerosonde: Aircraft) -> MakeSetup:
     """A setup through these points, (w, 3) m, without a mission file.
 
     wind: speed m/s, from degrees.  speeds: m/s, one or one a leg.  More keywords replace tables of the scenario.

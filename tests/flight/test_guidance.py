@@ -13,11 +13,14 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.gains import Gains, load_gains
-from flight.guidance import MEMORY_SIZE, G, M, guide, mean_curvature, profile, project
+from flight.guidance import guide
 from flight.path import arc_point, fly_by_path
+from flight.path_kernels import mean_curvature, profile, project
+from flight.rows import MEMORY_SIZE, G, M
 from flight.setup import FlightSetup, limits_of
 from flight.state import COMMAND_SIZE, STATE_SIZE, C, S
 from world.errors import FlightError
+from world.geometry import signed_turns
 
 Floats = NDArray[np.float64]
 MakeSetup = Callable[..., FlightSetup]
@@ -85,6 +88,9 @@ class Tick:
     def __init__(self, setup: FlightSetup, gains: Gains) -> None:
         path = fly_by_path(setup.route, limits_of(setup))
         self.pieces, self.nodes, self.speeds = path.pieces, path.nodes, setup.route.airspeed
+        way = setup.route.waypoints
+        turns = np.concatenate([[0.0], np.abs(signed_turns(way)), [0.0]])
+        self.corners = np.column_stack([way[:, :2], turns, np.zeros((len(way), 2))])
         self.gains = gains.packed()
         self.memory = np.zeros(MEMORY_SIZE)
         self.memory[M.LAST_AIRSPEED], self.memory[M.MAX_BANK] = -1.0, math.radians(33.0)
@@ -97,9 +103,11 @@ class Tick:
         values[[S.AIRSPEED, S.ACCEL_N]] = 25.0, 1.0
         for name, value in state.items():
             values[S[name]] = value
-        place = np.array([east, north, up, 25.0 * math.sin(course), 25.0 * math.cos(course)])
+        place = np.array([east, north, up, 25.0 * math.sin(course), 25.0 * math.cos(course), 0.0])
         commands = np.zeros(COMMAND_SIZE)
-        guide(values, place, self.pieces, self.nodes, self.speeds, self.gains, self.memory, commands, 1 / 60)
+        guide(
+            values, place, self.pieces, self.nodes, self.corners, self.speeds, self.gains, self.memory, commands, 1 / 60
+        )
         return commands
 
 

@@ -10,8 +10,8 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from flight.guidance import profile
 from flight.path import FlyByPath, arc_point, fly_by_path, sample_path
+from flight.path_kernels import profile
 from flight.setup import FlightSetup, limits_of
 from world.geometry import leg_runs, turning_angles
 

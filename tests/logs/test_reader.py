@@ -143,7 +143,7 @@ def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: boo
 def test_no_field_of_a_setup_is_left_behind() -> None:
     # A field with a default could be forgotten in silence: these are all that the log knows of.
     names = {kind: [item.name for item in dataclasses.fields(kind)] for kind in (FlightSetup, Mission, Route, Envelope)}
-    assert len(names[FlightSetup]) == 11
+    assert len(names[FlightSetup]) == 14
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 8
     assert len(names[Envelope]) == 10

@@ -1,0 +1,84 @@
+"""Rows of the packed arrays that the guidance core reads and keeps."""
+
+from enum import IntEnum
+
+
+class G(IntEnum):
+    """Rows of the packed gains, in the order of `flight.gains.Gains`."""
+
+    REFERENCE_AIRSPEED = 0
+    CROSS_TRACK_FREQUENCY = 1
+    CROSS_TRACK_DAMPING = 2
+    CROSS_TRACK_INTEGRAL = 3
+    INTERCEPT = 4
+    TURN_LEAD = 5
+    TURN_SMOOTHING = 6
+    HEIGHT_FREQUENCY = 7
+    HEIGHT_DAMPING = 8
+    HEIGHT_INTEGRAL = 9
+    SLOPE_LEAD = 10
+    SPEED_GAIN = 11
+    SPEED_INTEGRAL = 12
+    THROTTLE_PER_SLOPE = 13
+    SLOW_MARGIN = 14
+    ROLL_GAIN = 15
+    ROLL_RATE_GAIN = 16
+    AILERON_PER_ROLL_RATE = 17
+    ROLL_INTEGRAL = 18
+    ALPHA_PER_G = 19
+    ELEVATOR_PER_ALPHA = 20
+    ELEVATOR_PER_PITCH_RATE = 21
+    PITCH_RATE_GAIN = 22
+    YAW_RATE_GAIN = 23
+    L1_PERIOD = 24
+    L1_DAMPING = 25
+    L1_INTEGRAL = 26
+    FIELD_APPROACH = 27
+    FIELD_PATH = 28
+    FIELD_ORBIT = 29
+    FIELD_COURSE = 30
+    FIELD_COURSE_INTEGRAL = 31
+    SIDE_GAIN = 32
+    SIDE_LAG = 33
+
+
+class Lateral(IntEnum):
+    """Which law steers, by its name in a scenario's `[flight] guidance`."""
+
+    PATH = 0
+    L1 = 1
+    VECTOR_FIELD = 2
+
+
+class M(IntEnum):
+    """Rows of the guidance memory and of what one tick leaves for the log."""
+
+    PIECE = 0  # index of the piece of the path
+    CROSS_TRACK_SUM = 1  # m s
+    HEIGHT_SUM = 2  # m s
+    SPEED_SUM = 3  # m
+    ROLL_SUM = 4  # rad s
+    ENERGY_RATE = 5  # m/s, filtered rate of total energy height
+    LAST_AIRSPEED = 6  # m/s, negative before the first tick
+    TRIM_ELEVATOR = 7  # rad, of level flight at the reference airspeed
+    TRIM_ALPHA = 8  # rad
+    TRIM_THROTTLE = 9  # 0..1
+    MAX_BANK = 10  # rad, of the command
+    LEG = 11
+    DISTANCE = 12  # m along the path
+    CROSS_TRACK = 13  # m right of the path
+    HEIGHT_ERROR = 14  # m above it
+    SPEED_COMMAND = 15  # m/s
+    DONE = 16  # 1 past the end of the path
+    AIRSPEED = 17  # m/s, without its gusts
+    FULL_THROTTLE = 18  # s without a break
+    GUIDANCE = 19  # a `Lateral`
+    L1_LEG = 20  # the leg that L1 is on
+    L1_SUM = 21  # rad
+    COURSE_SUM = 22  # rad s, of the vector field
+    LAST_EAST = 23  # m/s over the ground, a tick ago
+    LAST_NORTH = 24
+    SIDE = 25  # m/s^2 to the right that the bank does not explain
+
+
+MEMORY_SIZE = len(M)

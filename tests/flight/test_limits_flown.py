@@ -1,0 +1,42 @@
+"""What the envelope predicts against what flights show (`tests.bench.limits`); every case with PLANFLY_SOAK=1."""
+
+import math
+import os
+
+import pytest
+
+from tests.bench.limits import Limit, calm_limits, wind_limits
+
+WHOLE = bool(os.environ.get("PLANFLY_SOAK"))
+
+
+@pytest.fixture(scope="module")
+def calm() -> list[Limit]:
+    return calm_limits(whole=WHOLE)
+
+
+@pytest.fixture(scope="module")
+def windy() -> list[Limit]:
+    return wind_limits(whole=WHOLE)
+
+
+def test_calm_slopes(calm: list[Limit]) -> None:
+    slopes = [limit for limit in calm if limit.kind != "leg"]
+    assert {limit.kind for limit in slopes} == {"climb", "dive"}
+    for limit in slopes:
+        assert abs(math.degrees(limit.optimistic)) <= 1.0, limit
+        assert limit.optimistic <= 0.0, limit
+
+
+def test_calm_legs(calm: list[Limit]) -> None:
+    legs = [limit for limit in calm if limit.kind == "leg"]
+    assert legs
+    for limit in legs:
+        assert abs(limit.optimistic) <= 10.0, limit
+
+
+def test_in_wind_the_prediction_is_on_the_safe_side_but_not_by_much(windy: list[Limit]) -> None:
+    assert {limit.kind for limit in windy} == {"climb", "dive", "leg"}
+    for limit in windy:
+        assert limit.optimistic <= 0.0, limit
+        assert limit.conservative <= 0.30, limit

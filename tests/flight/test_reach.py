@@ -1,0 +1,55 @@
+"""The flight rows of the issue, at a small count; at full count with PLANFLY_SOAK=1."""
+
+import os
+
+import numpy as np
+import pytest
+
+from tests.bench import flight as bench
+
+SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+
+
+def test_calm() -> None:
+    found = bench.calm()
+    assert found.completed
+    assert found.cross_rms <= 0.05
+    assert found.height_rms <= 0.03
+    assert found.cross_max <= 0.4
+    assert found.height_max <= 0.2
+
+
+def test_wind_and_moderate_turbulence() -> None:
+    found = bench.moderate(range(20 if SOAK else 2))
+    assert all(item.completed for item in found)
+    assert float(np.median([item.cross_rms for item in found])) <= 0.10
+    assert float(np.median([item.height_rms for item in found])) <= 0.20
+    assert float(np.percentile([item.cross_max for item in found], 95)) <= 1.0
+    assert float(np.percentile([item.height_max for item in found], 95)) <= 1.0
+
+
+def test_any_wind() -> None:
+    found = bench.anywhere(range(100 if SOAK else 4))
+    assert all(item.completed for item in found)
+    assert float(np.percentile([item.worst for item in found], 95)) <= 1.0
+
+
+def test_an_aircraft_that_differs_from_its_model() -> None:
+    for name, found in bench.mismatched(range(5 if SOAK else 1)).items():
+        assert all(item.completed for item in found), name
+        assert max(item.worst for item in found) <= 1.5, name
+
+
+def test_rivals_on_straight_legs() -> None:
+    found = bench.rivals(range(20 if SOAK else 1))
+    least = {"L1, ArduPlane's defaults": 10.0, "L1, best-tuned": 3.0, "vector field, best-tuned": 3.0}
+    assert found.keys() == least.keys()
+    for name, ratios in found.items():
+        assert float(np.median(ratios)) >= least[name], name
+
+
+@pytest.mark.bench
+def test_the_closed_loop_costs_little() -> None:
+    # A ratio, side by side; the issue's 1.30 and 1.15 are printed by the bench, with room here for a busy machine.
+    assert bench.loop_ratio(60, rounds=5, seconds=60)[0] < 1.5
+    assert bench.loop_ratio(30, rounds=5, seconds=60)[0] < 1.3
