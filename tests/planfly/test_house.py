@@ -16,12 +16,13 @@ COMMANDS = [
     "export",
     "fly",
     "check",
+    "aircraft",
+    "serve",
     "replay",
     "recover",
     "report",
     "compare",
     "paper",
-    "serve",
     "scenarios",
 ]
 
