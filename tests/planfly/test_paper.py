@@ -64,7 +64,7 @@ def test_a_named_folder_that_holds_anything_is_refused(folder: Path, capsys: pyt
 def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
     for name in ("mine.txt", "paths-60.png", "table.csv"):
         (tmp_path / name).write_text("old", encoding="utf-8")
-    prepare_folder(tmp_path, named=True, overwrite=True, files=file_names([7, 60]))
+    prepare_folder(tmp_path, tuple(file_names([7, 60])))
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
