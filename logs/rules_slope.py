@@ -13,6 +13,7 @@ from logs.flown import Flown, along_across
 from logs.route_shape import RouteShape
 from logs.rules_turn import PLAN_TOLERANCE
 from logs.verdict import Finding, make_finding
+from world.limits import arc_slope
 from world.wind import W20
 
 Floats = NDArray[np.float64]
@@ -191,6 +192,7 @@ def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL)
     wrong = [_too_steep(shape, leg, limit, source)] if abs(planned) > limit + PLAN_TOLERANCE else []
+    wrong += _steep_arc(shape, leg, limit)
     facts = [f"slope {math.degrees(planned):+.2f}°"]
     fit: Fit | None = None
     method = "route"
@@ -223,6 +225,34 @@ def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding
         unit="deg",
         method=method,
     )
+
+
+def _steep_arc(shape: RouteShape, leg: int, limit: float) -> list[str]:
+    """What the fly-by arc at a leg's end asks beyond its limit, where that costs or gives more than `OFF_SPEED`.
+
+    The arc is shorter than its two tangents and so steeper than the legs.  What the aircraft cannot climb or sink there
+    it takes from its speed or adds to it: g dh / V.
+    """
+    i = leg + 1
+    turn, reach = abs(float(shape.turns[i])), float(shape.before[i])
+    if i == shape.legs or not math.isfinite(limit) or not 0.0 < reach < min(shape.runs[leg : leg + 2]):
+        return []
+    if shape.setup.route.fly_over[i] or shape.setup.route.arcs[i] > 0.0:
+        return []
+    tan_in, tan_out = math.tan(shape.slopes[leg]), math.tan(shape.slopes[i])
+    tangent = arc_slope(tan_in, tan_out, reach, float(shape.radius[i]))
+    if tangent * (1.0 if shape.slopes[leg] >= 0.0 else -1.0) <= 0.0:
+        return []
+    length = float(shape.radius[i]) * turn
+    beyond = (abs(tangent) - math.tan(limit)) * length
+    speed = float(shape.setup.route.airspeed[leg])
+    if limit <= 0.0 or GRAVITY * beyond / speed <= OFF_SPEED:
+        return []
+    verb = "climbs" if tangent > 0.0 else "falls"
+    return [
+        f"the arc at {shape.waypoint(i)} {verb} {math.degrees(math.atan(abs(tangent))):.1f}° for {length:.0f} m, "
+        f"{beyond:.0f} m beyond the {math.degrees(limit):.1f}° that the aircraft can"
+    ]
 
 
 def _in_envelope(shape: RouteShape, leg: int) -> bool:

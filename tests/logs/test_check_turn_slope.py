@@ -251,3 +251,19 @@ def test_a_short_leg_is_measured_over_four_seconds() -> None:
     assert item.ok
     assert "short leg" in item.method
     assert item.flown == pytest.approx(math.degrees(math.atan2(10, 150)), abs=1.0)
+
+
+def test_a_big_corner_in_a_steep_descent_is_steeper_than_its_legs() -> None:
+    """-7 degrees on both legs fit the aircraft's -7.7; the arc of a 120 degree corner between them does not."""
+
+    def corner(turn_deg: float, slope_deg: float) -> list[list[float]]:
+        drop = -2000.0 * math.tan(math.radians(slope_deg))
+        turn = math.radians(turn_deg)
+        east, north = 2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn)
+        return [[0.0, 0.0, 1500.0], [0.0, 2000.0, 1500.0 - drop], [east, north, 1500.0 - 2.0 * drop]]
+
+    sharp = of(judge_geometry(make_setup(corner(120.0, -7.0))), "slope", "leg 0")
+    assert sharp.ok is False
+    assert "the arc at waypoint 1" in sharp.reason
+    assert judge_geometry(make_setup(corner(30.0, -7.0))).flyable
+    assert judge_geometry(make_setup(corner(120.0, -4.0))).flyable
