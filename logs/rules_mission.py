@@ -6,6 +6,7 @@ where it refuses what ArduPilot flies, the finding says so and does not fail.  L
 that are none were refused when the file was read.
 """
 
+import itertools
 import math
 from collections.abc import Iterator
 
@@ -33,6 +34,8 @@ LANDING_ANGLE = math.radians(5.0 + 0.1)
 FIRST_WAYPOINT = 10_000.0
 # MIS_DIST_WPS of the releases that had it.
 BETWEEN_WAYPOINTS = 900.0
+# A condition gate nearer than this to a waypoint, m, is at its place.
+GATE_APART = 0.05
 
 # Commands that PX4 takes in a mission, by number: idle, delay, condition gate, winch, gripper, cameras, gimbals.
 _PX4 = frozenset(
@@ -195,7 +198,21 @@ def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
         )
 
 
+def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+    """A condition gate at the place of the waypoint before or after it."""
+    places = [
+        item
+        for item in mission.items
+        if item.has_position and (item.command in PLACES | TAKEOFFS | LANDINGS or item.command == C.CONDITION_GATE)
+    ]
+    for before, after in itertools.pairwise(places):
+        gates = C.CONDITION_GATE in (before.command, after.command)
+        if gates and _apart(before, after, origin) < GATE_APART:
+            yield False, after.seq, "distance between waypoint and gate too close"
+
+
 def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+    yield from _gates(mission, origin)
     places = _positions(mission)
     if len(places) < 2:
         return

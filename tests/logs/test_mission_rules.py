@@ -21,6 +21,12 @@ def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
 
 
 REFUSED = {
+    "gate": (
+        "checkDistancesBetweenWaypoints",
+        (*GOOD[:2], wp(0, 1500, command=4501), GOOD[2]),
+        3,
+        "distance between waypoint and gate too close",
+    ),
     "unsupported": ("checkMissionItemValidity", (*GOOD, "2 5000 0 0 0 0 0 0 0"), 4, "unsupported command command 5000"),
     "spline": ("checkMissionItemValidity", (*GOOD, wp(1500, 0, command=82)), 4, "NAV_SPLINE_WAYPOINT"),
     "servo": (
