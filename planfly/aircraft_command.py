@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.cli import FLYABLE
+from planfly.exit_codes import FLYABLE
 from planfly.files import prepare_folder, refuse_folder
 from planfly.progress import progress
 from world.errors import PlanflyError

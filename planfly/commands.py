@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from planfly import log_commands
 from planfly.aircraft_command import aircraft
-from planfly.cli import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import default_folder, prepare_folder, refuse_existing, refuse_folder
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError

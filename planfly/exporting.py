@@ -9,7 +9,7 @@ from flight.mission import Mission
 from flight.mission_files import KINDS, mission_kind, mission_text, read_mission
 from logs.map_files import MapLine, gpx_text, kml_text, plan_line, track_line
 from logs.reader import read_log
-from planfly.cli import FLYABLE, LOSS
+from planfly.exit_codes import FLYABLE, LOSS
 from planfly.files import refuse_existing
 from planfly.missions import open_mission
 from planfly.pipeline import load_vehicle

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from planfly.cli import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
+from planfly.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
 from planfly.files import COMPARE_FILES, LOG_FIGURES, prepare_folder, refuse_existing, refuse_folder
 from planfly.progress import progress
 from world.errors import LogError, PlanflyError
