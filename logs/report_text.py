@@ -145,7 +145,7 @@ def _row(finding: Finding) -> FindingRow:
         margin=number(margin, signed=True),
         unit=in_unit(None, finding.unit)[1],
         method=method,
-        reason=finding.reason,
+        reason=finding.reason + (f"; would pass: {finding.suggestion}" if finding.suggestion else ""),
         sentence=_sentence(finding),
     )
 
