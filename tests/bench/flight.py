@@ -33,7 +33,7 @@ MISMATCHES = {
     "control power -25 %": Variation(control=0.75),
     "volts -8 %": Variation(volts=0.92),
 }
-# The rivals at their best on `standard` in wind, by search over a grid; L1 swings in some winds at 4 s.
+# The rivals at their best on `standard` in wind, of a handful of settings tried; L1 swings in some winds at 4 s.
 BEST_L1 = {"l1_period": 5.0, "l1_damping": 0.9}
 BEST_FIELD = {"field_path": 0.1, "field_course": 6.0, "field_course_integral": 1.0}
 
