@@ -113,6 +113,20 @@ def along_across(shape: RouteShape, leg: int, position: Floats) -> tuple[Floats,
     return east * ux + north * uy, east * uy - north * ux
 
 
+def approaches(position: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """Least horizontal distance of each segment of a track from a place, m, and the fraction where that is.
+
+    position: (n, 3).  place: (2,) or (3,).  Returns (n - 1,) twice.
+    """
+    start = position[:-1, :2]
+    step = position[1:, :2] - start
+    away = place[:2] - start
+    length2 = np.maximum((step * step).sum(axis=1), 1e-12)
+    fraction = np.clip((step * away).sum(axis=1) / length2, 0.0, 1.0)
+    rest = away - fraction[:, None] * step
+    return np.hypot(rest[:, 0], rest[:, 1]), fraction
+
+
 def _usable(track: Track) -> NDArray[np.bool_]:
     """Rows with finite, plausible numbers, later than every usable row before them."""
     good = np.isfinite(track.time)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.fits import leg_course
-from logs.flown import Flown, along_across
+from logs.flown import Flown, along_across, approaches
 from logs.route_shape import RouteShape
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,8 @@ class TurnMeasure:
     """How one turn was flown; None where it was not, or where there is nothing to measure.
 
     angle, tolerance, peak_bank, held_bank (mean over a second): rad.  radius (least over a second), overshoot (past the
-    arc, on its outside), settled (mean distance from the next leg in the last second before its end): m.  full_circles:
+    arc, on its outside), settled (mean distance from the next leg in the last second before its end), passed (least distance from the waypoint): m.
+    full_circles:
     whole turns flown beyond the corner's own.  over: the flight got past the turn.
     """
 
@@ -33,6 +34,7 @@ class TurnMeasure:
     radius: float | None = None
     overshoot: float | None = None
     settled: float | None = None
+    passed: float | None = None
     full_circles: int = 0
     over: bool = False
 
@@ -67,6 +69,7 @@ def measure_turn(shape: RouteShape, flown: Flown, i: int) -> TurnMeasure:
         radius=radius,
         overshoot=_overshoot(shape, i, position[watched], before[watched], along[watched], across[watched]),
         settled=_settled(shape, flown, i, first, end, along, across),
+        passed=float(approaches(position, shape.points[i])[0].min()),
         full_circles=max(0, round((turned - abs(float(shape.turns[i]))) / (2.0 * math.pi))),
         over=bool(flown.passed[i + 1] or end < last - first or leave < last - first),
     )

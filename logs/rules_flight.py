@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.fits import CLEAR_OF_TURN, straight_span
-from logs.flown import Flown, along_across
+from logs.flown import Flown, along_across, approaches
 from logs.route_shape import RouteShape
-from logs.rules_slope import GUST_SHARE, SATURATED, steady_rows
+from logs.rules_slope import GUST_SHARE
+from logs.measure_slope import SATURATED, steady_rows
 from logs.verdict import Finding, make_finding
 from world.wind import W20
 
@@ -79,13 +80,7 @@ def _closest(shape: RouteShape, flown: Flown, i: int, level: float) -> tuple[flo
     first = int(flown.rows[i - 1]) if i else 0
     last = int(flown.rows[i + 1]) if i + 1 < len(shape.points) else len(flown.track) - 1
     position = flown.track.position[first : max(last, first + 1) + 1]
-    start = position[:-1, :2]
-    step = position[1:, :2] - start
-    away = shape.points[i, :2] - start
-    length2 = np.maximum((step * step).sum(axis=1), 1e-12)
-    fraction = np.clip((step * away).sum(axis=1) / length2, 0.0, 1.0)
-    rest = away - fraction[:, None] * step
-    distance = np.hypot(rest[:, 0], rest[:, 1])
+    distance, fraction = approaches(position, shape.points[i])
     if not distance.size:
         off = flown.track.position[-1] - shape.points[i]
         return math.hypot(off[0], off[1]), float(off[2])

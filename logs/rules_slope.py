@@ -1,23 +1,16 @@
 """The slope rule: can each leg be climbed or descended at its speed, and was it."""
 
 import math
-from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-from aircraft.compiled import compiled
 from aircraft.envelope import GRAVITY
-from logs.fits import CLEAR_OF_TURN, Fit, leg_slope, straight_span
-from logs.flown import Flown, along_across
+from logs.fits import Fit
+from logs.flown import Flown
+from logs.measure_slope import SATURATED, SlopeMeasure, measure_slope
 from logs.route_shape import RouteShape
 from logs.rules_turn import PLAN_TOLERANCE
 from logs.verdict import Finding, make_finding
 from world.limits import arc_slope
 from world.wind import W20
-
-Floats = NDArray[np.float64]
-Singles = NDArray[np.float32]
 
 # A leg passes if its fitted slope is within this (rad) of the plan, beside the fit's own tolerance, and its height
 # within this (m) of the leg's line, away from the blends at its ends; more where there is no such place.
@@ -26,42 +19,15 @@ OFF_HEIGHT = 10.0
 OFF_HEIGHT_SHORT = 15.0
 # A leg within this (rad) of level.
 LEVEL = math.radians(0.5)
-# Throttle at a limit for this long in one leg (s), with the mean airspeed of as long off by this (m/s, and a gust's
-# standard deviation in turbulence), is not flyable: a moment's saturation is normal.
-SATURATED = 5.0
+# With the throttle at a limit for `SATURATED`, the mean airspeed may be off by this (m/s, and a gust's standard deviation
+# in turbulence).
 OFF_SPEED = 1.0
-# Air that rises takes speed up with it on a held slope, by g w/V, until drag has eaten it up: about this long, s.  What
-# the air explains is not held against the slope.
-_SPEED_MEMORY = 12.0
 # Standard deviation of the gust along the track, as a share of the wind at 6 m (MIL-F-8785C: 0.1 high up to 0.2 at the
 # ground).
 GUST_SHARE = 0.15
-# Share of a window that counts as "at the limit throughout".
-_THROUGHOUT = 0.8
-# Throttle and battery current (A) that count as at a limit.
-_FULL, _IDLE, _NO_CURRENT = 0.99, 0.01, 0.02
-# After a change of commanded speed the aircraft is given this to accelerate, m/s^2.
-ACCELERATION = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class SlopeMeasure:
-    """How one leg was climbed or descended; None where it was not.
-
-    slope: see `Fit`.  height_error: largest distance above (negative: below) the leg's line, m; short: no place on the
-    leg is clear of the blends.  at_full, at_idle: s with the throttle at its limits.  slow, fast: the largest 5 s mean
-    of airspeed below, above the command meanwhile, as far as no gust explains it, m/s (0 for none).  finished: the leg
-    was flown to its end.
-    """
-
-    slope: Fit | None = None
-    height_error: float | None = None
-    short: bool = False
-    at_full: float = 0.0
-    at_idle: float = 0.0
-    slow: float = 0.0
-    fast: float = 0.0
-    finished: bool = False
+# What an aircraft showed that it can may fall short of what a leg asks by this (rad) and four of its standard errors.
+SHOWN_TOLERANCE = math.radians(0.1)
+SURE = 4.0
 
 
 def slope_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool = False) -> list[Finding]:
@@ -83,105 +49,6 @@ def slope_limit(shape: RouteShape, leg: int) -> tuple[float, str]:
     if fixed is not None and fixed <= aircraft:
         return fixed, "scenario"
     return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
-
-
-def measure_slope(shape: RouteShape, flown: Flown, leg: int) -> SlopeMeasure:
-    """Measure the slope of a leg as flown."""
-    if not flown.flew(leg):
-        return SlopeMeasure()
-    rows = flown.leg_rows(leg)
-    error, short = _height_error(shape, leg, flown.track.position[rows])
-    full, idle, slow, fast = _saturation(shape, flown, leg)
-    return SlopeMeasure(
-        slope=leg_slope(shape, flown, leg),
-        height_error=error,
-        short=short,
-        at_full=full,
-        at_idle=idle,
-        slow=slow,
-        fast=fast,
-        finished=bool(flown.passed[leg + 1]),
-    )
-
-
-def _height_error(shape: RouteShape, leg: int, position: Floats) -> tuple[float | None, bool]:
-    """Largest signed distance from the leg's line where it is clear of blends, m, and whether nothing is."""
-    along, _ = along_across(shape, leg, position)
-    low, high = straight_span(shape, leg, CLEAR_OF_TURN, level=True)
-    inside = (along >= low) & (along <= high)
-    short = not inside.any()
-    if short:
-        low, high = straight_span(shape, leg, 0.0)
-        inside = (along >= low) & (along <= high)
-        if not inside.any():
-            return None, True
-    line = shape.points[leg, 2] + along[inside] * math.tan(shape.slopes[leg])
-    off = position[inside, 2] - line
-    return float(off[np.argmax(np.abs(off))]), short
-
-
-def steady_rows(shape: RouteShape, flown: Flown, leg: int) -> slice:
-    """Rows of a leg after the aircraft has had time to take up its commanded speed; empty for a leg as short."""
-    rows = flown.leg_rows(leg)
-    speeds = shape.setup.route.airspeed
-    change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
-    start = float(flown.track.time[rows.start]) + change / ACCELERATION
-    return slice(max(rows.start, int(np.searchsorted(flown.track.time, start))), rows.stop)
-
-
-def _saturation(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float, float, float]:
-    """Seconds at full and idle throttle, and the speed lost and gained meanwhile, as `SlopeMeasure` has them."""
-    rows = steady_rows(shape, flown, leg)
-    track = flown.track
-    if rows.stop - rows.start < 2:
-        return 0.0, 0.0, 0.0, 0.0
-    tick = flown.tick()
-    throttle = track.controls[rows, 3]
-    full = throttle >= _FULL
-    idle = throttle <= _IDLE
-    # An aircraft that burns fuel draws no current at all.
-    if not shape.setup.envelope.motor_braking and track.current.any():
-        idle |= (track.current[rows] <= _NO_CURRENT) & ~full
-    commanded = float(shape.setup.route.airspeed[leg])
-    error = track.airspeed[rows].astype(np.float64) - commanded
-    # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
-    steady = _speed_in_mean_wind(shape, flown, rows) - commanded
-    width = max(1, round(SATURATED / tick))
-    lifted = _lifted(flown.track.time, flown.track.airspeed, flown.track.wind[:, 2], rows.stop)[rows]
-    slow = _mean_while(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
-    fast = _mean_while(idle, np.minimum(error, steady) - np.maximum(0.0, lifted), width)
-    return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
-
-
-def _speed_in_mean_wind(shape: RouteShape, flown: Flown, rows: slice) -> Floats:
-    """Speed that the air would see without gusts, m/s."""
-    wind, track = shape.setup.scenario.wind, flown.track
-    speed = np.maximum(0.0, wind.speed + wind.gradient * (track.position[rows, 2] - wind.reference_amsl))
-    east = track.velocity[rows, 0] + speed * math.sin(wind.from_course)
-    north = track.velocity[rows, 1] + speed * math.cos(wind.from_course)
-    return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
-
-
-@compiled
-def _lifted(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
-    """Airspeed gained from rising air (m/s) in rows 0..stop, as it fades, for an aircraft that holds its path."""
-    out = np.zeros(stop)
-    for k in range(1, stop):
-        step = time[k] - time[k - 1]
-        gain = GRAVITY * rising[k] / max(10.0, airspeed[k])
-        out[k] = (out[k - 1] + gain * step) / (1.0 + step / _SPEED_MEMORY)
-    return out
-
-
-def _mean_while(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
-    """Largest mean of ``value`` over ``width`` rows of which most are in ``mask``; 0 where there are none."""
-    if mask.size < width:
-        return 0.0
-    total = np.concatenate([[0.0], np.cumsum(value)])
-    count = np.concatenate([[0], np.cumsum(mask)])
-    means = (total[width:] - total[:-width]) / width
-    held = count[width:] - count[:-width] >= _THROUGHOUT * width
-    return max(0.0, float(means[held].max())) if held.any() else 0.0
 
 
 def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding:
@@ -304,6 +171,8 @@ def _evidence(shape: RouteShape, leg: int, measure: SlopeMeasure, limit: float) 
         if abs(measure.height_error) > (OFF_HEIGHT_SHORT if measure.short else OFF_HEIGHT):
             where = "above" if measure.height_error > 0.0 else "below"
             wrong.append(f"{abs(measure.height_error):.0f} m {where} the leg")
+    short, fits = _ability(shape, leg, measure)
+    wrong += short
     most = OFF_SPEED + GUST_SHARE * W20[shape.setup.scenario.wind.turbulence]
     for name, held, off, word in (
         ("full", measure.at_full, measure.slow, "slow"),
@@ -311,6 +180,28 @@ def _evidence(shape: RouteShape, leg: int, measure: SlopeMeasure, limit: float) 
     ):
         if held >= 1.0:
             said.append(f"throttle at {name} for {held:.0f} s")
-        if held >= SATURATED and off > most:
+        # Where the aircraft showed that it can more than the leg asks, the air took the speed.
+        if held >= SATURATED and off > most and not (fits and name == _throttle(planned)):
             wrong.append(f"throttle at {name} for {held:.0f} s and {off:.1f} m/s too {word}")
     return said, wrong
+
+
+def _throttle(planned: float) -> str:
+    """Name of the throttle limit that a slope may come to."""
+    return "full" if planned >= 0.0 else "idle"
+
+
+def _ability(shape: RouteShape, leg: int, measure: SlopeMeasure) -> tuple[list[str], bool]:
+    """What is wrong where the aircraft showed that it can less than the leg asks, and whether it showed that it can."""
+    shown, planned = measure.shown, float(shape.slopes[leg])
+    if shown is None:
+        return [], False
+    spare = shown.slope - abs(planned)
+    if abs(planned) <= LEVEL or spare >= -SHOWN_TOLERANCE - SURE * shown.error:
+        return [], spare > SURE * shown.error
+    verb = "climb" if planned >= 0.0 else "sink"
+    speed = float(shape.setup.route.airspeed[leg])
+    return [
+        f"in {shown.seconds:.0f} s at {_throttle(planned)} throttle the aircraft showed that it can {verb}"
+        f" {math.degrees(shown.slope):.1f}° at {speed:.0f} m/s here; the leg asks for {math.degrees(abs(planned)):.1f}°"
+    ], False

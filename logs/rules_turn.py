@@ -2,6 +2,8 @@
 
 import math
 
+from flight.navigation import ERRORS
+from flight.path import SHARPEST
 from logs.flown import Flown
 from logs.measure_turn import TurnMeasure, measure_turn
 from logs.route_shape import RouteShape
@@ -14,6 +16,12 @@ OVERSHOOT = 5.0
 SETTLED = 1.0
 # What gusts may add to the settled cross-track, m.
 GUST_OFFSET = {"none": 0.0, "light": 0.5, "moderate": 1.0}
+# A flown arc may pass its waypoint closer than the arc at the bank limit by this share, and by this, m; arcs that pass
+# it within that are not measured.
+CLOSER_SHARE = 0.02
+CLOSER = {"none": 0.15, "light": 0.2, "moderate": 0.5}
+# Navigation may be off by this many of its standard deviations.
+_NAV_SIGMAS = 3.0
 # A planned angle is known to this, rad: 1e-7 degrees of latitude on a 130 m leg, and rounding.
 PLAN_TOLERANCE = math.radians(0.01)
 
@@ -114,11 +122,12 @@ def _evidence(shape: RouteShape, i: int, measure: TurnMeasure, limit: float) -> 
             wrong.append(f"flown course change {math.degrees(measure.angle):.1f}° beyond {math.degrees(limit):.1f}°")
     if measure.peak_bank is not None and measure.held_bank is not None:
         most = shape.limits.max_bank + BANK_TOLERANCE
-        # A gust's roll is not the turn's: in turbulence the mean over a second counts.
-        bank = measure.peak_bank if turbulence == "none" else measure.held_bank
+        # The roll of a gust, or into a turn, is not the turn's: the mean over a second counts.
+        bank = measure.held_bank
         said.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
         if bank > most:
             wrong.append(f"bank {math.degrees(bank):.1f}° beyond {math.degrees(most):.1f}°")
+    wrong += _too_tight(shape, i, measure)
     if measure.radius is not None and measure.radius < 10.0 * shape.radius[i]:
         said.append(f"radius {measure.radius:.0f} m")
     if measure.overshoot is not None:
@@ -133,3 +142,24 @@ def _evidence(shape: RouteShape, i: int, measure: TurnMeasure, limit: float) -> 
     if measure.full_circles:
         wrong.append(f"{measure.full_circles} full circle(s) flown at the corner")
     return said, wrong
+
+
+def _too_tight(shape: RouteShape, i: int, measure: TurnMeasure) -> list[str]:
+    """What is wrong with a turn flown tighter than the bank limit's arc, by how closely it passed its waypoint.
+
+    An arc of radius R between two courses passes their corner at R (1 / cos(turn / 2) - 1).  The legs of a turn that
+    they have no room for are joined by a tighter arc, and a flight that follows it has used bank that it does not have.
+    """
+    turn, setup = abs(float(shape.turns[i])), shape.setup
+    least = (1.0 / math.cos(0.5 * turn) - 1.0) * float(shape.tightest[i]) if turn < SHARPEST else math.inf
+    if measure.passed is None or not math.isfinite(least) or setup.route.fly_over[i] or setup.guidance != "path":
+        return []
+    slack = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence] + _NAV_SIGMAS * ERRORS[setup.nav][0]
+    if measure.passed >= least - slack:
+        return []
+    radius = measure.passed / least * float(shape.tightest[i])
+    return [
+        f"flown with a radius of {radius:.0f} m, {measure.passed:.1f} m from its waypoint; at"
+        f" {math.degrees(shape.limits.max_bank):.0f}° bank in this wind it is {shape.tightest[i]:.0f} m, and"
+        f" {least:.1f} m from it"
+    ]
