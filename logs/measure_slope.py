@@ -28,9 +28,11 @@ _THROUGHOUT = 0.8
 _FULL, _IDLE, _NO_CURRENT = 0.99, 0.01, 0.02
 # What an aircraft can is measured over at least this long (s), this long after the throttle came to its limit (s), by
 # numbers that are independent after about this long (s); and what speed and acceleration are known to, m/s of climb.
-_SHOWN_OVER, _SETTLED_AFTER, _INDEPENDENT, _KNOWN_TO = 1.5, 1.0, 0.5, 0.02
+_SHOWN_OVER, _SETTLED_AFTER, _INDEPENDENT, _KNOWN_TO = 1.5, 0.5, 0.5, 0.02
 # Moments of a plane beyond this condition number do not determine it.
 _SINGULAR = 1e7
+# Standard errors that a measured ability may be out by.
+SURE = 3.0
 # A measured ability with a larger standard error than this (rad) says nothing.
 _UNSURE = math.radians(0.3)
 # After a change of commanded speed the aircraft is given this to accelerate, m/s^2.
@@ -48,6 +50,10 @@ class Shown:
     slope: float
     error: float
     seconds: float
+
+    def covers(self, planned: float) -> bool:
+        """Whether it is more, beyond its own error, than a leg's slope (rad) asks."""
+        return self.slope - SURE * self.error > abs(planned)
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +93,7 @@ def measure_slope(shape: RouteShape, flown: Flown, leg: int) -> SlopeMeasure:
         at_idle=idle,
         slow=slow,
         fast=fast,
-        shown=_shown(shape, flown, leg),
+        shown=measure_ability(shape, flown, leg),
         finished=bool(flown.passed[leg + 1]),
     )
 
@@ -130,7 +136,7 @@ def _saturation(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
     steady = _speed_in_mean_wind(shape, flown, rows) - commanded
     width = max(1, round(SATURATED / tick))
-    lifted = _lifted(flown.track.time, flown.track.airspeed, flown.track.wind[:, 2], rows.stop)[rows]
+    lifted = lifted_speed(flown.track.time, flown.track.airspeed, flown.track.wind[:, 2], rows.stop)[rows]
     slow = _mean_while(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
     fast = _mean_while(idle, np.minimum(error, steady) - np.maximum(0.0, lifted), width)
     return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
@@ -148,12 +154,12 @@ def _at_limits(shape: RouteShape, flown: Flown, rows: slice) -> tuple[Flags, Fla
     return full, idle
 
 
-def _shown(shape: RouteShape, flown: Flown, leg: int) -> Shown | None:
+def measure_ability(shape: RouteShape, flown: Flown, leg: int) -> Shown | None:
     """What the aircraft could at the throttle limit that a leg asks for: full to climb, idle to dive.
 
-    Thrust less drag gives an aircraft the climb rate v_up + v . a / g, where v is its velocity relative to the air and a
-    its acceleration over the ground: exact in any gust, for lift does no work.  A least-squares plane over airspeed and
-    height gives it at the commanded airspeed, at the highest place where it was seen, where an aircraft can least.
+    Thrust less drag gives an aircraft the climb rate v_up + v . a / g, where v is its velocity relative to the air and
+    a its acceleration over the ground: exact in any gust, for lift does no work.  A least-squares plane over airspeed
+    and height gives it at the commanded airspeed, at the highest place where it was seen, where an aircraft can least.
     """
     rows = steady_rows(shape, flown, leg)
     track, sign = flown.track, 1.0 if shape.slopes[leg] >= 0.0 else -1.0
@@ -216,7 +222,7 @@ def _speed_in_mean_wind(shape: RouteShape, flown: Flown, rows: slice) -> Floats:
 
 
 @compiled
-def _lifted(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
+def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) -> Floats:  # pragma: no cover - compiled
     """Airspeed gained from rising air (m/s) in rows 0..stop, as it fades, for an aircraft that holds its path."""
     out = np.zeros(stop)
     for k in range(1, stop):
@@ -235,5 +241,3 @@ def _mean_while(mask: NDArray[np.bool_], value: Floats, width: int) -> float:
     means = (total[width:] - total[:-width]) / width
     held = count[width:] - count[:-width] >= _THROUGHOUT * width
     return max(0.0, float(means[held].max())) if held.any() else 0.0
-
-

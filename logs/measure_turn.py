@@ -21,9 +21,9 @@ class TurnMeasure:
     """How one turn was flown; None where it was not, or where there is nothing to measure.
 
     angle, tolerance, peak_bank, held_bank (mean over a second): rad.  radius (least over a second), overshoot (past the
-    arc, on its outside), settled (mean distance from the next leg in the last second before its end), passed (least distance from the waypoint): m.
-    full_circles:
-    whole turns flown beyond the corner's own.  over: the flight got past the turn.
+    arc, on its outside), settled (mean distance from the next leg in the last second before its end), passed (least
+    distance from the waypoint): m.  full_circles: whole turns flown beyond the corner's own.  over: the flight got past
+    the turn.
     """
 
     angle: float | None = None

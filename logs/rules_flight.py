@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from logs.fits import CLEAR_OF_TURN, straight_span
 from logs.flown import Flown, along_across, approaches
+from logs.measure_slope import SATURATED, measure_ability, steady_rows
 from logs.route_shape import RouteShape
 from logs.rules_slope import GUST_SHARE
-from logs.measure_slope import SATURATED, steady_rows
 from logs.verdict import Finding, make_finding
 from world.wind import W20
 
@@ -116,7 +116,7 @@ def _speed(shape: RouteShape, flown: Flown | None, leg: int, geometric: bool) ->
             if not wrong:
                 numbers = {"limit": commanded + math.copysign(OFF_MEAN, mean - commanded), "margin": OFF_MEAN - off}
                 source, method = "check", "mean airspeed, once taken up"
-            if off > OFF_MEAN + tolerance:
+            if off > OFF_MEAN + tolerance and not _by_the_air(shape, flown, leg, mean - commanded):
                 wrong.append(f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s")
     ok: bool | None = not wrong
     return make_finding(
@@ -132,6 +132,14 @@ def _speed(shape: RouteShape, flown: Flown | None, leg: int, geometric: bool) ->
         method=method,
         **numbers,
     )
+
+
+def _by_the_air(shape: RouteShape, flown: Flown | None, leg: int, off: float) -> bool:
+    """Whether rising or sinking air took the speed on a leg where the aircraft showed that it can more than it asks."""
+    if flown is None or off * shape.slopes[leg] >= 0.0:
+        return False
+    shown = measure_ability(shape, flown, leg)
+    return shown is not None and shown.covers(float(shape.slopes[leg]))
 
 
 def _commanded(shape: RouteShape, leg: int, commanded: float) -> tuple[float, float, list[str]]:

@@ -5,7 +5,7 @@ import math
 from aircraft.envelope import GRAVITY
 from logs.fits import Fit
 from logs.flown import Flown
-from logs.measure_slope import SATURATED, SlopeMeasure, measure_slope
+from logs.measure_slope import SATURATED, SURE, SlopeMeasure, measure_slope
 from logs.route_shape import RouteShape
 from logs.rules_turn import PLAN_TOLERANCE
 from logs.verdict import Finding, make_finding
@@ -19,15 +19,14 @@ OFF_HEIGHT = 10.0
 OFF_HEIGHT_SHORT = 15.0
 # A leg within this (rad) of level.
 LEVEL = math.radians(0.5)
-# With the throttle at a limit for `SATURATED`, the mean airspeed may be off by this (m/s, and a gust's standard deviation
-# in turbulence).
+# With the throttle at a limit for `SATURATED`, the mean airspeed may be off by this (m/s, and a gust's standard
+# deviation in turbulence).
 OFF_SPEED = 1.0
 # Standard deviation of the gust along the track, as a share of the wind at 6 m (MIL-F-8785C: 0.1 high up to 0.2 at the
 # ground).
 GUST_SHARE = 0.15
-# What an aircraft showed that it can may fall short of what a leg asks by this (rad) and four of its standard errors.
+# What an aircraft showed that it can may fall short of what a leg asks by this (rad) and `SURE` of its standard errors.
 SHOWN_TOLERANCE = math.radians(0.1)
-SURE = 4.0
 
 
 def slope_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool = False) -> list[Finding]:
@@ -198,7 +197,7 @@ def _ability(shape: RouteShape, leg: int, measure: SlopeMeasure) -> tuple[list[s
         return [], False
     spare = shown.slope - abs(planned)
     if abs(planned) <= LEVEL or spare >= -SHOWN_TOLERANCE - SURE * shown.error:
-        return [], spare > SURE * shown.error
+        return [], shown.covers(planned)
     verb = "climb" if planned >= 0.0 else "sink"
     speed = float(shape.setup.route.airspeed[leg])
     return [

@@ -144,7 +144,7 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     turns = _turns(draft, legs)
     draft.courses = rng.uniform(-math.pi, math.pi) + np.concatenate([[0.0], np.cumsum(turns)])
     runs = _runs(draft, turns)
-    heights = _heights(draft, runs, lowest)
+    heights = _heights(draft, runs, turns, lowest)
     steps = runs[:, None] * np.stack([np.sin(draft.courses), np.cos(draft.courses)], axis=1)
     points = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heights])
     scenario = _scenario(draft, points, numbers, f"{kind or 'feasible'} {number}")
@@ -205,7 +205,11 @@ def _runs(draft: _Draft, turns: Floats) -> Floats:
     wide = radii * np.tan(0.5 * np.minimum(angles / draft.inside, math.radians(170.0)))
     runs = np.zeros(legs)
     for leg in range(legs):
-        need = max(wide[leg] + tangents[leg + 1], tangents[leg] + wide[leg + 1], (tangents[leg] + tangents[leg + 1]) / draft.inside)
+        need = max(
+            wide[leg] + tangents[leg + 1],
+            tangents[leg] + wide[leg + 1],
+            (tangents[leg] + tangents[leg + 1]) / draft.inside,
+        )
         low, high = LEGS
         if leg == draft.bad and draft.breaks("climb", "dive", "climb number", "dive number"):
             low = SLOPE_LEG
@@ -223,17 +227,30 @@ def _runs(draft: _Draft, turns: Floats) -> Floats:
     return runs
 
 
-def _heights(draft: _Draft, runs: Floats, lowest: float) -> Floats:
-    """Height of each waypoint, m, the least of them ``lowest``."""
+def _heights(draft: _Draft, runs: Floats, turns: Floats, lowest: float) -> Floats:
+    """Height of each waypoint, m, the least of them ``lowest``.
+
+    A fly-by arc is shorter than its two tangents, and steeper: by tan(turn / 2) / (turn / 2).  It keeps to the limits
+    as the legs do.  The legs beside one that is too steep are level, so that nothing else is.
+    """
     up = np.zeros(len(runs) + 1)
     shares = np.where(draft.rng.random(len(runs)) < 0.3, 1.0, draft.rng.uniform(0.0, 1.0, len(runs)))
     shares *= draft.rng.choice([-1.0, 0.0, 1.0], len(runs), p=[0.4, 0.2, 0.4])
+    if draft.breaks("climb", "dive", "climb number", "dive number"):
+        shares[[draft.bad - 1, draft.bad + 1]] = 0.0
+    steeper = np.tan(0.5 * np.abs(turns)) / (0.5 * np.abs(turns))
     base = lowest
     # The limits depend on the heights, and which height is the least on the slopes.
     for _ in range(4):
         up[0] = base
         for leg, run in enumerate(runs):
-            up[leg + 1] = up[leg] + run * math.tan(_slope(draft, leg, float(shares[leg]), up[leg], run))
+            slope = _slope(draft, leg, float(shares[leg]), up[leg], run)
+            before = (up[leg] - up[leg - 1]) / runs[leg - 1] if leg else 0.0
+            if before * slope > 0.0 and leg != draft.bad:
+                most = math.tan(_slope(draft, leg, math.copysign(1.0, slope), up[leg], run))
+                room = max(0.0, 2.0 * abs(most) / float(steeper[leg - 1]) - abs(before))
+                slope = math.copysign(min(abs(slope), math.atan(room)), slope)
+            up[leg + 1] = up[leg] + run * math.tan(slope)
         base += lowest - float(up.min())
     return up
 
@@ -310,5 +327,7 @@ def _mission(points: Floats, speeds: Floats, origin: GeoOrigin) -> Mission:
         items.append(MissionItem(len(items) + 1, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, *place))
         if k < len(speeds) and (k == 0 or speeds[k] != speeds[k - 1]):
             change = (0.0, float(speeds[k]), -1.0, 0.0)
-            items.append(MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), change, 0.0, 0.0, 0.0))
+            items.append(
+                MissionItem(len(items) + 1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), change, 0.0, 0.0, 0.0)
+            )
     return Mission(None, tuple(items), source="made mission")
