@@ -8,7 +8,16 @@ from numpy.typing import NDArray
 
 from flight.setup import FlightSetup, limits_of
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
-from world.limits import BLEND_ACCELERATION, Limits, aircraft_slopes, ground_speed_on, turn_radius_between
+from world.limits import (
+    BLEND_ACCELERATION,
+    Limits,
+    aircraft_slopes,
+    downwind,
+    fly_over_run,
+    ground_speed_on,
+    reversal_room,
+    turn_radius_between,
+)
 
 Floats = NDArray[np.float64]
 
@@ -25,6 +34,7 @@ class RouteShape:
     For w waypoints: points (w, 3) m; runs (w - 1,) horizontal m; courses, slopes (w - 1,) rad; turns (w,) rad,
     positive to the right, 0 at the ends; radius (w,) m of the arc, at the bank limit or of a loiter's circle; tightest
     (w,) m, the arc at the bank limit; before, after (w,) m of leg that the turn uses on either side, inf for a U-turn;
+    reversal (w - 1,) m of leg that the roll from a turn into one the other way round uses;
     blend (w,) m of leg beyond them on which the slope still changes;
     sag (w,) m by which such a blend may pass above or below its corner; cut (w,) m by which the fly-by passes the
     waypoint; turn_limit (w,) rad, the sharpest turn there that fits both legs
@@ -43,6 +53,7 @@ class RouteShape:
     radius: Floats
     before: Floats
     after: Floats
+    reversal: Floats
     blend: Floats
     sag: Floats
     cut: Floats
@@ -104,6 +115,7 @@ def route_shape(setup: FlightSetup, *, envelope: bool = True) -> RouteShape:
             speeds[leg] = math.nan
         if envelope:
             climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
+    reversal = _reversals(setup, packed, courses, turns, radius, points[:, 2])
     blend, sag = _blends(setup, points, runs, turns, radius, after)
     cut = np.zeros(count)
     finite = np.isfinite(radius) & ~route.fly_over
@@ -119,11 +131,14 @@ def route_shape(setup: FlightSetup, *, envelope: bool = True) -> RouteShape:
         radius=radius,
         before=before,
         after=after,
+        reversal=reversal,
         blend=blend,
         sag=sag,
         cut=cut,
         tightest=tightest,
-        turn_limit=_turn_limits(setup, runs, tightest, before, after) if envelope else np.full(count, math.inf),
+        turn_limit=_turn_limits(setup, runs, tightest, before, after, reversal)
+        if envelope
+        else np.full(count, math.inf),
         climb=climb,
         dive=dive,
         ground_speed=speeds,
@@ -161,21 +176,31 @@ def turn_room(turn: float, radius: float, fly_over: bool) -> tuple[float, float]
     if turn < 1e-9:
         return 0.0, 0.0
     if fly_over:
-        return 0.0, radius * _fly_over_run(turn)
+        return 0.0, radius * fly_over_run(turn)
     if turn > _U_TURN:
         return math.inf, math.inf
     reach = radius * math.tan(0.5 * turn)
     return reach, reach
 
 
-def _fly_over_run(turn: float) -> float:
-    """Run after a fly-over turn, in radii; its greatest up to this angle, so that it never falls with the angle."""
-    sharpest = min(turn, math.acos(-1.0 / 3.0))  # where sin turn + 2 sin phi is greatest, 2 sqrt 2
-    back = 0.5 * (1.0 + math.cos(sharpest))
-    return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
+def _reversals(
+    setup: FlightSetup, packed: dict[float, Floats], courses: Floats, turns: Floats, radius: Floats, up: Floats
+) -> Floats:
+    """Length of each leg that the roll from one bank into the other uses, (w - 1,) m; 0 between turns of one side."""
+    out = np.zeros(len(courses))
+    for leg in range(1, len(courses) - 1):
+        flown_by = not setup.route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
+        if turns[leg] * turns[leg + 1] < 0.0 and flown_by:
+            table = packed[float(setup.route.airspeed[leg])]
+            ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
+            lower = float(min(up[leg], up[leg + 1]))
+            out[leg] = reversal_room(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
+    return out
 
 
-def _turn_limits(setup: FlightSetup, runs: Floats, radius: Floats, before: Floats, after: Floats) -> Floats:
+def _turn_limits(
+    setup: FlightSetup, runs: Floats, radius: Floats, before: Floats, after: Floats, reversal: Floats
+) -> Floats:
     """Sharpest turn at each waypoint that fits its legs beside the neighbouring turns, (w,) rad.
 
     Of a leg too short for its two turns the one that takes more than half of it is at fault, or both are.
@@ -185,8 +210,8 @@ def _turn_limits(setup: FlightSetup, runs: Floats, radius: Floats, before: Float
         if not math.isfinite(radius[i]):
             out[i] = 0.0
             continue
-        behind = max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1])
-        ahead = max(runs[i] - before[i + 1], 0.5 * runs[i])
+        behind = max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1]
+        ahead = max(runs[i] - before[i + 1], 0.5 * runs[i]) - reversal[i]
         if setup.route.fly_over[i]:
             out[i] = _sharpest_fly_over(ahead / radius[i])
         else:
@@ -197,9 +222,9 @@ def _turn_limits(setup: FlightSetup, runs: Floats, radius: Floats, before: Float
 def _sharpest_fly_over(room: float) -> float:
     """Sharpest fly-over turn (rad) whose run fits ``room`` radii, by bisection."""
     low, high = 0.0, math.pi
-    if _fly_over_run(high) <= room:
+    if fly_over_run(high) <= room:
         return high
     for _ in range(50):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if _fly_over_run(middle) <= room else (low, middle)
+        low, high = (middle, high) if fly_over_run(middle) <= room else (low, middle)
     return low

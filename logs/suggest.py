@@ -87,8 +87,8 @@ def turn_suggestion(shape: RouteShape, i: int) -> str:
     degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
     changes = [(1.0 - allowed / planned, f"turn at most {degrees:.1f}° there")]
     if source == "aircraft" and math.isfinite(shape.before[i]):
-        before = shape.before[i] + shape.after[i - 1] + SPARE_LENGTH
-        after = shape.after[i] + shape.before[i + 1] + SPARE_LENGTH
+        before = shape.before[i] + shape.after[i - 1] + shape.reversal[i - 1] + SPARE_LENGTH
+        after = shape.after[i] + shape.before[i + 1] + shape.reversal[i] + SPARE_LENGTH
         short = []
         grown = 0.0
         for leg, needed in ((i - 1, before), (i, after)):
@@ -129,8 +129,8 @@ def _turn_speed(shape: RouteShape, i: int) -> float | None:
     now = float(max(shape.setup.route.airspeed[i - 1 : i + 1]))
     # As the turn limit has it: what the neighbours leave, and half of each leg in any case.
     room = min(
-        max(shape.runs[i - 1] - shape.after[i - 1], 0.5 * shape.runs[i - 1]),
-        max(shape.runs[i] - shape.before[i + 1], 0.5 * shape.runs[i]),
+        max(shape.runs[i - 1] - shape.after[i - 1], 0.5 * shape.runs[i - 1]) - shape.reversal[i - 1],
+        max(shape.runs[i] - shape.before[i + 1], 0.5 * shape.runs[i]) - shape.reversal[i],
     )
     for speed in sorted((v for v in _speeds(shape, float(shape.points[i, 2]), now) if v < now), reverse=True):
         table = shape.limits.packed(speed)

@@ -8,12 +8,22 @@ from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
 from planner.corners import corner, corner_radii
-from planner.legs import CERTIFIED_LEG, RESERVE_GROWTH, extended, settling_room, slope_limits
+from planner.legs import (
+    CERTIFIED_LEG,
+    make_gauge,
+    measure_corners,
+    measure_legs,
+    roll_need,
+    settling_room,
+    slope_limits,
+    turn_need,
+)
 from planner.plan import Certificate
 from planner.problem import SPARE, Problem
+from planner.reserve import RESERVE_GROWTH
 from planner.rules import Rules
 from world.geometry import leg_runs, leg_slopes, sphere_window, turning_angles
-from world.limits import arc_slope, fly_over_run, turn_tangents
+from world.limits import arc_slope, turn_tangents
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -84,6 +94,28 @@ def _segment_distance(threats: Floats, a: Floats, b: Floats, nearest: float) -> 
     return nearest
 
 
+@compiled
+def extended(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compiled
+    """Path with a far point before the start and after the destination, on the courses asked for there.
+
+    Without such a course the point lies on the leg's own line, and the turn at the end is none.
+    """
+    count = path.shape[0]
+    out = np.empty((count + 2, 3))
+    out[1:-1] = path
+    for end, at, other, course, sign in (
+        (0, 0, 1, rules.start_course, -1.0),
+        (count + 1, count - 1, count - 2, rules.destination_course, 1.0),
+    ):
+        out[end] = path[at]
+        if math.isnan(course):
+            out[end, :2] = 2.0 * path[at, :2] - path[other, :2]
+        else:
+            out[end, 0] += sign * 1e4 * math.sin(course)
+            out[end, 1] += sign * 1e4 * math.cos(course)
+    return out
+
+
 def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
     way = extended(rules, waypoints)
     allowed = rules.max_turn if rules.room else rules.max_turn + SPARE
@@ -98,29 +130,31 @@ def _turns(rules: Rules, waypoints: Floats, problems: list[str]) -> tuple[float,
         if run < CERTIFIED_LEG:
             problems.append(f"leg {i}: {run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
     if rules.room:
-        for i, (run, need) in enumerate(zip(leg_runs(waypoints), _turn_needs(rules, way), strict=True)):
+        for i, (run, need, roll) in enumerate(zip(leg_runs(waypoints), *turn_needs(rules, waypoints), strict=True)):
             if need == 0.0:
                 continue
-            room = min(room, float(run - need))
-            settle = settling_room(float(need), float(run))
+            room = min(room, float(run - need - roll))
+            settle = settling_room(float(need), float(run)) + roll
             if need + settle > run + _EPSILON:
                 problems.append(f"leg {i}: {run:.0f} m long, its turns need {need:.0f} m and {settle:.0f} m to settle")
     return float(margins.min(initial=math.inf)), room
 
 
-def _turn_needs(rules: Rules, way: Floats) -> Floats:
-    """Length of each leg (w - 1,) that its turns use, m; way: extended."""
-    tangents = turn_tangents(rules.aircraft, way)[1:-1]
-    if not rules.fly_over:
-        return np.asarray(tangents[:-1] + tangents[1:])
-    turns = turning_angles(way)
-    half = np.array([math.tan(0.5 * min(turn, math.pi - 1e-6)) for turn in turns])
-    return np.array(
-        [
-            tangent / tangent_of_half * fly_over_run(turn) if 0.0 < tangent < math.inf else tangent
-            for tangent, tangent_of_half, turn in zip(tangents[:-1], half[:-1], turns[:-1], strict=True)
-        ]
-    )
+@compiled
+def turn_needs(rules: Rules, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+    """Length of each leg (w - 1,) that its turns use, and that the roll from one to the other uses, m."""
+    count = waypoints.shape[0]
+    legs, corners = np.empty((count - 1, 4)), np.zeros((count, 2))
+    needs, rolls = np.zeros(count - 1), np.zeros(count - 1)
+    gauge, paths = make_gauge(rules), waypoints.copy().reshape((1, count, 3))
+    measure_legs(paths, 0, legs)
+    measure_corners(rules, gauge, paths, 0, legs, corners)
+    for i in range(count - 1):
+        needs[i] = turn_need(rules, legs, corners, i)
+        if not rules.fly_over:
+            up = min(waypoints[i, 2], waypoints[i + 1, 2])
+            rolls[i] = roll_need(rules.aircraft, legs, corners, i, up, gauge.wind_east, gauge.wind_north)
+    return needs, rolls
 
 
 def _arc_slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
 from planner.cells import Short, cell_at, grid_of
-from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs, required_clearance
+from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs
+from planner.reserve import required_clearance
 from planner.rules import Rules
 from world.frames import polymap
 from world.geometry import CLOSEST

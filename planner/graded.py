@@ -14,7 +14,8 @@ from aircraft.compiled import compiled
 from planner.cells import Cells, cell_at, grid_of
 from planner.corners import ARC_STEP, blend_reach, corner
 from planner.criteria import POINTS
-from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs, required_clearance
+from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs
+from planner.reserve import required_clearance
 from planner.rules import CORNER_SLACK, Rules
 from world.frames import polymap
 from world.geometry import window_exposure

@@ -1,4 +1,4 @@
-"""What every judge asks of waypoints and legs: turns and room for them, slopes, the map, and the clearance wanted."""
+"""What every judge asks of waypoints and legs: turns and room for them, slopes, and the map."""
 
 import math
 from typing import NamedTuple
@@ -7,18 +7,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
+from planner.reserve import pack_clearance
 from planner.rules import Rules
-from world.limits import arc_slope, corner_tangent, downwind, fly_over_run, slopes_along, wind_speed_at
+from world.limits import arc_slope, corner_tangent, downwind, fly_over_run, reversal_room, slopes_along, wind_speed_at
 
 Floats = NDArray[np.float64]
 
 # Leg left over between its two turns: this share of the leg, and this length (m) or what small turns use of it.
 ROOM_SHARE = 0.05
 ROOM_LENGTH = 20.0
+# No roll from one turn into the next takes more, m: at 60 degrees of bank and 90 m/s over the ground.
+MOST_ROLL = 25.0
 # Shortest leg that a graded judge and the certificate let pass, m.
 LEAST_LEG, CERTIFIED_LEG = 10.0, 5.0
-# Growth of the clearance reserve away from an end that starts without it, m per m.
-RESERVE_GROWTH = 0.05
 
 
 class Gauge(NamedTuple):
@@ -26,7 +27,7 @@ class Gauge(NamedTuple):
 
     cos_turn: of the largest turn.  wind_east, wind_north: unit vector downwind.  climb, dive: tangents that no leg may
     exceed, or, where the aircraft limits them, that every leg may use.  straight: m from start to destination.
-    clear: of `pack_clearance`.
+    clear: of `planner.reserve.pack_clearance`.
     """
 
     cos_turn: float
@@ -76,28 +77,6 @@ def _least_slope(rules: Rules, row: int) -> float:  # pragma: no cover - compile
     if not angle > 0.0 or wind >= 0.99 * packed[0, 0] * math.cos(angle):
         return -1.0
     return math.atan2(packed[0, 0] * math.sin(angle), packed[0, 0] * math.cos(angle) + wind)
-
-
-@compiled
-def extended(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compiled
-    """Path with a far point before the start and after the destination, on the courses asked for there.
-
-    Without such a course the point lies on the leg's own line, and the turn at the end is none.
-    """
-    count = path.shape[0]
-    out = np.empty((count + 2, 3))
-    out[1:-1] = path
-    for end, at, other, course, sign in (
-        (0, 0, 1, rules.start_course, -1.0),
-        (count + 1, count - 1, count - 2, rules.destination_course, 1.0),
-    ):
-        out[end] = path[at]
-        if math.isnan(course):
-            out[end, :2] = 2.0 * path[at, :2] - path[other, :2]
-        else:
-            out[end, 0] += sign * 1e4 * math.sin(course)
-            out[end, 1] += sign * 1e4 * math.cos(course)
-    return out
 
 
 @compiled
@@ -233,6 +212,9 @@ def constraints(
         for i in range(last):
             need, run = turn_need(rules, legs, corners, i), legs[i, 2]
             short = need + settling_room(need, run) - run if need > 0.0 else 0.0
+            if short > -MOST_ROLL and not rules.fly_over:
+                up = min(paths[n, i, 2], paths[n, i + 1, 2])
+                short += roll_need(rules.aircraft, legs, corners, i, up, gauge.wind_east, gauge.wind_north)
             missed[n, 0] += _weight(min(10.0, max(0.0, short / 100.0)), graded)
     for i in range(last):
         # Two waypoints in one place have no course between them, and would make two sharp turns none.
@@ -270,6 +252,24 @@ def turn_need(rules: Rules, legs: Floats, corners: Floats, i: int) -> float:  # 
 
 
 @compiled
+def roll_need(
+    packed: Floats, legs: Floats, corners: Floats, i: int, amsl: float, wx: float, wy: float
+) -> float:  # pragma: no cover - compiled
+    """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side.
+
+    packed: the aircraft.  w: downwind.
+    """
+    if i == 0 or i == legs.shape[0] - 1 or corners[i, 0] <= 0.0 or corners[i + 1, 0] <= 0.0:
+        return 0.0
+    ux, uy = legs[i, 0], legs[i, 1]
+    into, onward = legs[i - 1, 0] * uy - legs[i - 1, 1] * ux, ux * legs[i + 1, 1] - uy * legs[i + 1, 0]
+    if into * onward >= 0.0 or math.isinf(corners[i, 0] + corners[i + 1, 0]):
+        return 0.0
+    room: float = reversal_room(packed, ux, uy, amsl, corners[i, 1], corners[i + 1, 1], wx, wy)
+    return room
+
+
+@compiled
 def _arc_excess(
     rules: Rules, gauge: Gauge, paths: Floats, n: int, i: int, legs: Floats, corners: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -294,40 +294,6 @@ def _weight(over: float, graded: bool) -> float:  # pragma: no cover - compiled
     if graded:
         return over
     return 1.0 if over > 0.0 else 0.0
-
-
-@compiled
-def pack_clearance(rules: Rules) -> Floats:  # pragma: no cover - compiled
-    """What the terrain is judged with, (12,): clearance, reserve; east, north, slack of both ends; and steps.
-
-    The last four: pitch of samples (m), the steepest loss of height above the required clearance (m per m), whether
-    the reserve is the same everywhere (1 or 0), and nothing.
-    """
-    out = np.zeros(12)
-    out[0], out[1] = rules.clearance, rules.reserve
-    out[2], out[3], out[4] = rules.start[0], rules.start[1], rules.start_slack
-    out[5], out[6], out[7] = rules.destination[0], rules.destination[1], rules.destination_slack
-    whole = min(rules.start_slack, rules.destination_slack) >= rules.reserve
-    out[8], out[9] = rules.pitch, rules.steepest + (0.0 if whole else RESERVE_GROWTH)
-    out[10] = 1.0 if whole else 0.0
-    return out
-
-
-@compiled
-def required_clearance(clear: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Height above ground that a path needs here, m: the reserve grows from what the fixed ends leave of it.
-
-    clear: of `pack_clearance`.
-    """
-    keep = clear[1]
-    if clear[4] < keep:
-        away = math.sqrt((east - clear[2]) ** 2 + (north - clear[3]) ** 2)
-        keep = min(keep, clear[4] + RESERVE_GROWTH * away)
-    if clear[7] < keep:
-        away = math.sqrt((east - clear[5]) ** 2 + (north - clear[6]) ** 2)
-        keep = min(keep, clear[7] + RESERVE_GROWTH * away)
-    need: float = clear[0] + keep
-    return need
 
 
 @compiled

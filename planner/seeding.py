@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from aircraft.compiled import compiled
 from planner.encoding import Frame, rotated_frame
 from planner.fitting import KILL_COST, fit_waypoints
-from planner.legs import pack_clearance, required_clearance, slope_limits
+from planner.legs import slope_limits
+from planner.reserve import pack_clearance, required_clearance
 from planner.rules import Rules
 from world.terrain import ground_height
 

@@ -16,6 +16,9 @@ from world.wind import W20, Wind
 
 Floats = NDArray[np.float64]
 
+# Rolling from one bank into the other takes this long, s per rad, as far as it is more than the bank limit: that much
+# every turn rolls in from level.  From the shortest S-turn legs that flights hold (`tests.bench.limits`).
+ROLL_TIME = 0.25
 # Vertical acceleration where one slope blends into the next, m/s^2.
 BLEND_ACCELERATION = 1.0
 
@@ -224,3 +227,21 @@ def turn_tangents(packed: Floats, waypoints: Floats) -> Floats:  # pragma: no co
         if u > 1e-6 and v > 1e-6:
             out[i], _ = corner_tangent(packed, ux / u, uy / u, vx / v, vy / v, waypoints[i, 2], wx, wy)
     return out
+
+
+@compiled
+def reversal_room(
+    packed: Floats, ux: float, uy: float, amsl: float, radius_in: float, radius_out: float, wx: float, wy: float
+) -> float:  # pragma: no cover - compiled
+    """Length of leg (m) that rolling from a turn into one the other way round takes, between arcs of these radii (m).
+
+    u: the leg's unit course.  w: `downwind`.  0 where the wind leaves no way along the leg.
+    """
+    wind = wind_speed_at(packed, amsl)
+    speed = ground_speed(packed[0, 0], wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + packed[0, 7]
+    if math.isnan(speed):
+        return 0.0
+    pull = speed * speed / GRAVITY
+    roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(packed[0, 1])
+    room: float = speed * ROLL_TIME * max(0.0, roll)
+    return room

@@ -15,7 +15,7 @@ from flight.route import Route
 from flight.setup import FlightSetup, limits_of
 from flight.simulate import simulate
 from flight.track import Track
-from world.limits import turn_tangents
+from logs.route_shape import route_shape
 from world.scenario import from_spec
 
 Floats = NDArray[np.float64]
@@ -165,8 +165,8 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
         return bool(np.abs(flown.track.cross_track[late]).max() <= CROSS_HELD and mean <= BANK + BANK_HELD)
 
     far = points(4000.0)
-    limits = limits_of(made_setup(far, aircraft, wind, wind_from))
-    predicted = float(turn_tangents(limits.packed(aircraft.airspeed), far).sum())
+    shape = route_shape(made_setup(far, aircraft, wind, wind_from))
+    predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
     return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
 
 
