@@ -26,7 +26,9 @@ AROUND = 2000.0
 _HOME_REACH = 100_000.0
 
 
-def foreign_scenario(mission: Mission, terrain_path: str | None, flight: FlightTable | None = None) -> Scenario:
+def foreign_scenario(
+    mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, on_the_spot: bool = False
+) -> Scenario:
     """Scenario for a mission that has none: its surroundings, no threats, default limits, ``foreign`` set.
 
     terrain_path: an elevation file or embedded name, None for no terrain at all.  flight: the aircraft and how it
@@ -34,14 +36,15 @@ def foreign_scenario(mission: Mission, terrain_path: str | None, flight: FlightT
     edge of the tile.  Start and destination are the route's ends; where those are not above ground they are lifted to
     1 m, because a scenario's ends must be, while the route (and its verdict) keeps what the mission says.
 
-    Raises MissionError, and TerrainError where the mission leaves the tile.
+    on_the_spot: of `flight.routing.make_route`.  Raises MissionError, and TerrainError where the mission leaves the
+    tile.
     """
     flight = flight or FlightTable()
     origin = mission_origin(mission)
     box, flown = _boxes(mission, origin)
     terrain, table, box = _ground(terrain_path, origin, box, flown)
     # The speed of a route does not matter for its ends.
-    route = make_route(mission, origin, terrain, flight.airspeed_mps or 25.0, flight.fly_over)
+    route = make_route(mission, origin, terrain, flight.airspeed_mps or 25.0, flight.fly_over, on_the_spot=on_the_spot)
     top = float(route.waypoints[:, 2].max())
     if terrain is not None:
         top = max(top, float(np.nanmax(terrain.heights)))

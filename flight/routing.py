@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 
 # Places nearer to each other than this (m) are one place.
 SAME_PLACE = 1.0
+# Leg that stands for a climb on the spot, m: ten metres of height on it are 89 degrees.
+STEP = 0.1
 # Heights (m AMSL) that a flight may be asked to keep.
 LOWEST, HIGHEST = -500.0, 9000.0
 # Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.
@@ -38,17 +40,20 @@ def make_route(
     default_airspeed: float,
     fly_over: bool,
     limits: Limits | None = None,
+    *,
+    on_the_spot: bool = False,
 ) -> Route:
     """Route of a mission in the map about ``origin``.
 
     terrain: None where none is known; heights above terrain are then an error.  default_airspeed: m/s until the
     mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and sets none).  fly_over: whether
     waypoints are flown through instead of by.  limits: the aircraft's, for the radius of a loiter that states none and
-    the slope of a spiral; None takes 80 m and 5 %.
+    the slope of a spiral; None takes 80 m and 5 %.  on_the_spot: whether a place straight above or below the one before
+    it becomes a leg of `STEP` m, for a judge to call it what it is; otherwise it is an error.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
-    has a horizontal length of at least `SAME_PLACE`.  Raises MissionError, naming the item, for what cannot be placed,
-    and for a mission of fewer than two places.
+    has a horizontal length of at least `SAME_PLACE`, or `STEP` on the spot.  Raises MissionError, naming the item, for
+    what cannot be placed, and for a mission of fewer than two places.
     """
     itinerary = plan_stops(mission, default_airspeed)
     notes = Notes()
@@ -60,6 +65,9 @@ def make_route(
         point = np.array([east, north, heights.amsl(stop, float(east), float(north), last)])
         circles = stop.loiter is not None or bool(kept and kept[-1][0].loiter is not None)
         if kept and not circles and math.dist(kept[-1][1][:2], point[:2]) < SAME_PLACE:
+            if on_the_spot and _straight_up(kept[-1], (stop, point)):
+                kept.append((stop, _step_aside(kept, point)))
+                continue
             kept[-1] = (_merge(mission.source, kept[-1], (stop, point), notes), kept[-1][1])
         else:
             kept.append((stop, point))
@@ -201,6 +209,20 @@ class _Heights:
             f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {under:.1f} m AMSL"
         )
         return under
+
+
+def _straight_up(kept: tuple[Stop, Floats], new: tuple[Stop, Floats]) -> bool:
+    """Whether a place is straight above or below the one before, and no take-off's."""
+    return abs(float(new[1][2] - kept[1][2])) >= SAME_PLACE and new[0].command not in TAKEOFFS
+
+
+def _step_aside(kept: list[tuple[Stop, Floats]], point: Floats) -> Floats:
+    """The place `STEP` m further on the course that leads to the last one; east of it where there is none."""
+    course = math.pi / 2.0
+    if len(kept) > 1:
+        course = float(leg_courses(np.array([kept[-2][1], kept[-1][1]]))[0])
+    east, north, _ = kept[-1][1]
+    return np.array([east + STEP * math.sin(course), north + STEP * math.cos(course), point[2]])
 
 
 def _merge(source: str, kept: tuple[Stop, Floats], new: tuple[Stop, Floats], notes: Notes) -> Stop:

@@ -21,6 +21,8 @@ from world.limits import (
 
 Floats = NDArray[np.float64]
 
+# A leg shorter than this is a climb on the spot, with no course of its own, m.
+ON_THE_SPOT = 0.5
 # A turn sharper than this has no useful tangent length; a U-turn's is infinite.
 _U_TURN = math.pi - 1e-6
 # The distance by which a fly-by passes its waypoint is capped at this many radii (a turn of about 176 degrees).

@@ -2,11 +2,13 @@
 
 import math
 
+import numpy as np
+
 from aircraft.envelope import GRAVITY
 from logs.fits import Fit
 from logs.flown import Flown
 from logs.measure_slope import SATURATED, SURE, SlopeMeasure, measure_slope
-from logs.route_shape import RouteShape
+from logs.route_shape import ON_THE_SPOT, RouteShape
 from logs.rules_turn import PLAN_TOLERANCE
 from logs.verdict import Finding, make_finding
 from world.limits import arc_slope
@@ -58,7 +60,7 @@ def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL)
     wrong = [_too_steep(shape, leg, limit, source)] if abs(planned) > limit + PLAN_TOLERANCE else []
-    wrong += _steep_arc(shape, leg, limit)
+    wrong += _steep_arc(shape, leg)
     facts = [f"slope {math.degrees(planned):+.2f}°"]
     fit: Fit | None = None
     method = "route"
@@ -93,31 +95,41 @@ def _judge(shape: RouteShape, leg: int, measure: SlopeMeasure | None) -> Finding
     )
 
 
-def _steep_arc(shape: RouteShape, leg: int, limit: float) -> list[str]:
-    """What the fly-by arc at a leg's end asks beyond its limit, where that costs or gives more than `OFF_SPEED`.
+def steep_arc(shape: RouteShape, leg: int) -> tuple[float, float] | None:
+    """Tangent of the slope of the fly-by arc at a leg's end, and of what the aircraft can on the mean of its courses.
 
-    The arc is shorter than its two tangents and so steeper than the legs.  What the aircraft cannot climb or sink there
-    it takes from its speed or adds to it: g dh / V.
+    None where that leaves the airspeed within `OFF_SPEED`: what the aircraft cannot climb or sink on the arc it takes
+    from its speed or adds to it, g dh / V.
     """
     i = leg + 1
-    turn, reach = abs(float(shape.turns[i])), float(shape.before[i])
-    if i == shape.legs or not math.isfinite(limit) or not 0.0 < reach < min(shape.runs[leg : leg + 2]):
+    if i == shape.legs or shape.setup.route.fly_over[i] or shape.setup.route.arcs[i] > 0.0:
+        return None
+    reach, length = float(shape.before[i]), float(shape.radius[i]) * abs(float(shape.turns[i]))
+    if not 0.0 < reach < min(shape.runs[leg : leg + 2]):
+        return None
+    tangent = arc_slope(math.tan(shape.slopes[leg]), math.tan(shape.slopes[i]), reach, float(shape.radius[i]))
+    limits = (shape.climb if tangent > 0.0 else shape.dive)[leg : leg + 2]
+    if not np.isfinite(limits).all() or not (limits > 0.0).all():
+        return None
+    can, speed = float(np.tan(limits).mean()), float(shape.setup.route.airspeed[leg])
+    return (tangent, can) if GRAVITY * (abs(tangent) - can) * length / speed > OFF_SPEED else None
+
+
+def _steep_arc(shape: RouteShape, leg: int) -> list[str]:
+    """What the fly-by arc at a leg's end asks beyond what the aircraft can, in words."""
+    found = steep_arc(shape, leg)
+    if found is None:
         return []
-    if shape.setup.route.fly_over[i] or shape.setup.route.arcs[i] > 0.0:
-        return []
-    tan_in, tan_out = math.tan(shape.slopes[leg]), math.tan(shape.slopes[i])
-    tangent = arc_slope(tan_in, tan_out, reach, float(shape.radius[i]))
-    if tangent * (1.0 if shape.slopes[leg] >= 0.0 else -1.0) <= 0.0:
-        return []
-    length = float(shape.radius[i]) * turn
-    beyond = (abs(tangent) - math.tan(limit)) * length
-    speed = float(shape.setup.route.airspeed[leg])
-    if limit <= 0.0 or GRAVITY * beyond / speed <= OFF_SPEED:
-        return []
+    i = leg + 1
+    tangent, can = found
+    length = float(shape.radius[i]) * abs(float(shape.turns[i]))
     verb = "climbs" if tangent > 0.0 else "falls"
+    legs = " and ".join(f"{math.degrees(abs(float(shape.slopes[k]))):.1f}°" for k in (leg, i))
+    missing = (abs(tangent) - can) * length
     return [
-        f"the arc at {shape.waypoint(i)} {verb} {math.degrees(math.atan(abs(tangent))):.1f}° for {length:.0f} m, "
-        f"{beyond:.0f} m beyond the {math.degrees(limit):.1f}° that the aircraft can"
+        f"the fly-by arc at {shape.waypoint(i)} {verb} {math.degrees(math.atan(abs(tangent))):.1f}° for {length:.0f} m,"
+        f" where legs {leg} and {i} have {legs}: it is shorter than the {2.0 * float(shape.before[i]):.0f} m of leg"
+        f" that it replaces; the aircraft can {math.degrees(math.atan(can)):.1f}° there, {missing:.0f} m less"
     ]
 
 
@@ -130,6 +142,9 @@ def _too_steep(shape: RouteShape, leg: int, limit: float, source: str) -> str:
     planned = float(shape.slopes[leg])
     verb = "climbs" if planned >= 0.0 else "falls"
     says = f"leg {leg} {verb} {math.degrees(abs(planned)):.1f}° for {_distance(float(shape.runs[leg]))}"
+    if shape.runs[leg] < ON_THE_SPOT:
+        rise = abs(float(shape.points[leg + 1, 2] - shape.points[leg, 2]))
+        says = f"leg {leg} {verb} {rise:.0f} m on the spot, {math.degrees(abs(planned)):.1f}°"
     if source == "scenario":
         return f"{says}; the scenario allows {math.degrees(limit):.1f}°"
     speed = float(shape.setup.route.airspeed[leg])

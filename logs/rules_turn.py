@@ -6,7 +6,7 @@ from flight.navigation import ERRORS
 from flight.path import SHARPEST
 from logs.flown import Flown
 from logs.measure_turn import TurnMeasure, measure_turn
-from logs.route_shape import RouteShape
+from logs.route_shape import ON_THE_SPOT, RouteShape
 from logs.verdict import Finding, make_finding
 
 # A turn passes if the bank stays within the limit and this, the aircraft within this of its arc on the outside, and the
@@ -18,8 +18,8 @@ SETTLED = 1.0
 GUST_OFFSET = {"none": 0.0, "light": 0.5, "moderate": 1.0}
 # A flown arc may pass its waypoint closer than the arc at the bank limit by this share, and by this, m; arcs that pass
 # it within that are not measured.
-CLOSER_SHARE = 0.02
-CLOSER = {"none": 0.15, "light": 0.2, "moderate": 0.5}
+CLOSER_SHARE = 0.01
+CLOSER = {"none": 0.2, "light": 0.3, "moderate": 1.0}
 # Navigation may be off by this many of its standard deviations.
 _NAV_SIGMAS = 3.0
 # A planned angle is known to this, rad: 1e-7 degrees of latitude on a 130 m leg, and rounding.
@@ -50,6 +50,9 @@ def turn_limit(shape: RouteShape, i: int) -> tuple[float, str]:
 def _judge(shape: RouteShape, i: int, measure: TurnMeasure | None) -> Finding:
     planned = abs(float(shape.turns[i]))
     limit, source = turn_limit(shape, i)
+    if shape.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
+        reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
+        return make_finding("turn", shape.waypoint(i), ok=None, reason=reason, unit="deg")
     wrong = [_too_sharp(shape, i, planned, limit, source)] if planned > limit + PLAN_TOLERANCE else []
     facts = [
         f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")

@@ -39,13 +39,21 @@ def clearance_findings(shape: RouteShape, flown: Flown | None, *, geometric: boo
     out = []
     for leg in range(shape.legs):
         if geometric:
-            out.append(_planned_clearance(leg, planned[leg], limit))
+            out.append(_planned_clearance(leg, planned[leg], limit, ground.vertical_error))
         else:
             out.append(_flown_clearance(shape, flown, leg, planned[leg], limit))
     return out
 
 
-def _planned_clearance(leg: int, planned: float, limit: float) -> Finding:
+def _less_error(clearance: float, limit: float, error: float | None) -> str:
+    """A clearance (m) less the terrain's stated error, in words; "" where none is stated."""
+    if error is None or math.isnan(clearance):
+        return ""
+    short = f", less than the {limit:.0f} m required" if limit - HEIGHT_ROUNDING > clearance - error else ""
+    return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
+
+
+def _planned_clearance(leg: int, planned: float, limit: float, error: float | None) -> Finding:
     reason = f"{planned:.1f} m above ground at the lowest"
     if math.isnan(planned):
         reason = "the leg leaves the known terrain"
@@ -54,7 +62,8 @@ def _planned_clearance(leg: int, planned: float, limit: float) -> Finding:
         f"leg {leg}",
         ok=None if math.isnan(planned) else planned >= limit - HEIGHT_ROUNDING,
         reason=reason
-        + ("" if math.isnan(planned) or planned >= limit - HEIGHT_ROUNDING else f"; {limit:.0f} m are required"),
+        + ("" if math.isnan(planned) or planned >= limit - HEIGHT_ROUNDING else f"; {limit:.0f} m are required")
+        + _less_error(planned, limit, error),
         planned=planned,
         limit=limit,
         source="scenario",
@@ -84,6 +93,8 @@ def _flown_clearance(shape: RouteShape, flown: Flown | None, leg: int, planned: 
             ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
+        ground = shape.setup.scenario.terrain
+        reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
     if planned < limit - HEIGHT_ROUNDING:
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(

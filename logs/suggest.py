@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from logs.flown import Flown
 from logs.route_shape import RouteShape, turn_room
-from logs.rules_slope import slope_limit
+from logs.rules_slope import slope_limit, steep_arc
 from logs.rules_turn import turn_limit
 from logs.rules_world import planned_path
 from logs.sweeps import path_spheres
@@ -63,18 +63,33 @@ def slope_suggestion(shape: RouteShape, leg: int, item: Finding) -> str:
         limit = min(limit, abs(math.radians(item.flown)))
     allowed = limit - SPARE_ANGLE
     if allowed <= 0.0 or planned <= allowed:
-        return ""
+        return _arc_suggestion(shape, leg)
     word = "climb" if shape.slopes[leg] >= 0.0 else "fall"
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
-    changes = [
-        (1.0 - gentler / rise, f"{word} {math.floor(gentler)} m on leg {leg} instead of {rise:.0f} m"),
-        (longer / run - 1.0, f"make leg {leg} {math.ceil(longer)} m long instead of {run:.0f} m"),
-    ]
+    changes = [(longer / run - 1.0, f"make leg {leg} {math.ceil(longer)} m long instead of {run:.0f} m")]
+    if gentler >= 1.0:
+        changes.append((1.0 - gentler / rise, f"{word} {math.floor(gentler)} m on leg {leg} instead of {rise:.0f} m"))
     speed = _slope_speed(shape, leg, planned + SPARE_ANGLE) if source == "aircraft" else None
     if speed is not None:
         now = float(shape.setup.route.airspeed[leg])
         changes.append((abs(speed - now) / now, f"fly it at {speed:g} m/s instead of {now:g} m/s"))
     return ", or ".join(text for _, text in sorted(changes))
+
+
+def _arc_suggestion(shape: RouteShape, leg: int) -> str:
+    """Gentler legs on either side of a fly-by arc that is too steep where they are not, or ""."""
+    steep = steep_arc(shape, leg)
+    if steep is None:
+        return ""
+    tangent, can = steep
+    share = math.tan(math.atan(can) - SPARE_ANGLE) / abs(tangent)
+    parts = []
+    for k in (leg, leg + 1):
+        rise = share * float(shape.points[k + 1, 2] - shape.points[k, 2])
+        # A leg that goes the other way makes the arc flatter, and stays.
+        if rise * tangent > 0.0:
+            parts.append(f"{'climb' if rise > 0.0 else 'fall'} {math.floor(abs(rise))} m on leg {k}")
+    return " and ".join(parts)
 
 
 def turn_suggestion(shape: RouteShape, i: int) -> str:

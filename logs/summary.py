@@ -113,6 +113,7 @@ def summary_text(
         if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "flown":
@@ -122,6 +123,23 @@ def summary_text(
     if prediction is not None:
         lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
     return "\n".join(lines)
+
+
+def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
+    """The least clearance less the terrain's stated error, where one is stated."""
+    error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
+    heights = [
+        item.planned if item.flown is None else item.flown
+        for item in findings
+        if item.rule == "clearance" and item.planned is not None
+    ]
+    if error is None or not heights:
+        return []
+    low, required = min(heights), setup.scenario.limits.min_clearance_m
+    return [
+        f"Terrain's stated error: {error:g} m; the least clearance is {low:.1f} m, {low - error:.1f} m less that error"
+        f" ({required:g} m are required)"
+    ]
 
 
 def _agreement(prediction: Prediction) -> str:

@@ -45,11 +45,11 @@ def open_mission(
     if scenario_name is not None:
         scenario = load_scenario(scenario_name, terrain)
     else:
-        scenario = foreign_scenario(mission, terrain)
+        scenario = foreign_scenario(mission, terrain, on_the_spot=True)
     scenario = change(scenario)
     vehicle = load_vehicle(scenario)
     number = choose_seed(scenario, seed)
-    return OpenedMission(make_setup(scenario, vehicle, mission, number), vehicle, path.stem)
+    return OpenedMission(make_setup(scenario, vehicle, mission, number, on_the_spot=True), vehicle, path.stem)
 
 
 def _open_plan(

@@ -114,11 +114,20 @@ def make_plan(
 
 
 def make_setup(
-    scenario: Scenario, vehicle: Vehicle, mission: Mission, seed: int, *, plan: Plan | None = None
+    scenario: Scenario,
+    vehicle: Vehicle,
+    mission: Mission,
+    seed: int,
+    *,
+    plan: Plan | None = None,
+    on_the_spot: bool = False,
 ) -> FlightSetup:
-    """Everything that decides the flight of a mission in a scenario."""
+    """Everything that decides the flight of a mission in a scenario.  on_the_spot: of `flight.routing.make_route`."""
     limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
-    route = make_route(mission, scenario.origin, scenario.terrain, vehicle.airspeed, scenario.flight.fly_over, limits)
+    fly_over = scenario.flight.fly_over
+    route = make_route(
+        mission, scenario.origin, scenario.terrain, vehicle.airspeed, fly_over, limits, on_the_spot=on_the_spot
+    )
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
         scenario=scenario,

@@ -71,7 +71,10 @@ class MadeMission:
 
 @dataclass(slots=True)
 class _Draft:
-    """A mission while it is drawn.  bad: the leg, or the waypoint, that breaks the limit; -1 for none."""
+    """A mission while it is drawn.
+
+    bad: the leg, or the waypoint, that breaks the limit; -1 for none.  short: the leg that is too short for its turns.
+    """
 
     rng: np.random.Generator
     kind: str
@@ -80,6 +83,7 @@ class _Draft:
     limits: Limits
     courses: Floats
     speeds: Floats
+    short: int = -1
 
     @property
     def inside(self) -> float:
@@ -151,16 +155,16 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     vehicle = load_vehicle(scenario)
     mission = _mission(points, draft.speeds, scenario.origin)
     setup = make_setup(scenario, vehicle, mission, number)
-    return MadeMission(setup, vehicle, kind, _where(kind, bad))
+    return MadeMission(setup, vehicle, kind, _where(draft))
 
 
-def _where(kind: str, bad: int) -> tuple[str, ...]:
+def _where(draft: _Draft) -> tuple[str, ...]:
     """Where a mission's fault is to be found: of a leg too short for its turns, at either of them."""
-    if not kind:
+    if not draft.kind:
         return ()
-    if kind == "legs":
-        return f"waypoint {bad}", f"waypoint {bad + 1}"
-    return (f"{'waypoint' if kind in ('turn', 'turn number') else 'leg'} {bad}",)
+    if draft.short >= 0:
+        return f"waypoint {draft.short}", f"waypoint {draft.short + 1}"
+    return (f"{'waypoint' if draft.kind == 'turn number' else 'leg'} {draft.bad}",)
 
 
 def _turbulence(rng: np.random.Generator) -> Any:
@@ -217,11 +221,12 @@ def _runs(draft: _Draft, turns: Floats) -> Floats:
             low, high = LONG_LEG
         runs[leg] = max(need, low if draft.rng.random() < 0.3 else draft.rng.uniform(low, high))
     if draft.breaks("legs"):
+        draft.short = draft.bad
         runs[draft.bad] = (tangents[draft.bad] + tangents[draft.bad + 1]) / draft.beyond
     if draft.breaks("turn"):
         # Room on one leg for this turn, were it gentler by the margin, beside the neighbour's.
         i = draft.bad
-        leg = i if i < legs - 1 or draft.rng.random() < 0.5 else i - 1
+        leg = draft.short = i if i < legs - 1 or draft.rng.random() < 0.5 else i - 1
         other = tangents[leg + 1] if leg == i else tangents[leg]
         runs[leg] = other + radii[i] * math.tan(0.5 * angles[i] / draft.beyond)
     return runs
@@ -247,8 +252,9 @@ def _heights(draft: _Draft, runs: Floats, turns: Floats, lowest: float) -> Float
             slope = _slope(draft, leg, float(shares[leg]), up[leg], run)
             before = (up[leg] - up[leg - 1]) / runs[leg - 1] if leg else 0.0
             if before * slope > 0.0 and leg != draft.bad:
-                most = math.tan(_slope(draft, leg, math.copysign(1.0, slope), up[leg], run))
-                room = max(0.0, 2.0 * abs(most) / float(steeper[leg - 1]) - abs(before))
+                sign = math.copysign(1.0, slope)
+                most = min(abs(math.tan(_slope(draft, k, sign, up[leg], run))) for k in (leg - 1, leg))
+                room = max(0.0, 2.0 * most / float(steeper[leg - 1]) - abs(before))
                 slope = math.copysign(min(abs(slope), math.atan(room)), slope)
             up[leg + 1] = up[leg] + run * math.tan(slope)
         base += lowest - float(up.min())

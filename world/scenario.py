@@ -157,6 +157,8 @@ def from_spec(
             ground = read_terrain(raster, origin, bounds, MARGIN)
         else:
             ground = _made_terrain(spec.terrain, bounds)
+    if ground is not None and spec.terrain.vertical_error_m is not None:
+        ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
     if is_folder(spec.flight.aircraft):
         folder = str(Path(base or "", spec.flight.aircraft).resolve())
         spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft": folder})})
@@ -201,7 +203,7 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
         raise ScenarioError(f"{source}: terrain.path: {path}: the file has changed since (its SHA-256 differs)")
     if path not in EMBEDDED:
         path = str(Path(base or "", path).resolve())
-    return raster, TerrainTable(kind="dem", path=path, sha256=raster.sha256)
+    return raster, TerrainTable(kind="dem", path=path, vertical_error_m=table.vertical_error_m, sha256=raster.sha256)
 
 
 def _assemble(

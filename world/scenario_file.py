@@ -77,12 +77,16 @@ class PeakTable(_Table):
 
 
 class TerrainTable(_Table):
-    """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file."""
+    """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file.
+
+    vertical_error_m: of the heights, as their source states it; none where it is not stated, for no file says.
+    """
 
     kind: Literal["dem", "peaks", "flat", "none"]
     path: FilePath | None = None
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
+    vertical_error_m: Annotated[float, _within(0.0, 1000.0)] | None = None
     sha256: str | None = None
 
     @model_validator(mode="after")

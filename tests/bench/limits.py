@@ -174,7 +174,7 @@ def calm_limits(*, whole: bool) -> list[Limit]:
     """Slopes and shortest legs of the Aerosonde in calm air; fewer of them unless ``whole``."""
     aircraft = load_aircraft("aerosonde")
     found = [slope_limit(aircraft, 1.0), slope_limit(aircraft, -1.0)]
-    turns = [(60.0, False), (60.0, True), (30.0, False), (90.0, True), (90.0, False)]
+    turns = [(turn, way) for turn in (60.0, 30.0, 45.0, 90.0, 120.0) for way in (False, True)]
     found += [leg_limit(aircraft, math.radians(turn), way) for turn, way in (turns if whole else turns[:1])]
     return found
 
@@ -186,6 +186,6 @@ def wind_limits(*, whole: bool) -> list[Limit]:
     found = []
     for side in sides:
         found += [slope_limit(aircraft, 1.0, 10.0, side), slope_limit(aircraft, -1.0, 10.0, side)]
-        turns = [(60.0, False), (60.0, True), (90.0, True)] if whole else [(60.0, False)]
+        turns = [(turn, way) for turn in (60.0, 90.0, 120.0) for way in (False, True)] if whole else [(60.0, False)]
         found += [leg_limit(aircraft, math.radians(turn), way, 10.0, side) for turn, way in turns]
     return found

@@ -1,0 +1,31 @@
+"""A mission that climbs on the spot is judged, not refused: its slope is 90 degrees."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from planfly.cli import main
+
+MISSION = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t100\t1
+1\t0\t3\t16\t0\t0\t0\t0\t46.00\t8.00\t200\t1
+2\t0\t3\t16\t0\t0\t0\t0\t46.01\t8.00\t200\t1
+3\t0\t3\t16\t0\t0\t0\t0\t46.01\t8.00\t{up}\t1
+4\t0\t3\t16\t0\t0\t0\t0\t46.02\t8.01\t{up}\t1
+"""
+
+
+@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "falls")])
+def test_it_is_judged_and_not_flyable(up: int, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    mission = tmp_path / "up.waypoints"
+    mission.write_text(MISSION.format(up=up), encoding="utf-8")
+    assert main(["check", str(mission), "--json", str(tmp_path / "verdict.json")]) == 4
+    verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
+    failed = [item for item in verdict["findings"] if item["ok"] is False]
+    assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1")]
+    assert abs(failed[0]["planned"]) == pytest.approx(90.0, abs=0.1)
+    rise = abs(up - 200)
+    assert f"leg 1 {verb} {rise} m on the spot, 90.0°; at 25 m/s" in failed[0]["reason"]
+    assert main(["fly", str(mission), "--log", str(tmp_path / "flight.mcap")]) == 4
+    assert "on the spot" in capsys.readouterr().out
