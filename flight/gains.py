@@ -52,7 +52,7 @@ class Gains:
     roll_gain: float
     roll_rate_gain: float
     aileron_per_roll_rate: float
-    roll_integral: float
+    aileron_per_roll_acceleration: float
     alpha_per_g: float
     elevator_per_alpha: float
     elevator_per_pitch_rate: float
@@ -68,13 +68,29 @@ class Gains:
     field_course_integral: float = 0.2
     side_gain: float = 0.0
     side_lag: float = 0.3
+    roll_frequency: float = 10.0
+    roll_rate_max: float = math.radians(70.0)
+    roll_acceleration_max: float = math.radians(500.0)
+    roll_disturbance_lag: float = 0.1
+    aileron_lead: float = 0.05
+    load_lead: float = 0.0
+    side_per_aileron: float = 0.0
+    rudder_per_yaw_rate: float = 0.0
+    sideslip_gain: float = 0.0
+    side_per_sideslip: float = 0.0
+    sideslip_max: float = 0.0
 
     def packed(self) -> Floats:
         """(g,) the fields in order."""
         return np.array([getattr(self, item.name) for item in fields(self)])
 
 
-_UNITS = ("_rad_s", "_1_s3", "_1_s2", "_1_s", "_1_m", "_deg", "_mps", "_s")
+# Suffixes that a key may carry, the longer first, and what takes the value to SI and radians.
+_DEG = math.radians(1.0)
+_UNITS = {
+    **{"_deg_s2": _DEG, "_deg_s": _DEG, "_deg": _DEG},
+    **dict.fromkeys(("_rad_s", "_1_s3", "_1_s2", "_1_s", "_1_m", "_mps2", "_mps", "_s2", "_s"), 1.0),
+}
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
@@ -90,8 +106,8 @@ def load_gains(aircraft: Aircraft) -> Gains:
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise FlightError(f"{file}: {key} = {value!r} is not a finite number")
-        name = next((key.removesuffix(unit) for unit in _UNITS if key.endswith(unit)), key)
-        values[name] = math.radians(value) if key.endswith("_deg") else float(value)
+        unit = next((unit for unit in _UNITS if key.endswith(unit)), "")
+        values[key.removesuffix(unit)] = float(value) * _UNITS.get(unit, 1.0)
     known = {item.name for item in fields(Gains)}
     wanted = {item.name for item in fields(Gains) if item.default is MISSING}
     missing, unknown = sorted(wanted - set(values)), sorted(set(values) - known)

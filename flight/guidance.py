@@ -99,12 +99,19 @@ def _along_path(
     crab = math.cos(wrap(ground_course - state[S.YAW]))
     if memory[M.LAST_EAST] != 0.0 or memory[M.LAST_NORTH] != 0.0:
         gained = (place[3] - memory[M.LAST_EAST]) * place[4] - (place[4] - memory[M.LAST_NORTH]) * place[3]
-        unexplained = gained / (speed * dt) - GRAVITY * math.tan(state[S.ROLL]) * crab
+        lifted = (GRAVITY + (place[5] - memory[M.LAST_UP]) / dt) * math.tan(state[S.ROLL])
+        pushed = gains[G.SIDE_PER_AILERON] * (speed / gains[G.REFERENCE_AIRSPEED]) ** 2 * state[S.AILERON]
+        unexplained = gained / (speed * dt) - (lifted + pushed) * crab
         memory[M.SIDE] += (unexplained - memory[M.SIDE]) * min(1.0, dt / gains[G.SIDE_LAG])
-    memory[M.LAST_EAST], memory[M.LAST_NORTH] = place[3], place[4]
+    memory[M.LAST_EAST], memory[M.LAST_NORTH], memory[M.LAST_UP] = place[3], place[4], place[5]
     push -= gains[G.SIDE_GAIN] * memory[M.SIDE]
-    wanted = math.atan((speed * speed * curvature + push) / (GRAVITY * max(0.5, crab)))
+    wanted = math.atan((speed * speed * curvature + push) / ((GRAVITY + memory[M.BEND]) * max(0.5, crab)))
     bank: float = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
+    # What the bank limit leaves, within limits, a skid: its side force points where the turn goes.
+    left = (GRAVITY + memory[M.BEND]) * (math.tan(wanted) - math.tan(bank))
+    slip = left / max(1.0, gains[G.SIDE_PER_SIDESLIP] * (speed / gains[G.REFERENCE_AIRSPEED]) ** 2)
+    most = gains[G.SIDESLIP_MAX]
+    memory[M.SIDESLIP] = -min(most, max(-most, slip))
     if bank == wanted and abs(cross) < 20.0:
         memory[M.CROSS_TRACK_SUM] = min(40.0, max(-40.0, memory[M.CROSS_TRACK_SUM] + cross * dt))
     return bank
