@@ -79,6 +79,9 @@ class Gains:
     sideslip_gain: float = 0.0
     side_per_sideslip: float = 0.0
     sideslip_max: float = 0.0
+    arc_slowing_time: float = 4.0
+    arc_slowing_max: float = 0.0
+    aside_frequency: float = 1.0
 
     def packed(self) -> Floats:
         """(g,) the fields in order."""

@@ -90,12 +90,33 @@ def steer_height(
     )
     # Throttle: level flight, the slope to the air ahead, and the airspeed error.
     slow = command - airspeed
+    if memory[M.ARC_SPEED] > 0.0:
+        # In an arc and before it the ground speed counts too, as far as the air allows.
+        over = math.hypot(place[3], place[4]) - memory[M.ARC_SPEED]
+        slow = min(slow, max(-over, slow - gains[G.ARC_SLOWING_MAX]))
     steady = memory[M.TRIM_THROTTLE] + gains[G.THROTTLE_PER_SLOPE] * ahead_slope * along / airspeed
     wanted = steady + gains[G.SPEED_GAIN] * slow + gains[G.SPEED_INTEGRAL] * memory[M.SPEED_SUM]
     commands[C.THROTTLE] = min(1.0, max(0.0, wanted))
     memory[M.FULL_THROTTLE] = memory[M.FULL_THROTTLE] + dt if wanted >= 1.0 else 0.0
     if (wanted < 1.0 or slow < 0.0) and (wanted > 0.0 or slow > 0.0):
         memory[M.SPEED_SUM] = min(60.0, max(-60.0, memory[M.SPEED_SUM] + slow * dt))
+
+
+@compiled
+def roll_model(
+    wanted: float, bank: float, rate: float, gains: Floats, dt: float
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Bank (rad), roll rate and roll acceleration a tick on of an aircraft that rolls as ours shall.
+
+    A critically damped oscillator within limits of roll rate and acceleration.
+    """
+    frequency = gains[G.ROLL_FREQUENCY]
+    most = gains[G.ROLL_ACCELERATION_MAX]
+    change = min(most, max(-most, frequency * (frequency * (wanted - bank) - 2.0 * rate)))
+    most = gains[G.ROLL_RATE_MAX]
+    change = min((most - rate) / dt, max((-most - rate) / dt, change))
+    rate += change * dt
+    return bank + rate * dt, rate, change
 
 
 @compiled
@@ -110,15 +131,8 @@ def steer_bank(
     """
     airspeed = max(8.0, state[S.AIRSPEED])
     scale = gains[G.REFERENCE_AIRSPEED] / airspeed
-    frequency = gains[G.ROLL_FREQUENCY]
-    rate = memory[M.BANK_RATE]
-    most = gains[G.ROLL_ACCELERATION_MAX]
-    turn = min(most, max(-most, frequency * (frequency * (bank - memory[M.BANK]) - 2.0 * rate)))
-    most = gains[G.ROLL_RATE_MAX]
-    turn = min((most - rate) / dt, max((-most - rate) / dt, turn))
-    rate += turn * dt
+    memory[M.BANK], rate, turn = roll_model(bank, memory[M.BANK], memory[M.BANK_RATE], gains, dt)
     memory[M.BANK_RATE] = rate
-    memory[M.BANK] += rate * dt
     per_rate, per_acceleration = gains[G.AILERON_PER_ROLL_RATE] * scale, gains[G.AILERON_PER_ROLL_ACCELERATION] * scale * scale
     rolled = per_acceleration * (state[S.P] - memory[M.LAST_ROLL_RATE]) / dt + per_rate * state[S.P] - state[S.AILERON]
     memory[M.LAST_ROLL_RATE] = state[S.P]

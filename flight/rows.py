@@ -51,6 +51,9 @@ class G(IntEnum):
     SIDESLIP_GAIN = 42
     SIDE_PER_SIDESLIP = 43
     SIDESLIP_MAX = 44
+    ARC_SLOWING_TIME = 45
+    ARC_SLOWING_MAX = 46
+    ASIDE_FREQUENCY = 47
 
 
 class Lateral(IntEnum):
@@ -96,6 +99,11 @@ class M(IntEnum):
     LAST_UP = 29  # m/s, a tick ago
     BEND = 30  # m/s^2 upwards, of the path ahead
     SIDESLIP = 31  # rad, wanted
+    PATH_BANK = 33  # rad and rad/s, of the model roll into the path's curvature alone
+    PATH_BANK_RATE = 34
+    ASIDE = 35  # m right of the path and m/s, where that roll takes it
+    ASIDE_RATE = 36
+    ARC_SPEED = 32  # m/s over the ground, of the sharpest arc near ahead; 0 for no limit
 
 
 MEMORY_SIZE = len(M)
