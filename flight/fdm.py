@@ -18,6 +18,7 @@ from aircraft.catalog import Aircraft
 from aircraft.model import Command
 from flight.engine import Engine
 from flight.model_check import check_model
+from flight.nodes import Ints, addresses
 from flight.properties import (
     FLAT_DENSITY,
     FLAT_PLANET,
@@ -64,17 +65,18 @@ class Variation:
 class Links:
     """The bound nodes themselves, in JSBSim's units, for the one loop that cannot afford `Fdm`'s conversions.
 
-    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI.  commands: setters in
-    the order of `flight.state.C`.  gusts: setters north, east and down, ft/s.  terrain: setter, ft.  feet: in a metre.
+    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI.  setters: commands in the
+    order of `flight.state.C`, gusts north, east and down, the ground's height.  scales: (8, 2) what takes their SI value
+    to JSBSim's where it is above zero, and where not.  nodes: (STATE_SIZE + 8,) addresses of all of them for compiled
+    code, 0 for none; None where `flight.nodes` does not know this JSBSim.
     """
 
     getters: tuple[Callable[[], float], ...]
     factors: Floats
-    commands: tuple[Callable[[float], object], ...]
-    gusts: tuple[Callable[[float], object], ...]
-    terrain: Callable[[float], object]
+    setters: tuple[Callable[[float], object], ...]
+    scales: Floats
+    nodes: Ints | None
     run: Callable[[], object]
-    feet: float = 1.0 / FOOT
 
 
 class Fdm:
@@ -114,7 +116,8 @@ class Fdm:
         state = STATE | {
             row: (reading.name, reading.factor) for row, reading in zip(OWN, aircraft.model.readings, strict=True)
         }
-        self._readers = [self._getter(state[row][0]) for row in S]
+        self._names = [state[row][0] for row in S]
+        self._readers = [self._getter(name) for name in self._names]
         self._factors = np.array([state[row][1] for row in S])
         self._writers = [self._commander(command) for command in aircraft.model.commands]
         self._winds = [self._setter(name) for name in WIND]
@@ -257,12 +260,16 @@ class Fdm:
 
     def links(self) -> Links:
         """The bound nodes of this instance."""
+        commands = self.aircraft.model.commands
+        names = [*self._names, *(command.name for command in commands), *GUST, TERRAIN]
+        nodes = [self._node(name) if name else None for name in names]
+        scales = [(command.above, command.below) for command in commands] + 4 * [(1.0 / FOOT, 1.0 / FOOT)]
         return Links(
             getters=tuple(self._readers),
             factors=self._factors,
-            commands=tuple(self._writers),
-            gusts=tuple(self._gusts),
-            terrain=self._terrain,
+            setters=tuple(node.set_double_value for node in nodes[STATE_SIZE:] if node is not None),
+            scales=np.array(scales),
+            nodes=addresses(nodes, JSBSIM_VERSION, Path(jsbsim._jsbsim.__file__)),
             run=self._run,
         )
 
