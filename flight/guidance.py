@@ -1,7 +1,8 @@
 """The guidance core: from the state to the four commands, on packed arrays, compiled.
 
-Three lateral laws: ours, a second-order cross-track law on the fly-by path with curvature feed-forward; L1 along the
-legs, as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
+Three lateral laws: ours, a second-order cross-track law about the line that a rolling aircraft can follow along the
+fly-by path, with curvature feed-forward, what gusts do to it answered by bank, and by a skid where bank ends; L1 along
+the legs, as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
 They share bank limit, vertical channel and inner loops (`flight.inner_loops`), so that flights differ by the law alone.
 None asks for the wind: all steer by the velocity over the ground.  No clock: dt is an argument.
 """
@@ -30,6 +31,7 @@ from world.geometry import wrap
 
 Floats = NDArray[np.float64]
 
+# Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
 ARC_SHARE = 0.95
 
 
@@ -117,17 +119,23 @@ def _along_path(
     lift = GRAVITY + memory[M.BEND]
     wanted = math.atan((turn + push) / (lift * crab))
     bank: float = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
-    # The bank limit with a little to spare, in what the arc takes.
     sharpest = most_curvature(pieces, k, s, s + speed * gains[G.ARC_SLOWING_TIME])
     memory[M.ARC_SPEED] = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory[M.MAX_BANK]) / max(1e-9, sharpest))
     # What the bank limit leaves, within limits, a skid: its side force points where the turn goes.
     left = lift * (math.tan(wanted) - math.tan(bank))
-    slip = left / max(1.0, gains[G.SIDE_PER_SIDESLIP] * (speed / gains[G.REFERENCE_AIRSPEED]) ** 2)
+    slip = left / max(1.0, gains[G.SIDE_PER_SIDESLIP] * _pressure(state, gains))
     most = gains[G.SIDESLIP_MAX]
     memory[M.SIDESLIP] = -min(most, max(-most, slip))
     if bank == wanted and abs(cross) < 20.0:
         memory[M.CROSS_TRACK_SUM] = min(40.0, max(-40.0, memory[M.CROSS_TRACK_SUM] + cross * dt))
     return bank
+
+
+@compiled
+def _pressure(state: Floats, gains: Floats) -> float:  # pragma: no cover - compiled
+    """Dynamic pressure in that at the reference airspeed."""
+    share: float = (state[S.AIRSPEED] / gains[G.REFERENCE_AIRSPEED]) ** 2
+    return share
 
 
 @compiled
@@ -138,7 +146,7 @@ def _unexplained(
     if memory[M.LAST_EAST] != 0.0 or memory[M.LAST_NORTH] != 0.0:
         gained = (place[3] - memory[M.LAST_EAST]) * place[4] - (place[4] - memory[M.LAST_NORTH]) * place[3]
         lifted = (GRAVITY + (place[5] - memory[M.LAST_UP]) / dt) * math.tan(state[S.ROLL])
-        pushed = gains[G.SIDE_PER_AILERON] * (speed / gains[G.REFERENCE_AIRSPEED]) ** 2 * state[S.AILERON]
+        pushed = gains[G.SIDE_PER_AILERON] * _pressure(state, gains) * state[S.AILERON]
         side = gained / (speed * dt) - (lifted + pushed) * crab
         memory[M.SIDE] += (side - memory[M.SIDE]) * min(1.0, dt / gains[G.SIDE_LAG])
     memory[M.LAST_EAST], memory[M.LAST_NORTH], memory[M.LAST_UP] = place[3], place[4], place[5]

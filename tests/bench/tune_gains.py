@@ -32,7 +32,7 @@ SEARCHED = (
     *("speed_gain", "speed_integral", "throttle_per_slope"),
 )
 # Missions that are searched on and reported on, numbered apart under the one seed.
-TRAINED, REPORTED = range(8), range(1000, 1020)
+TRAINED, REPORTED = range(12), range(1000, 1020)
 FIRST_STEP = 1.3
 # What a figure counts as one: the aims in wind.
 SCALES = (0.10, 0.6, 0.2, 0.8)
@@ -86,10 +86,10 @@ def cases(aircraft: Aircraft, make: MakeSetup, seed: int, numbers: Iterable[int]
     # A turn's radius grows with the square of the speed, and the envelope's slopes are the aircraft's.
     scale = (aircraft.airspeed / 25.0) ** 2
     found = []
+    steepest = 0.4 * np.array(make(standard()).envelope.air_angles(aircraft.airspeed, 700.0))
     for number in numbers:
         random = np.random.default_rng([seed, number])
         way, course = [np.array([0.0, 0.0, 700.0])], random.uniform(0.0, 6.0)
-        steepest = 0.4 * np.array(make(standard()).envelope.air_angles(aircraft.airspeed, 700.0))
         for leg in range(7):
             run = scale * random.uniform(700.0, 1500.0)
             slope = min(math.radians(5.0), random.uniform(-1.0, 1.0) * float(abs(steepest).min()))
