@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import jsbsim
 import numpy as np
@@ -65,10 +66,10 @@ class Variation:
 class Links:
     """The bound nodes themselves, in JSBSim's units, for the one loop that cannot afford `Fdm`'s conversions.
 
-    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI.  setters: commands in the
-    order of `flight.state.C`, gusts north, east and down, the ground's height.  scales: (8, 2) what takes their SI value
-    to JSBSim's where it is above zero, and where not.  nodes: (STATE_SIZE + 8,) addresses of all of them for compiled
-    code, 0 for none; None where `flight.nodes` does not know this JSBSim.
+    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI. setters: commands in
+    the order of `flight.state.C`, gusts north, east and down, the ground's height. scales: (8, 2) what takes an SI
+    value to JSBSim's where it is above zero, and where not. nodes: (STATE_SIZE + 8,) addresses of all of them for
+    compiled code, 0 for none; None where `flight.nodes` does not know this JSBSim.
     """
 
     getters: tuple[Callable[[], float], ...]
@@ -269,7 +270,7 @@ class Fdm:
             factors=self._factors,
             setters=tuple(node.set_double_value for node in nodes[STATE_SIZE:] if node is not None),
             scales=np.array(scales),
-            nodes=addresses(nodes, JSBSIM_VERSION, Path(jsbsim._jsbsim.__file__)),
+            nodes=addresses(nodes, JSBSIM_VERSION, Path(cast("Any", jsbsim)._jsbsim.__file__)),
             run=self._run,
         )
 

@@ -1,8 +1,8 @@
 """The guidance core: from the state to the four commands, on packed arrays, compiled.
 
-Three lateral laws: ours, a second-order cross-track law about the line that a rolling aircraft can follow along the
-fly-by path, with curvature feed-forward, what gusts do to it answered by bank, and by a skid where bank ends; L1 along
-the legs, as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
+Three lateral laws: ours, a second-order cross-track law with curvature feed-forward, about the line beside the path
+that a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank ends; L1 along the legs, as
+ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
 They share bank limit, vertical channel and inner loops (`flight.inner_loops`), so that flights differ by the law alone.
 None asks for the wind: all steer by the velocity over the ground.  No clock: dt is an argument.
 """
@@ -102,9 +102,7 @@ def _along_path(
     )
     back = gains[G.ASIDE_FREQUENCY]
     home = -back * (2.0 * memory[M.ASIDE_RATE] + back * memory[M.ASIDE])
-    memory[M.ASIDE_RATE] += (
-        GRAVITY * math.tan(memory[M.PATH_BANK]) * crab - speed * speed * pieces[k, 5] + home
-    ) * dt
+    memory[M.ASIDE_RATE] += (GRAVITY * math.tan(memory[M.PATH_BANK]) * crab - speed * speed * pieces[k, 5] + home) * dt
     memory[M.ASIDE] += memory[M.ASIDE_RATE] * dt
     frequency = gains[G.CROSS_TRACK_FREQUENCY]
     rate_gain = 2.0 * gains[G.CROSS_TRACK_DAMPING] * frequency
@@ -150,7 +148,8 @@ def _unexplained(
         side = gained / (speed * dt) - (lifted + pushed) * crab
         memory[M.SIDE] += (side - memory[M.SIDE]) * min(1.0, dt / gains[G.SIDE_LAG])
     memory[M.LAST_EAST], memory[M.LAST_NORTH], memory[M.LAST_UP] = place[3], place[4], place[5]
-    return memory[M.SIDE]
+    side_now: float = memory[M.SIDE]
+    return side_now
 
 
 @compiled_views

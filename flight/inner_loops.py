@@ -133,7 +133,10 @@ def steer_bank(
     scale = gains[G.REFERENCE_AIRSPEED] / airspeed
     memory[M.BANK], rate, turn = roll_model(bank, memory[M.BANK], memory[M.BANK_RATE], gains, dt)
     memory[M.BANK_RATE] = rate
-    per_rate, per_acceleration = gains[G.AILERON_PER_ROLL_RATE] * scale, gains[G.AILERON_PER_ROLL_ACCELERATION] * scale * scale
+    per_rate, per_acceleration = (
+        gains[G.AILERON_PER_ROLL_RATE] * scale,
+        gains[G.AILERON_PER_ROLL_ACCELERATION] * scale * scale,
+    )
     rolled = per_acceleration * (state[S.P] - memory[M.LAST_ROLL_RATE]) / dt + per_rate * state[S.P] - state[S.AILERON]
     memory[M.LAST_ROLL_RATE] = state[S.P]
     memory[M.ROLLED] += (rolled - memory[M.ROLLED]) * min(1.0, dt / gains[G.ROLL_DISTURBANCE_LAG])

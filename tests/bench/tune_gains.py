@@ -108,7 +108,7 @@ def model_gains(aircraft: Aircraft) -> dict[str, float]:
         raise SystemExit(f"{aircraft.name} holds no level flight at cruise")
     a, b = linearise(fdm, level)
     speed = aircraft.airspeed
-    u, v, w, p, q, r = range(6)
+    _, v, w, p, q, r = range(6)
     elevator, aileron, rudder = range(3)
     # Steady yaw rate without sideslip: ailerons and rudder balance its rolling and yawing moments.
     hold = np.linalg.solve(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])
