@@ -19,7 +19,7 @@ from aircraft.catalog import Aircraft
 from aircraft.model import Command
 from flight.engine import Engine
 from flight.model_check import check_model
-from flight.nodes import Ints, addresses
+from flight.nodes import Links, addresses
 from flight.properties import (
     FLAT_DENSITY,
     FLAT_PLANET,
@@ -60,24 +60,6 @@ class Variation:
     control: float = 1.0
     parasite_drag: float | None = None
     volts: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Links:
-    """The bound nodes themselves, in JSBSim's units, for the one loop that cannot afford `Fdm`'s conversions.
-
-    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI. setters: commands in
-    the order of `flight.state.C`, gusts north, east and down, the ground's height. scales: (8, 2) what takes an SI
-    value to JSBSim's where it is above zero, and where not. nodes: (STATE_SIZE + 8,) addresses of all of them for
-    compiled code, 0 for none; None where `flight.nodes` does not know this JSBSim.
-    """
-
-    getters: tuple[Callable[[], float], ...]
-    factors: Floats
-    setters: tuple[Callable[[float], object], ...]
-    scales: Floats
-    nodes: Ints | None
-    run: Callable[[], object]
 
 
 class Fdm:

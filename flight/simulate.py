@@ -13,9 +13,10 @@ from aircraft.catalog import Aircraft
 from aircraft.compiled import entry
 from flight.arena import ROW, Arena, K, Table
 from flight.chart import Chart, Ground
-from flight.fdm import Fdm, Links, Variation
+from flight.fdm import Fdm, Variation
 from flight.gains import load_gains
 from flight.navigation import ERRORS, NAV_STATES, start_navigation
+from flight.nodes import Links
 from flight.path import FlyByPath, fly_by_path
 from flight.rows import Lateral, M
 from flight.setup import FlightSetup, limits_of

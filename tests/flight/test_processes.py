@@ -3,14 +3,19 @@
 `test_simulate.py` has a process started anew with another order of hashes.
 """
 
+import ctypes.util
 import hashlib
 import multiprocessing
 import warnings
+from pathlib import Path
+from typing import Any, cast
 
+import jsbsim
 import pytest
 
-from aircraft.catalog import Aircraft, load_aircraft
+from aircraft.catalog import load_aircraft
 from flight import nodes
+from flight.fdm import JSBSIM_VERSION, Fdm
 from flight.setup import FlightSetup
 from flight.simulate import simulate
 from flight.track import COLUMNS
@@ -49,14 +54,22 @@ def test_both_ways_to_jsbsim_give_the_same_bytes(make_setup: MakeSetup, monkeypa
             assert fly(setup) == compiled
 
 
-def test_another_build_of_jsbsim_is_gone_through_python(aerosonde: Aircraft, monkeypatch: pytest.MonkeyPatch) -> None:
-    class Other:
-        """Looks like a node, and is none."""
-
-    library = nodes.Path("missing.so")
-    assert nodes.addresses([], "0.0.0", library) is None
-    monkeypatch.setattr(nodes, "KNOWN", {"9.9.9": (10**6, 24)})
-    assert nodes.addresses([Other()], "9.9.9", library) is None
+def test_another_build_of_jsbsim_is_gone_through_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    library = Path(cast("Any", jsbsim)._jsbsim.__file__)
+    fdm = Fdm(load_aircraft("aerosonde"))
+    ours = [fdm._node("position/h-sl-ft"), None]
+    version = JSBSIM_VERSION
+    found = nodes.addresses(ours, version, library)
+    assert found is not None
+    assert found[0] != 0
+    assert found[1] == 0
+    assert nodes.addresses(ours, "0.0.0", library) is None
+    size, where = nodes.KNOWN[version]
+    # Another size, another place in it, another library, another machine.
+    for known in ((size + 8, where), (size, where - 8)):
+        monkeypatch.setattr(nodes, "KNOWN", {version: known})
+        assert nodes.addresses(ours, version, library) is None
+    monkeypatch.setattr(nodes, "KNOWN", {version: (size, where)})
+    assert nodes.addresses(ours, version, Path(ctypes.util.find_library("m") or "")) is None
     monkeypatch.setattr(nodes.sys, "platform", "elsewhere")
-    monkeypatch.setattr(nodes, "KNOWN", {"9.9.9": (Other.__basicsize__, 24)})
-    assert nodes.addresses([Other()], "9.9.9", library) is None
+    assert nodes.addresses(ours, version, library) is None
