@@ -16,7 +16,19 @@ from planner.fitting import QUICK, fit_waypoints
 from planner.plan import Certificate, Plan
 from planner.preference import NO_GOAL, Level, ranks
 from planner.problem import CERTIFIED_KILL_MARGIN, make_problem
-from planner.run import ARCHIVE_LEVELS, DETECTION, HEIGHT, KILL, LENGTH, VIOLATIONS, Archive, Progress, Run, Stop
+from planner.run import (
+    ARCHIVE_LEVELS,
+    DETECTION,
+    HEIGHT,
+    KILL,
+    LENGTH,
+    VIOLATIONS,
+    Archive,
+    Improved,
+    Progress,
+    Run,
+    Stop,
+)
 from planner.sampling import bridge_basis, first_samples
 from planner.seeding import Route, grid_routes
 from planner.umda import Umda
@@ -53,6 +65,7 @@ def plan_path(
     algorithm: str | None = None,
     progress: Progress | None = None,
     stop: Stop | None = None,
+    improved: Improved | None = None,
     first_safe: bool = False,
     previous: Floats | None = None,
 ) -> Plan:
@@ -60,7 +73,8 @@ def plan_path(
 
     algorithm: a name of `planner.algorithms`; None takes the scenario's, or the default.  progress: called with
     generations done, generations in all, and a short text.  stop: asked between generations; a text such as
-    "interrupted" ends the search with the best path yet, and stands in the plan.  first_safe: end with the first
+    "interrupted" ends the search with the best path yet, and stands in the plan.  improved: called with each path
+    (w, 3) that meets the constraints better than all before it, not yet certified.  first_safe: end with the first
     safe path.  previous: (w, 3) an older path of the same ends and number of waypoints to start from.
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
@@ -71,7 +85,7 @@ def plan_path(
     # No path is further from a missile's sphere than its own ends are.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
-    run = Run(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted)
+    run = Run(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
     waypoints, certificate = _attempts(run, previous)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
@@ -219,7 +233,10 @@ def _routes(run: Run, grids: tuple[tuple[int, int], ...]) -> list[Route]:
     for route in grid_routes(rules, frame, span, grids):
         found.append(route)
         path = fit_waypoints(rules, frame, route.points, encoding.waypoints, QUICK)
-        run.polish(rotated_vectors(space, encoding, path[None])[0], QUICK_POLISH)
+        vectors = rotated_vectors(space, encoding, path[None])
+        run.evaluate(vectors)
+        if not run.safe_already():
+            run.polish(vectors[0], QUICK_POLISH)
         if run.over() or run.safe_already():
             break
     return found

@@ -26,6 +26,8 @@ LAYERS_A_STEP = 2.5
 LOW_LAYER, HIGH_LAYER = 0.05, 0.12
 # Cells of one grid, at most: stages x across x layers.
 MOST_CELLS = 1_200_000
+# What the first route is expected to cost, over the straight line; grids know eight courses and are too long by that.
+EXPECTED = 1.12
 # Routes beside one another: within this of an earlier one (m, or steps if that is more) a route costs up to twice.
 APART, APART_STEPS = 800.0, 3.0
 
@@ -97,7 +99,7 @@ def grid_routes(
     rules: Rules, frame: Frame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
 ) -> Iterator[Route]:
     """Routes as found: of each grid's number of stages, up to so many different ones."""
-    expected = math.inf
+    expected = EXPECTED * math.dist(rules.start, rules.destination)
     for stages, each in grids:
         grid = make_grid(rules, frame, span, stages)
         used: tuple[Route, ...] = ()
