@@ -79,7 +79,14 @@ def _pixel_steps(rules: Rules, packed: Floats, along: float, reach: float, out: 
 
 @compiled
 def _add_danger(
-    rules: Rules, places: Floats, along: float, step: float, grid: tuple[Floats, Floats], low: int, high: int, dear: Floats
+    rules: Rules,
+    places: Floats,
+    along: float,
+    step: float,
+    grid: tuple[Floats, Floats],
+    low: int,
+    high: int,
+    dear: Floats,
 ) -> None:  # pragma: no cover - compiled
     """Add the cost per m inside kill spheres, growing inwards, to a stage's cells dear (layers, across) low..high.
 

@@ -99,9 +99,9 @@ class Run:
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
-        if self.improved is not None and not self.archive.scores[:1, :4].any():
-            if not np.array_equal(before, self.archive.vectors[:1]):
-                self.improved(self.encoding.decode(self.archive.vectors[:1])[0])
+        best = self.archive.vectors[:1]
+        if self.improved is not None and not self.archive.scores[0, :4].any() and not np.array_equal(before, best):
+            self.improved(self.encoding.decode(best)[0])
         return scores
 
     def polish(self, vector: Floats, most: int) -> Floats:

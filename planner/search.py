@@ -223,23 +223,27 @@ def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | Non
 
 
 def _routes(run: Run, grids: tuple[tuple[int, int], ...]) -> list[Route]:
-    """Find the grids' routes; the archive sees a path that is quickly fitted to each as soon as it is found."""
+    """Find the grids' routes; the archive sees a path that is quickly fitted to each as soon as it is found.
+
+    Those with the best such paths come first.
+    """
     encoding, space, rules = run.encoding, run.problem.space, run.problem.search
     if run.progress is not None:
         run.progress(run.done, run.done + run.problem.scenario.planner.generations, "grid routes")
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-    found = []
+    found, scores = [], []
     for route in grid_routes(rules, frame, span, grids):
         found.append(route)
         path = fit_waypoints(rules, frame, route.points, encoding.waypoints, QUICK)
         vectors = rotated_vectors(space, encoding, path[None])
-        run.evaluate(vectors)
+        scores.append(run.evaluate(vectors)[0])
         if not run.safe_already():
-            run.polish(vectors[0], QUICK_POLISH)
+            scores[-1] = run.polish(vectors[0], QUICK_POLISH)
         if run.over() or run.safe_already():
             break
-    return found
+    order = np.argsort(ranks(np.array(scores), ARCHIVE_LEVELS), kind="stable") if found else []
+    return [found[k] for k in order]
 
 
 def _known(scores: Floats | None) -> Floats:

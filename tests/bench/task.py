@@ -76,6 +76,11 @@ def best_known(name: str) -> float:
     return float(known[name]["length_ratio"]) if name in known else float("nan")
 
 
+def all_known() -> list[str]:
+    """The problems of which a best path is known."""
+    return list(json.loads(BEST_KNOWN.read_text(encoding="utf-8")))
+
+
 def with_planner(scenario: Scenario, **changes: object) -> Scenario:
     """The same scenario with other keys in ``[planner]``."""
     spec = scenario.spec
