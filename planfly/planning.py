@@ -9,7 +9,8 @@ from pathlib import Path
 from types import FrameType
 
 from flight.setup import make_limits
-from planfly.pipeline import Advance, Vehicle
+from planfly.progress import Advance
+from planfly.vehicle import Vehicle
 from planner.plan import Plan, read_plan
 from planner.replan import replan
 from planner.run import Stop

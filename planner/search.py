@@ -242,8 +242,9 @@ def _routes(run: Run, grids: tuple[tuple[int, int], ...]) -> list[Route]:
             scores[-1] = run.polish(vectors[0], QUICK_POLISH)
         if run.over() or run.safe_already():
             break
-    order = np.argsort(ranks(np.array(scores), ARCHIVE_LEVELS), kind="stable") if found else []
-    return [found[k] for k in order]
+    if not found:
+        return []
+    return [found[k] for k in np.argsort(ranks(np.array(scores), ARCHIVE_LEVELS), kind="stable")]
 
 
 def _known(scores: Floats | None) -> Floats:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.setup import make_limits
-from planfly.pipeline import Vehicle, load_vehicle
+from planfly.vehicle import Vehicle, load_vehicle
 from planner.certify import certify
 from planner.encoding import ENCODINGS, Encoding, rotated_vectors
 from planner.graded import graded_scores
