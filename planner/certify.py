@@ -190,19 +190,15 @@ def _heights(rules: Rules, waypoints: Floats) -> Floats:  # pragma: no cover - c
     """
     last = waypoints.shape[0] - 1
     radii = corner_radii(rules, waypoints)
-    arcs = [corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i]) for i in range(1, last)]
-    count = last
-    for arc in arcs:
-        count += max(1, arc.shape[0] - 1)
-    out = np.empty((count, 4))
+    out = np.empty((last, 4))
     for i in range(last):
         _height(rules, waypoints[i], waypoints[i + 1], 0.0, i, out[i])
-    row = last
     for i in range(1, last):
-        arc = arcs[i - 1]
-        for k in range(max(1, arc.shape[0] - 1)):
-            _height(rules, arc[k], arc[min(k + 1, arc.shape[0] - 1)], 1.0, i, out[row])
-            row += 1
+        arc = corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        rows = np.empty((max(1, arc.shape[0] - 1), 4))
+        for k in range(rows.shape[0]):
+            _height(rules, arc[k], arc[min(k + 1, arc.shape[0] - 1)], 1.0, i, rows[k])
+        out = np.concatenate((out, rows))
     return out
 
 
