@@ -14,7 +14,8 @@ from planfly.files import default_folder, prepare_folder, refuse_existing, refus
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, over_terrain, with_flight, with_wind
+from world.scenario import Scenario, embedded_scenarios, load_scenario
+from world.scenario_changes import over_terrain, with_flight, with_wind
 
 if TYPE_CHECKING:
     pass

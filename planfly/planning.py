@@ -16,7 +16,8 @@ from planner.replan import replan
 from planner.run import Stop
 from planner.search import plan_path
 from world.errors import ScenarioError
-from world.scenario import Scenario, with_planner, with_threats
+from world.scenario import Scenario
+from world.scenario_changes import with_planner, with_threats
 
 
 @contextmanager

@@ -16,7 +16,8 @@ from planfly.results import print_verdict, write_missions, write_pictures, write
 from planfly.vehicle import choose_seed, load_vehicle
 from planner.plan import plan_json
 from world.files import write_whole
-from world.scenario import Scenario, load_scenario, with_flight
+from world.scenario import Scenario, load_scenario
+from world.scenario_changes import with_flight
 
 
 def run(args: argparse.Namespace) -> Verdict:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from flight.downlink import CRITICAL, INFO, NOTICE, WARNING
 from flight.flight_process import Judge, Landed, Ready, Up, Words, answer, serve_flights
 from flight.mission import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.setup import FlightSetup
 from flight.simulate import Flight, as_track
 from flight.track import Track, join_tracks
-from flight.vehicle import CRITICAL, INFO, NOTICE, WARNING
 from flight.watch import Watcher
 from logs.check import judge_flight, judge_geometry
 from logs.recorder import Recorder
