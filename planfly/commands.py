@@ -39,9 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
 def plan(args: argparse.Namespace) -> int:
     """``planfly plan``, and planning again with ``--from``."""
-    from planfly.pipeline import choose_seed, load_vehicle
-    from planfly.planning import make_plan, prepare
-    from planfly.results import print_plan
+    from planfly.planning import make_plan, prepare, print_plan
+    from planfly.vehicle import choose_seed, load_vehicle
     from planner.plan import plan_json
 
     scenario, old = prepare(args, load_scenario(args.scenario))

@@ -20,8 +20,9 @@ from logs.check import judge_flight, judge_geometry
 from logs.recorder import Recorder
 from logs.verdict import Finding, Verdict
 from planfly.missions import open_mission
-from planfly.pipeline import Vehicle as Airframe
-from planfly.pipeline import load_vehicle, make_setup
+from planfly.pipeline import make_setup
+from planfly.vehicle import Vehicle as Airframe
+from planfly.vehicle import load_vehicle
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
