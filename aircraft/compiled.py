@@ -6,6 +6,7 @@ cache folder under a hash of all sources that kernels are made of, so that any c
 """
 
 import hashlib
+import importlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -33,6 +34,25 @@ def _sources_hash() -> str:
 _settings: Any = numba.config
 if not _settings.CACHE_DIR:
     _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / f"kernels-{_sources_hash()}")
+
+
+def _load_array_functions() -> None:
+    """Load numba's array functions without asking, as they do when loaded, whether SciPy's linear algebra is there.
+
+    Numba needs them before it reads the first kernel from its cache.  That question costs a new process 0.15 s and has
+    one answer: SciPy is a dependency.  Kernels that do call linear algebra ask again.
+    """
+    linalg: Any = importlib.import_module("numba.np.linalg")
+    ask = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        arraymath: Any = importlib.import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = ask
+    arraymath.ensure_blas = ask
+
+
+_load_array_functions()
 
 
 def compiled(kernel: _Kernel) -> _Kernel:

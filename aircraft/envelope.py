@@ -100,7 +100,20 @@ def turn_radius(speed: float, bank: float) -> float:  # pragma: no cover - compi
 
 
 def _bilinear(xs: Floats, ys: Floats, table: Floats, x: float, y: float) -> float:
-    rows = np.array([np.interp(y, ys, row) for row in table])
+    rows = _at(ys, table, y)
     first = int(np.argmax(~np.isnan(rows)))
     rows[:first] = rows[first]
     return float(np.interp(x, xs, rows, left=np.nan, right=np.nan))
+
+
+def _at(ys: Floats, table: Floats, y: float) -> Floats:
+    """``np.interp`` of every row of a table at one place, to the last bit: a call for each takes ten times as long."""
+    k = min(max(0, int(np.searchsorted(ys, y, side="right")) - 1), ys.size - 1)
+    if y <= ys[k] or k == ys.size - 1:
+        return np.array(table[:, k])
+    left, right = table[:, k], table[:, k + 1]
+    slope = (right - left) / (ys[k + 1] - ys[k])
+    rows = slope * (y - ys[k]) + left
+    # As there: from the other side where that is not a number, and for equal neighbours the neighbour.
+    rows = np.where(np.isnan(rows), slope * (y - ys[k + 1]) + right, rows)
+    return np.where(np.isnan(rows) & (left == right), left, rows)

@@ -67,7 +67,11 @@ MEMORY: Final = NAV + NAV_STATES
 GAINS: Final = MEMORY + len(M)
 CONSTANTS: Final = GAINS + len(G)
 LAYOUT: Final = CONSTANTS + len(K)
-NOISE: Final = LAYOUT + 3 * len(Table)
+# What is set in JSBSim: commands, gusts north, east and down, the ground's height; SI here, then times its scale.
+OUT: Final = LAYOUT + 3 * len(Table)
+OUT_SIZE: Final = COMMAND_SIZE + 4
+SCALES: Final = OUT + OUT_SIZE
+NOISE: Final = SCALES + 2 * OUT_SIZE
 # Turbulence's and navigation's, each tick.
 NOISE_SIZE: Final = 6
 
@@ -102,5 +106,7 @@ class Arena:
         self.nav = self.packed[NAV:MEMORY]
         self.memory = self.packed[MEMORY:GAINS]
         self.constants = self.packed[CONSTANTS:LAYOUT]
+        self.out = self.packed[OUT:SCALES]
+        self.scales = self.packed[SCALES:NOISE]
         self.noise = self.packed[NOISE:rows].reshape(block, NOISE_SIZE)
         self.rows = self.packed[rows:].reshape(block, ROW)

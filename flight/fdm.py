@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, cast
 
 import jsbsim
 import numpy as np
@@ -18,6 +19,7 @@ from aircraft.catalog import Aircraft
 from aircraft.model import Command
 from flight.engine import Engine
 from flight.model_check import check_model
+from flight.nodes import Links, addresses
 from flight.properties import (
     FLAT_DENSITY,
     FLAT_PLANET,
@@ -60,23 +62,6 @@ class Variation:
     volts: float = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class Links:
-    """The bound nodes themselves, in JSBSim's units, for the one loop that cannot afford `Fdm`'s conversions.
-
-    getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI.  commands: setters in
-    the order of `flight.state.C`.  gusts: setters north, east and down, ft/s.  terrain: setter, ft.  feet: in a metre.
-    """
-
-    getters: tuple[Callable[[], float], ...]
-    factors: Floats
-    commands: tuple[Callable[[float], object], ...]
-    gusts: tuple[Callable[[float], object], ...]
-    terrain: Callable[[float], object]
-    run: Callable[[], object]
-    feet: float = 1.0 / FOOT
-
-
 class Fdm:
     """One aircraft in one JSBSim instance, from a trimmed start; make a new one for each flight.
 
@@ -114,7 +99,8 @@ class Fdm:
         state = STATE | {
             row: (reading.name, reading.factor) for row, reading in zip(OWN, aircraft.model.readings, strict=True)
         }
-        self._readers = [self._getter(state[row][0]) for row in S]
+        self._names = [state[row][0] for row in S]
+        self._readers = [self._getter(name) for name in self._names]
         self._factors = np.array([state[row][1] for row in S])
         self._writers = [self._commander(command) for command in aircraft.model.commands]
         self._winds = [self._setter(name) for name in WIND]
@@ -257,12 +243,16 @@ class Fdm:
 
     def links(self) -> Links:
         """The bound nodes of this instance."""
+        commands = self.aircraft.model.commands
+        names = [*self._names, *(command.name for command in commands), *GUST, TERRAIN]
+        nodes = [self._node(name) if name else None for name in names]
+        scales = [(command.above, command.below) for command in commands] + 4 * [(1.0 / FOOT, 1.0 / FOOT)]
         return Links(
             getters=tuple(self._readers),
             factors=self._factors,
-            commands=tuple(self._writers),
-            gusts=tuple(self._gusts),
-            terrain=self._terrain,
+            setters=tuple(node.set_double_value for node in nodes[STATE_SIZE:] if node is not None),
+            scales=np.array(scales),
+            nodes=addresses(nodes, JSBSIM_VERSION, Path(cast("Any", jsbsim)._jsbsim.__file__)),
             run=self._run,
         )
 

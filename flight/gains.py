@@ -20,18 +20,26 @@ class Gains:
     reference_airspeed: the airspeed at which surface gains hold; they are scaled with dynamic pressure.
     cross_track_frequency, cross_track_damping, cross_track_integral: of the second-order cross-track law.
     intercept: steepest course to the path that it flies when far away.  turn_lead, turn_smoothing: how far ahead the
-    path's curvature is fed forward, and over how long it is averaged.  height_*: the same law upwards.  slope_lead: as
-    turn_lead.
+    path's curvature is fed forward, and over how long it is averaged about there.  height_*: the same law upwards.
+    slope_lead: as turn_lead.  aside_frequency: how fast the aircraft goes back to the path from where rolling into an
+    arc took it.
     speed_gain, speed_integral: throttle per m/s.  throttle_per_slope: throttle per rad of climb.  slow_margin:
-    below command less this, height gives way to speed.  roll_gain: roll rate per rad of roll error.
-    roll_rate_gain, aileron_per_roll_rate, roll_integral: aileron per rad/s of roll rate error, per rad/s of
-    steady roll rate, and per rad s of roll error.  alpha_per_g, elevator_per_alpha, elevator_per_pitch_rate: the
-    airframe, from its coefficients.  pitch_rate_gain, yaw_rate_gain: damping.
+    below command less this, height gives way to speed.  arc_slowing_*: so long before an arc, and by so much, the
+    airspeed gives way to a ground speed that the arc can be flown with.
+    roll_frequency, roll_rate_max, roll_acceleration_max: of the model roll that the aircraft follows.  roll_gain,
+    roll_rate_gain: aileron per rad and rad/s that it differs from it.  roll_disturbance_lag: of the estimate of what
+    else rolls it.  aileron_lead: the ailerons' own lag.  load_lead: how far ahead the lift is asked for the bank.
+    pitch_rate_gain, yaw_rate_gain: damping.  sideslip_gain: rudder per rad of sideslip.
+    Of the airframe: alpha_per_g; elevator_per_alpha, elevator_per_pitch_rate, aileron_per_roll_rate,
+    aileron_per_roll_acceleration, rudder_per_yaw_rate (without sideslip); side_per_sideslip, side_per_aileron: sideways
+    acceleration, m/s^2 a rad.
+    side_gain, side_lag: how much of the sideways acceleration that bank and ailerons do not explain is answered, and
+    its lag.  sideslip_max: skid where the bank ends.
 
     The rivals' have defaults.  l1_*: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
-    side_gain, side_lag: how much of the sideways acceleration that the bank does not explain is answered, and its lag.
     field_approach: course to the path far from it.  field_path, field_orbit: how the vector field closes in on a line
-    and on an orbit.  field_course, field_course_integral: bank per course error.
+    and on an orbit.  field_course, field_course_integral: bank per course error.  So have those that an aircraft can do
+    without.
     """
 
     reference_airspeed: float
@@ -52,7 +60,7 @@ class Gains:
     roll_gain: float
     roll_rate_gain: float
     aileron_per_roll_rate: float
-    roll_integral: float
+    aileron_per_roll_acceleration: float
     alpha_per_g: float
     elevator_per_alpha: float
     elevator_per_pitch_rate: float
@@ -68,13 +76,32 @@ class Gains:
     field_course_integral: float = 0.2
     side_gain: float = 0.0
     side_lag: float = 0.3
+    roll_frequency: float = 5.0
+    roll_rate_max: float = math.radians(40.0)
+    roll_acceleration_max: float = math.radians(150.0)
+    roll_disturbance_lag: float = 0.3
+    aileron_lead: float = 0.0
+    load_lead: float = 0.0
+    side_per_aileron: float = 0.0
+    rudder_per_yaw_rate: float = 0.0
+    sideslip_gain: float = 0.0
+    side_per_sideslip: float = 0.0
+    sideslip_max: float = 0.0
+    arc_slowing_time: float = 4.0
+    arc_slowing_max: float = 0.0
+    aside_frequency: float = 1.0
 
     def packed(self) -> Floats:
         """(g,) the fields in order."""
         return np.array([getattr(self, item.name) for item in fields(self)])
 
 
-_UNITS = ("_rad_s", "_1_s3", "_1_s2", "_1_s", "_1_m", "_deg", "_mps", "_s")
+# Suffixes that a key may carry, the longer first, and what takes the value to SI and radians.
+_DEG = math.radians(1.0)
+_UNITS = {
+    **{"_deg_s2": _DEG, "_deg_s": _DEG, "_deg": _DEG},
+    **dict.fromkeys(("_rad_s", "_1_s3", "_1_s2", "_1_s", "_1_m", "_mps2", "_mps", "_s2", "_s"), 1.0),
+}
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
@@ -90,8 +117,8 @@ def load_gains(aircraft: Aircraft) -> Gains:
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise FlightError(f"{file}: {key} = {value!r} is not a finite number")
-        name = next((key.removesuffix(unit) for unit in _UNITS if key.endswith(unit)), key)
-        values[name] = math.radians(value) if key.endswith("_deg") else float(value)
+        unit = next((unit for unit in _UNITS if key.endswith(unit)), "")
+        values[key.removesuffix(unit)] = float(value) * _UNITS.get(unit, 1.0)
     known = {item.name for item in fields(Gains)}
     wanted = {item.name for item in fields(Gains) if item.default is MISSING}
     missing, unknown = sorted(wanted - set(values)), sorted(set(values) - known)

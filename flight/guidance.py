@@ -1,7 +1,8 @@
 """The guidance core: from the state to the four commands, on packed arrays, compiled.
 
-Three lateral laws: ours, a second-order cross-track law on the fly-by path with curvature feed-forward; L1 along the
-legs, as ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
+Three lateral laws: ours, a second-order cross-track law with curvature feed-forward, about the line beside the path
+that a rolling aircraft can follow, which answers gusts by bank, and by a skid where bank ends; L1 along the legs, as
+ArduPlane flies it; and the vector field of Beard and McLain along the fly-by path, whose arcs are its fillets.
 They share bank limit, vertical channel and inner loops (`flight.inner_loops`), so that flights differ by the law alone.
 None asks for the wind: all steer by the velocity over the ground.  No clock: dt is an argument.
 """
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 
 from aircraft.compiled import compiled, compiled_views
 from aircraft.envelope import GRAVITY
-from flight.inner_loops import steer_bank, steer_height
-from flight.path_kernels import mean_curvature, project
+from flight.inner_loops import roll_model, steer_bank, steer_height
+from flight.path_kernels import mean_curvature, most_curvature, project
 from flight.rivals import (
     WAYPOINT_RADIUS,
     field_course,
@@ -29,6 +30,9 @@ from flight.state import S
 from world.geometry import wrap
 
 Floats = NDArray[np.float64]
+
+# Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
+ARC_SHARE = 0.95
 
 
 @compiled_views
@@ -84,30 +88,68 @@ def _along_path(
     ground_course = math.atan2(place[3], place[4])
     off_course = wrap(ground_course - course)
     cross = memory[M.CROSS_TRACK]
+    # The lift's horizontal part is square to the heading, the acceleration wanted is square to the course.
+    drift = wrap(ground_course - state[S.YAW])
+    crab = max(0.5, math.cos(drift))
+    k, s = int(memory[M.PIECE]), memory[M.DISTANCE]
+    # Where the wind blows aside the turn changes the ground speed: it will be this when the bank comes.
+    then = speed + gains[G.TURN_LEAD] * GRAVITY * math.tan(memory[M.BANK]) * math.sin(drift)
+    start = s + speed * max(0.0, gains[G.TURN_LEAD] - 0.5 * gains[G.TURN_SMOOTHING])
+    turn = then * then * mean_curvature(pieces, k, start, start + speed * gains[G.TURN_SMOOTHING])
+    # No aircraft steps into an arc: this is how far aside it shall be where the path's curvature jumps.
+    memory[M.PATH_BANK], memory[M.PATH_BANK_RATE], _ = roll_model(
+        math.atan(turn / (GRAVITY * crab)), memory[M.PATH_BANK], memory[M.PATH_BANK_RATE], gains, dt
+    )
+    back = gains[G.ASIDE_FREQUENCY]
+    home = -back * (2.0 * memory[M.ASIDE_RATE] + back * memory[M.ASIDE])
+    memory[M.ASIDE_RATE] += (GRAVITY * math.tan(memory[M.PATH_BANK]) * crab - speed * speed * pieces[k, 5] + home) * dt
+    memory[M.ASIDE] += memory[M.ASIDE_RATE] * dt
     frequency = gains[G.CROSS_TRACK_FREQUENCY]
     rate_gain = 2.0 * gains[G.CROSS_TRACK_DAMPING] * frequency
     most = speed * math.sin(gains[G.INTERCEPT])
-    wanted_rate = min(most, max(-most, -cross * frequency * frequency / rate_gain))
+    wanted_rate = min(most, max(-most, -(cross - memory[M.ASIDE]) * frequency * frequency / rate_gain))
     # Flying away from the course counts as flying square to it: the sine would fall again.
     away = abs(off_course) > 0.5 * math.pi
     rate = math.copysign(speed, off_course) if away else speed * math.sin(off_course)
-    s = memory[M.DISTANCE]
-    start = s + speed * gains[G.TURN_LEAD]
-    curvature = mean_curvature(pieces, int(memory[M.PIECE]), start, start + speed * gains[G.TURN_SMOOTHING])
-    push = rate_gain * (wanted_rate - rate) - gains[G.CROSS_TRACK_INTEGRAL] * memory[M.CROSS_TRACK_SUM]
-    # The lift's horizontal part is square to the heading, the acceleration wanted is square to the course.
-    crab = math.cos(wrap(ground_course - state[S.YAW]))
-    if memory[M.LAST_EAST] != 0.0 or memory[M.LAST_NORTH] != 0.0:
-        gained = (place[3] - memory[M.LAST_EAST]) * place[4] - (place[4] - memory[M.LAST_NORTH]) * place[3]
-        unexplained = gained / (speed * dt) - GRAVITY * math.tan(state[S.ROLL]) * crab
-        memory[M.SIDE] += (unexplained - memory[M.SIDE]) * min(1.0, dt / gains[G.SIDE_LAG])
-    memory[M.LAST_EAST], memory[M.LAST_NORTH] = place[3], place[4]
-    push -= gains[G.SIDE_GAIN] * memory[M.SIDE]
-    wanted = math.atan((speed * speed * curvature + push) / (GRAVITY * max(0.5, crab)))
+    push = home + rate_gain * (wanted_rate - (rate - memory[M.ASIDE_RATE]))
+    push -= gains[G.CROSS_TRACK_INTEGRAL] * memory[M.CROSS_TRACK_SUM]
+    push -= gains[G.SIDE_GAIN] * _unexplained(state, place, gains, memory, speed, crab, dt)
+    lift = GRAVITY + memory[M.BEND]
+    wanted = math.atan((turn + push) / (lift * crab))
     bank: float = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
+    sharpest = most_curvature(pieces, k, s, s + speed * gains[G.ARC_SLOWING_TIME])
+    memory[M.ARC_SPEED] = math.sqrt(ARC_SHARE * GRAVITY * math.tan(memory[M.MAX_BANK]) / max(1e-9, sharpest))
+    # What the bank limit leaves, within limits, a skid: its side force points where the turn goes.
+    left = lift * (math.tan(wanted) - math.tan(bank))
+    slip = left / max(1.0, gains[G.SIDE_PER_SIDESLIP] * _pressure(state, gains))
+    most = gains[G.SIDESLIP_MAX]
+    memory[M.SIDESLIP] = -min(most, max(-most, slip))
     if bank == wanted and abs(cross) < 20.0:
         memory[M.CROSS_TRACK_SUM] = min(40.0, max(-40.0, memory[M.CROSS_TRACK_SUM] + cross * dt))
     return bank
+
+
+@compiled
+def _pressure(state: Floats, gains: Floats) -> float:  # pragma: no cover - compiled
+    """Dynamic pressure in that at the reference airspeed."""
+    share: float = (state[S.AIRSPEED] / gains[G.REFERENCE_AIRSPEED]) ** 2
+    return share
+
+
+@compiled
+def _unexplained(
+    state: Floats, place: Floats, gains: Floats, memory: Floats, speed: float, crab: float, dt: float
+) -> float:  # pragma: no cover - compiled
+    """Acceleration to the right of the course that neither lift nor ailerons explain, smoothed, m/s^2."""
+    if memory[M.LAST_EAST] != 0.0 or memory[M.LAST_NORTH] != 0.0:
+        gained = (place[3] - memory[M.LAST_EAST]) * place[4] - (place[4] - memory[M.LAST_NORTH]) * place[3]
+        lifted = (GRAVITY + (place[5] - memory[M.LAST_UP]) / dt) * math.tan(state[S.ROLL])
+        pushed = gains[G.SIDE_PER_AILERON] * _pressure(state, gains) * state[S.AILERON]
+        side = gained / (speed * dt) - (lifted + pushed) * crab
+        memory[M.SIDE] += (side - memory[M.SIDE]) * min(1.0, dt / gains[G.SIDE_LAG])
+    memory[M.LAST_EAST], memory[M.LAST_NORTH], memory[M.LAST_UP] = place[3], place[4], place[5]
+    side_now: float = memory[M.SIDE]
+    return side_now
 
 
 @compiled_views

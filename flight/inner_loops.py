@@ -47,7 +47,8 @@ def steer_height(
     rate_gain = 2.0 * gains[G.HEIGHT_DAMPING] * frequency
     wanted_rate = slope * along
     correction = min(4.0, max(-4.0, -error * frequency * frequency / rate_gain))
-    push = bend * along * along + rate_gain * (wanted_rate + correction - climb_rate)
+    memory[M.BEND] = bend * along * along
+    push = memory[M.BEND] + rate_gain * (wanted_rate + correction - climb_rate)
     push -= gains[G.HEIGHT_INTEGRAL] * memory[M.HEIGHT_SUM]
     # Energy: what the aircraft gains now is what it can climb at a steady airspeed.
     command = memory[M.SPEED_COMMAND]
@@ -69,14 +70,16 @@ def steer_height(
     if not held and abs(error) < 5.0:
         memory[M.HEIGHT_SUM] = min(5.0, max(-5.0, memory[M.HEIGHT_SUM] + error * dt))
     # Load factor, angle of attack, elevator.
+    # Lift is slower than the ailerons: it is asked for the bank that comes.
     roll = state[S.ROLL]
+    banked = roll + gains[G.LOAD_LEAD] * memory[M.BANK_RATE]
     climb = math.asin(min(1.0, max(-1.0, climb_rate / airspeed)))
-    load = (push / GRAVITY + math.cos(climb)) / max(0.4, math.cos(roll))
+    load = (push / GRAVITY + math.cos(climb)) / max(0.4, math.cos(banked))
     load = min(3.0, max(0.0, load))
     pressure = (gains[G.REFERENCE_AIRSPEED] / airspeed) ** 2
     alpha = gains[G.ALPHA_PER_G] * (load * pressure - 1.0)
     alpha = min(0.25 - memory[M.TRIM_ALPHA], max(-0.12 - memory[M.TRIM_ALPHA], alpha))
-    turn_rate = GRAVITY / airspeed * math.tan(roll) * math.sin(roll)
+    turn_rate = GRAVITY / airspeed * math.tan(banked) * math.sin(banked)
     pitch_rate = turn_rate + push / airspeed * math.cos(roll)
     scale = gains[G.REFERENCE_AIRSPEED] / airspeed
     commands[C.ELEVATOR] = (
@@ -87,6 +90,10 @@ def steer_height(
     )
     # Throttle: level flight, the slope to the air ahead, and the airspeed error.
     slow = command - airspeed
+    if memory[M.ARC_SPEED] > 0.0:
+        # In an arc and before it the ground speed counts too, as far as the air allows.
+        over = math.hypot(place[3], place[4]) - memory[M.ARC_SPEED]
+        slow = min(slow, max(-over, slow - gains[G.ARC_SLOWING_MAX]))
     steady = memory[M.TRIM_THROTTLE] + gains[G.THROTTLE_PER_SLOPE] * ahead_slope * along / airspeed
     wanted = steady + gains[G.SPEED_GAIN] * slow + gains[G.SPEED_INTEGRAL] * memory[M.SPEED_SUM]
     commands[C.THROTTLE] = min(1.0, max(0.0, wanted))
@@ -96,20 +103,53 @@ def steer_height(
 
 
 @compiled
+def roll_model(
+    wanted: float, bank: float, rate: float, gains: Floats, dt: float
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Bank (rad), roll rate and roll acceleration a tick on of an aircraft that rolls as ours shall.
+
+    A critically damped oscillator within limits of roll rate and acceleration.
+    """
+    frequency = gains[G.ROLL_FREQUENCY]
+    most = gains[G.ROLL_ACCELERATION_MAX]
+    change = min(most, max(-most, frequency * (frequency * (wanted - bank) - 2.0 * rate)))
+    most = gains[G.ROLL_RATE_MAX]
+    change = min((most - rate) / dt, max((-most - rate) / dt, change))
+    rate += change * dt
+    return bank + rate * dt, rate, change
+
+
+@compiled
 def steer_bank(
     state: Floats, gains: Floats, memory: Floats, commands: Floats, bank: float, dt: float
 ) -> None:  # pragma: no cover - compiled
-    """Aileron from bank through roll rate; rudder for coordination and damping."""
+    """Aileron from a bank command through a model of how the aircraft shall roll; rudder for coordination and damping.
+
+    The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
+    it never overshoots.  The ailerons get what the model's roll takes, what is left of the error, and, against gusts
+    and the propeller, what rolled the aircraft beyond its ailerons' own doing.
+    """
     airspeed = max(8.0, state[S.AIRSPEED])
     scale = gains[G.REFERENCE_AIRSPEED] / airspeed
-    error = bank - state[S.ROLL]
-    rate = min(1.5, max(-1.5, gains[G.ROLL_GAIN] * error))
-    commands[C.AILERON] = (
-        gains[G.AILERON_PER_ROLL_RATE] * scale * rate
-        + gains[G.ROLL_RATE_GAIN] * scale * scale * (rate - state[S.P])
-        + gains[G.ROLL_INTEGRAL] * memory[M.ROLL_SUM]
+    memory[M.BANK], rate, turn = roll_model(bank, memory[M.BANK], memory[M.BANK_RATE], gains, dt)
+    memory[M.BANK_RATE] = rate
+    per_rate, per_acceleration = (
+        gains[G.AILERON_PER_ROLL_RATE] * scale,
+        gains[G.AILERON_PER_ROLL_ACCELERATION] * scale * scale,
     )
-    if abs(error) < 0.15:
-        memory[M.ROLL_SUM] = min(0.5, max(-0.5, memory[M.ROLL_SUM] + error * dt))
+    rolled = per_acceleration * (state[S.P] - memory[M.LAST_ROLL_RATE]) / dt + per_rate * state[S.P] - state[S.AILERON]
+    memory[M.LAST_ROLL_RATE] = state[S.P]
+    memory[M.ROLLED] += (rolled - memory[M.ROLLED]) * min(1.0, dt / gains[G.ROLL_DISTURBANCE_LAG])
+    commands[C.AILERON] = (
+        per_rate * rate
+        + (per_acceleration + gains[G.AILERON_LEAD] * per_rate) * turn
+        + gains[G.ROLL_GAIN] * scale * scale * (memory[M.BANK] - state[S.ROLL])
+        + gains[G.ROLL_RATE_GAIN] * scale * scale * (rate - state[S.P])
+        - memory[M.ROLLED]
+    )
     yaw_rate = GRAVITY / airspeed * math.sin(state[S.ROLL]) * math.cos(state[S.PITCH])
-    commands[C.RUDDER] = -gains[G.YAW_RATE_GAIN] * scale * (yaw_rate - state[S.R])
+    commands[C.RUDDER] = (
+        -gains[G.RUDDER_PER_YAW_RATE] * scale * yaw_rate
+        - gains[G.YAW_RATE_GAIN] * scale * (yaw_rate - state[S.R])
+        - gains[G.SIDESLIP_GAIN] * (state[S.BETA] - memory[M.SIDESLIP])
+    )

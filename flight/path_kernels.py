@@ -48,6 +48,18 @@ def mean_curvature(pieces: Floats, k: int, start: float, end: float) -> float:  
 
 
 @compiled
+def most_curvature(pieces: Floats, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+    """Sharpest curvature of the path between two distances, both at or after piece ``k``, 1/m, positive."""
+    most = 0.0
+    for i in range(k, pieces.shape[0]):
+        if pieces[i, 0] > end:
+            break
+        if pieces[i, 0] + pieces[i, 1] > start:
+            most = max(most, abs(pieces[i, 5]))
+    return most
+
+
+@compiled
 def profile(nodes: Floats, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Height (m), slope (tangent) and its change per metre of the height profile at distance ``s``."""
     k = 0

@@ -24,7 +24,7 @@ class G(IntEnum):
     ROLL_GAIN = 15
     ROLL_RATE_GAIN = 16
     AILERON_PER_ROLL_RATE = 17
-    ROLL_INTEGRAL = 18
+    AILERON_PER_ROLL_ACCELERATION = 18
     ALPHA_PER_G = 19
     ELEVATOR_PER_ALPHA = 20
     ELEVATOR_PER_PITCH_RATE = 21
@@ -40,6 +40,20 @@ class G(IntEnum):
     FIELD_COURSE_INTEGRAL = 31
     SIDE_GAIN = 32
     SIDE_LAG = 33
+    ROLL_FREQUENCY = 34
+    ROLL_RATE_MAX = 35
+    ROLL_ACCELERATION_MAX = 36
+    ROLL_DISTURBANCE_LAG = 37
+    AILERON_LEAD = 38
+    LOAD_LEAD = 39
+    SIDE_PER_AILERON = 40
+    RUDDER_PER_YAW_RATE = 41
+    SIDESLIP_GAIN = 42
+    SIDE_PER_SIDESLIP = 43
+    SIDESLIP_MAX = 44
+    ARC_SLOWING_TIME = 45
+    ARC_SLOWING_MAX = 46
+    ASIDE_FREQUENCY = 47
 
 
 class Lateral(IntEnum):
@@ -57,7 +71,7 @@ class M(IntEnum):
     CROSS_TRACK_SUM = 1  # m s
     HEIGHT_SUM = 2  # m s
     SPEED_SUM = 3  # m
-    ROLL_SUM = 4  # rad s
+    BANK = 4  # rad, of the model roll
     ENERGY_RATE = 5  # m/s, filtered rate of total energy height
     LAST_AIRSPEED = 6  # m/s, negative before the first tick
     TRIM_ELEVATOR = 7  # rad, of level flight at the reference airspeed
@@ -79,6 +93,17 @@ class M(IntEnum):
     LAST_EAST = 23  # m/s over the ground, a tick ago
     LAST_NORTH = 24
     SIDE = 25  # m/s^2 to the right that the bank does not explain
+    BANK_RATE = 26  # rad/s, of the model roll
+    LAST_ROLL_RATE = 27  # rad/s, a tick ago
+    ROLLED = 28  # rad of aileron that gusts and the propeller amount to
+    LAST_UP = 29  # m/s, a tick ago
+    BEND = 30  # m/s^2 upwards, of the path ahead
+    SIDESLIP = 31  # rad, wanted
+    PATH_BANK = 33  # rad and rad/s, of the model roll into the path's curvature alone
+    PATH_BANK_RATE = 34
+    ASIDE = 35  # m right of the path and m/s, where that roll takes it
+    ASIDE_RATE = 36
+    ARC_SPEED = 32  # m/s over the ground, of the sharpest arc near ahead; 0 for no limit
 
 
 MEMORY_SIZE = len(M)

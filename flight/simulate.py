@@ -4,6 +4,7 @@ import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +13,15 @@ from aircraft.catalog import Aircraft
 from aircraft.compiled import entry
 from flight.arena import ROW, Arena, K, Table
 from flight.chart import Chart, Ground
-from flight.fdm import Fdm, Links, Variation
+from flight.fdm import Fdm, Variation
 from flight.gains import load_gains
 from flight.navigation import ERRORS, NAV_STATES, start_navigation
+from flight.nodes import Links
 from flight.path import FlyByPath, fly_by_path
 from flight.rows import Lateral, M
 from flight.setup import FlightSetup, limits_of
-from flight.state import S
-from flight.tick import ENDS, tick
+from flight.state import STATE_SIZE, S
+from flight.tick import ENDS, linked_tick, tick
 from flight.track import COLUMNS, Track
 from flight.trim import straight
 from flight.turbulence import GUST_STATES, start_gusts
@@ -40,7 +42,7 @@ TICK = 1.0 / 60.0
 # Rows that are handed on at a time, s of flight.
 BLOCK = 1.0
 # Bank that guidance may add to the planned turns' to correct an error, rad.
-BANK_RESERVE = math.radians(3.5)
+BANK_RESERVE = math.radians(2.7)
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
 PATIENCE = 1.5
 PATIENCE_SECONDS = 60.0
@@ -114,10 +116,7 @@ class Flight:
         # Guidance knows the model; it is not told how the aircraft differs from it.
         self._start(setup, gains.reference_airspeed, Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking))
         self._disturb(setup)
-        links = self.fdm.links()
-        self.arena.factors[:] = links.factors
-        self._read, self._links = _reader(links, self.arena), links
-        self._tick = entry(tick, self.arena.packed, self.arena.tables, self.terrain.heights)
+        self._step = self._linked(self.fdm.links())
         constants = self.arena.constants
         constants[K.LONGITUDE] = self.chart.position.packed[0, 1]
         constants[K.DT], constants[K.SLOWEST] = self.dt, 0.94 * aircraft.stall_speed
@@ -225,29 +224,38 @@ class Flight:
             return rows, f"time limit: not finished after {self.most_ticks * self.dt:.0f} s"
         return rows, ""
 
+    def _linked(self, links: Links) -> Callable[[], int]:
+        """Make what reads JSBSim, does a tick, sets JSBSim, and returns the tick's status."""
+        arena, tables, heights = self.arena, self.arena.tables, self.terrain.heights
+        arena.factors[:] = links.factors
+        arena.scales[:] = links.scales.ravel()
+        self._run = links.run
+        # What is not set: gusts in still air, and ground that is not known.
+        unset = [*([] if self.windy else [4, 5, 6]), *([] if self.terrain.known else [7])]
+        if links.nodes is not None:
+            links.nodes[[STATE_SIZE + k for k in unset]] = 0
+            linked = entry(linked_tick, arena.packed, tables, heights, links.nodes)
+            return partial(linked, arena.packed, tables, heights, links.nodes)
+        read, once = _reader(links, arena), entry(tick, arena.packed, tables, heights)
+        setters = [(k, setter) for k, setter in enumerate(links.setters) if k not in unset]
+
+        def step() -> int:
+            read()
+            status = once(arena.packed, tables, heights)
+            if not status:
+                values = arena.out.tolist()
+                for k, setter in setters:
+                    setter(values[k])
+            return status
+
+        return step
+
     def _fly(self, count: int) -> int:
         """Fly ``count`` ticks into the arena's rows; returns the last tick's status."""
-        read, tick_once, run = self._read, self._tick, self._links.run
-        elevator, aileron, rudder, throttle = self._links.commands
-        gust_north, gust_east, gust_down = self._links.gusts
-        set_terrain, feet = self._links.terrain, self._links.feet
-        arena, tables, heights = self.arena.packed, self.arena.tables, self.terrain.heights
-        windy, known, steps = self.windy, self.terrain.known, (None,) * self.steps
+        step, run, steps = self._step, self._run, (None,) * self.steps
         for _ in range(count):
-            read()
-            status, e, a, r, t, north, east, down, ground = tick_once(arena, tables, heights)
-            if status:
+            if status := step():
                 return status
-            elevator(e)
-            aileron(a)
-            rudder(r)
-            throttle(t)
-            if windy:
-                gust_north(north * feet)
-                gust_east(east * feet)
-                gust_down(down * feet)
-            if known:
-                set_terrain(ground * feet)
             for _ in steps:
                 run()
         return 0
@@ -255,19 +263,10 @@ class Flight:
 
 def _reader(links: Links, arena: Arena) -> Callable[[], None]:
     """Make a function that fills the arena's state, in JSBSim's units; time and winds are known without asking."""
-    # Each by its name, as a closure: a loop over a list of them takes three times as long.
-    lat, lon, up, v_n, v_e, v_d, roll, pitch, yaw, p, q, r, speed, alpha, beta = links.getters[S.LATITUDE : S.ELEVATOR]
-    elevator, aileron, rudder, throttle, current, power, load = links.getters[S.ELEVATOR : S.WIND_NORTH]
-    pack: Callable[..., None] = struct.Struct(f"{S.WIND_NORTH - S.LATITUDE}d").pack_into
+    getters = links.getters[S.LATITUDE : S.WIND_NORTH]
+    pack: Callable[..., None] = struct.Struct(f"{len(getters)}d").pack_into
     state = arena.state[S.LATITUDE : S.WIND_NORTH]
-
-    def read() -> None:
-        pack(
-            state, 0, lat(), lon(), up(), v_n(), v_e(), v_d(), roll(), pitch(), yaw(), p(), q(), r(), speed(), alpha(),
-            beta(), elevator(), aileron(), rudder(), throttle(), current(), power(), load(),
-        )  # fmt: skip
-
-    return read
+    return lambda: pack(state, 0, *[getter() for getter in getters])
 
 
 def as_track(rows: Floats) -> Track:

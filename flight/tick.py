@@ -10,14 +10,16 @@ from flight import arena as at
 from flight.arena import NOISE_SIZE, ROW, K, Table
 from flight.guidance import guide
 from flight.navigation import navigate
+from flight.nodes import get_node, set_node
 from flight.rows import M
-from flight.state import C, S
+from flight.state import STATE_SIZE, C, S
 from flight.turbulence import step_gusts
 from world.frames import polymap_within
 from world.geometry import wrap
 from world.terrain import Heights, pixel_height
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 STEEPEST_BANK = math.radians(75.0)
 # What `tick` returns, and how the flight ended by then.
@@ -32,12 +34,12 @@ ENDS = {
     STALLED: "departure: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
 }
-# Status; elevator, aileron, rudder, throttle; wind north, east and down, gusts included; ground below.
-Ticked = tuple[int, float, float, float, float, float, float, float, float]
-
 _STATE, _COMMANDS, _FACTORS, _PLACE, _SEEN = at.STATE, at.COMMANDS, at.FACTORS, at.PLACE, at.SEEN
 _AIR, _WIND, _GUSTS, _NAV, _MEMORY = at.AIR, at.WIND, at.GUSTS, at.NAV, at.MEMORY
-_GAINS, _CONSTANTS, _LAYOUT, _NOISE = at.GAINS, at.CONSTANTS, at.LAYOUT, at.NOISE
+_GAINS, _CONSTANTS, _LAYOUT = at.GAINS, at.CONSTANTS, at.LAYOUT
+_OUT, _OUT_SIZE, _SCALES, _NOISE = at.OUT, at.OUT_SIZE, at.SCALES, at.NOISE
+# Rows of the state that JSBSim gives; time and winds are known without asking.
+_FIRST, _LAST = int(S.LATITUDE), int(S.ACCEL_N)
 
 
 @compiled_views
@@ -62,8 +64,26 @@ def _end(arena: Floats, name: int) -> int:  # pragma: no cover - compiled
 
 
 @compiled_views
-def tick(arena: Floats, tables: Floats, heights: Heights) -> Ticked:  # pragma: no cover - compiled
-    """Take the state as JSBSim gave it, in its units; return a key of `ENDS` or 0 to fly on, and what to set.
+def linked_tick(arena: Floats, tables: Floats, heights: Heights, nodes: Ints) -> int:  # pragma: no cover - compiled
+    """Read JSBSim, do `tick`, and set JSBSim unless the flight has ended.
+
+    nodes: (STATE_SIZE + OUT_SIZE,) addresses of what is read and set, 0 for none, as `flight.nodes.addresses` gives.
+    """
+    for i in range(_FIRST, _LAST + 1):
+        arena[_STATE + i] = get_node(nodes[i]) if nodes[i] != 0 else 0.0
+    status = tick(arena, tables, heights)
+    if status == 0:
+        for i in range(_OUT_SIZE):
+            if nodes[STATE_SIZE + i] != 0:
+                set_node(nodes[STATE_SIZE + i], arena[_OUT + i])
+    return status
+
+
+@compiled_views
+def tick(arena: Floats, tables: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+    """Take the state as JSBSim gave it, in its units; return a key of `ENDS` or 0 to fly on.
+
+    What to set in JSBSim, in its units, stands in the arena's `out`.
 
     arena, tables: `flight.arena`.  heights: of the terrain.
     """
@@ -75,7 +95,7 @@ def tick(arena: Floats, tables: Floats, heights: Heights) -> Ticked:  # pragma: 
         state[i] *= arena[_FACTORS + i]
         total += state[i] * 0.0
     if total != 0.0:  # any NaN or infinity
-        return NOT_A_NUMBER, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        return NOT_A_NUMBER
     state[S.WIND_NORTH], state[S.WIND_EAST], state[S.WIND_DOWN] = air[0] + air[2], air[1] + air[3], air[4]
     dt, k = constants[K.DT], int(constants[K.ROW])
     # About the chart's middle, so that a flight may cross the 180th meridian.
@@ -120,9 +140,13 @@ def tick(arena: Floats, tables: Floats, heights: Heights) -> Ticked:  # pragma: 
         status = BANKED
     elif state[S.AIRSPEED] < constants[K.SLOWEST]:
         status = STALLED
-    return (
-        status, commands[0], commands[1], commands[2], commands[3], air[0] + air[2], air[1] + air[3], air[4], air[5],
-    )  # fmt: skip
+    out = arena[_OUT:_SCALES]
+    for i in range(4):
+        out[i] = commands[i]
+    out[4], out[5], out[6], out[7] = air[0] + air[2], air[1] + air[3], air[4], air[5]
+    for i in range(_OUT_SIZE):
+        out[i] *= arena[_SCALES + 2 * i + (0 if out[i] > 0.0 else 1)]
+    return status
 
 
 @compiled

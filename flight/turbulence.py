@@ -28,7 +28,9 @@ def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no co
     """
     h = min(1000.0, max(10.0, height / _FOOT))
     base = 0.177 + 0.000823 * h
-    return h / base**1.2 * _FOOT, h * _FOOT, base**-0.4
+    # One power for both: base^1.2 = base root, base^-0.4 = root^-2.
+    root = base**0.2
+    return h / (base * root) * _FOOT, h * _FOOT, 1.0 / (root * root)
 
 
 @compiled
@@ -57,7 +59,7 @@ def step_gusts(
     speed = max(airspeed, 5.0)
     decay = math.exp(-dt * speed / length_u)
     gusts[0] = decay * gusts[0] + math.sqrt(1.0 - decay * decay) * noise[0]
-    out_v = _transverse(gusts, 1, noise[1], math.exp(-dt * speed / length_u))
+    out_v = _transverse(gusts, 1, noise[1], decay)
     out_w = _transverse(gusts, 3, noise[2], math.exp(-dt * speed / length_w))
     return sigma_u * gusts[0], sigma_u * out_v, sigma_w * out_w
 

@@ -11,29 +11,25 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.commands import Pilot
+from flight.downlink import CRITICAL, INFO, WARNING, Downlink, Tell
 from flight.flight_process import Ended, Fly, Judge, Landed, Ready, Stop, Up, read_answer
 from flight.link import Link, Peer
 from flight.mavlink_items import MissionType
 from flight.mission import Home, Mission
 from flight.mission_server import MissionServer, Station
-from flight.parameters import RATE, Parameters
+from flight.parameters import Parameters
 from flight.station_missions import listed, uploaded
 from flight.station_requests import Reply, Requests
-from flight.telemetry import ACTIVE, COMPLETE, Status, heartbeat, status_texts, telemetry_message
+from flight.telemetry import ACTIVE, COMPLETE, Status, telemetry_message
 from flight.watch import Moment
 
-INFO, NOTICE, WARNING, CRITICAL = 6, 5, 4, 2
 # Longest wait for the network or the flight, s.
 _NAP = 0.02
-# A message that is late by more than this (s) is not made up for.
-_LATE = 0.5
 # How long a process that is to end may be silent, s.
 _LAST_WORDS = 10.0
 _MOST_DEATHS = 3
 # Within this time (s) the same answer is said once.
 _SAME = 3.0
-
-Tell = Callable[[str], None]
 
 
 class Vehicle:
@@ -56,6 +52,7 @@ class Vehicle:
         self.server = MissionServer()
         self.pilot = Pilot()
         self.status = Status(where[0], where[1], battery=battery)
+        self.down = Downlink(link, self.status, parameters, tell, _NAP)
         self.requests = Requests(self.pilot, parameters, self.status)
         self._where = where
         self._spawn = spawn
@@ -64,11 +61,8 @@ class Vehicle:
         self._flight = spawn()
         self._parameters = parameters
         self._tell = tell
-        self._texts = 0
         self._clock = time.monotonic
         self._born = self._clock()
-        self._next_hello = self._born
-        self._busy = 0.0
         # Which mission is judged or flown: the item at each waypoint, and what to add to it for the station's number.
         self._number = 0
         self._outstanding = self._brief = False
@@ -95,13 +89,13 @@ class Vehicle:
                 found = read_answer(self._flight.recv_bytes())
                 if isinstance(found, Landed):
                     for severity, text in found.words:
-                        self.say(text, severity)
+                        self.down.say(text, severity)
         self._flight.close()
 
     def step(self, patience: float) -> None:
         """Wait for something to do, at most ``patience`` s, and do it."""
         wire, flight = self.link.fileno(), self._flight.fileno()
-        readable, _, _ = select.select([wire, flight], [], [], self._nap(patience))
+        readable, _, _ = select.select([wire, flight], [], [], self.down.wait(self._clock(), patience))
         now = self._clock()
         self.status.boot, self.status.wall = now - self._born, time.time()
         if flight in readable:
@@ -112,22 +106,9 @@ class Vehicle:
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
         self._changes()
-        self._telemetry(now)
+        self.down.tick(now)
         used = self._clock() - now
         self.status.load += 0.01 * (used / max(used, patience) - self.status.load)
-
-    def _nap(self, patience: float) -> float:
-        now = self._clock()
-        due = min((at for peer in self.link.peers.values() for at in peer.due.values()), default=now + patience)
-        return max(0.0, min(patience, due - now, self._next_hello - now))
-
-    def say(self, text: str, severity: int = INFO) -> None:
-        """Tell every station, and the terminal."""
-        self._tell(text)
-        self._texts = self._texts % 65535 + 1
-        for peer in self.link.peers.values():
-            for piece in status_texts(text, severity, self._texts):
-                self.link.send(piece, peer)
 
     def _from_station(self, message: Any, peer: Peer, now: float) -> None:
         self.server.locked = "in flight: the mission cannot change" if self.pilot.flying else ""
@@ -145,7 +126,7 @@ class Vehicle:
                 now = self._clock()
                 # A station that tries again within a moment is told once.
                 if self._said[0] != text or now - self._said[1] > _SAME:
-                    self.say(text, severity)
+                    self.down.say(text, severity)
                 self._said = (text, now)
             else:
                 self.link.send(content, peer)
@@ -155,7 +136,7 @@ class Vehicle:
         if peer is not None:
             self.link.send(message, peer)
         if text:
-            self.say(text, WARNING)
+            self.down.say(text, WARNING)
 
     def _after_command(self) -> None:
         if self.pilot.stop_asked:
@@ -164,7 +145,7 @@ class Vehicle:
         if self.pilot.starts:
             self.pilot.took_off()
             self._leg = -1
-            self.say("mission started")
+            self.down.say("mission started")
             self._order(Fly())
         self._refresh()
 
@@ -233,7 +214,7 @@ class Vehicle:
             self._tell("ready")
         else:
             for severity, text in answer.words:
-                self.say(text, severity)
+                self.down.say(text, severity)
 
     def _judged(self, ready: Ready) -> None:
         if ready.number != self._number:
@@ -246,10 +227,10 @@ class Vehicle:
         known = self.pilot.ready
         if not self._brief or known is None or known.words != ready.words:
             for severity, text in ready.words:
-                self.say(text, severity)
+                self.down.say(text, severity)
         disarmed = self.pilot.judged(ready)
         if disarmed:
-            self.say(disarmed, WARNING)
+            self.down.say(disarmed, WARNING)
         if ready.start is not None and ready.home is not None:
             self.status.moment, self.status.home = ready.start, ready.home
         self.status.current = self._item(0)
@@ -262,9 +243,8 @@ class Vehicle:
             self._reached(len(self.pilot.ready.items) - 1)
         self.pilot.ended(completed)
         self._refresh()
-        self.say(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
-        for peer in self.link.peers.values():
-            self.link.send(telemetry_message("MISSION_CURRENT", self.status), peer)
+        self.down.say(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
+        self.down.to_all(telemetry_message("MISSION_CURRENT", self.status))
 
     def _progress(self, leg: int) -> None:
         """Tell the waypoints that were reached since the last moment."""
@@ -274,15 +254,13 @@ class Vehicle:
             self._reached(waypoint)
         self._leg = leg
         self.status.current = self._item(leg + 1)
-        for peer in self.link.peers.values():
-            self.link.send(telemetry_message("MISSION_CURRENT", self.status), peer)
+        self.down.to_all(telemetry_message("MISSION_CURRENT", self.status))
 
     def _reached(self, waypoint: int) -> None:
         ready = self.pilot.ready
         if ready is None or not 0 <= waypoint < len(ready.items) or ready.items[waypoint] < 0:
             return
-        for peer in self.link.peers.values():
-            self.link.send(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)), peer)
+        self.down.to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
 
     def _item(self, waypoint: int) -> int:
         """Station's number of the item at a waypoint, or of the next that is one."""
@@ -295,36 +273,10 @@ class Vehicle:
         pilot, status = self.pilot, self.status
         if (status.mode, status.armed, status.flying) != (pilot.mode, pilot.armed, pilot.flying):
             # A change is told at once.
-            self._next_hello = self._clock()
+            self.down.hello_now()
         status.mode, status.armed, status.flying = pilot.mode, pilot.armed, pilot.flying
         status.ready, status.mission_state = pilot.armable or pilot.armed, pilot.mission_state
         items = self.server.lists[MissionType.MISSION]
         status.total = max(0, len(items) - 1) if items else 0
         if pilot.mission_state not in (ACTIVE, COMPLETE):
             status.current = self._item(0) if pilot.ready is not None else 0
-
-    def _telemetry(self, now: float) -> None:
-        if now >= self._next_hello:
-            self._next_hello = now + 1.0 if now - self._next_hello > _LATE else self._next_hello + 1.0
-            self.link.forget_silent()
-            self.link.hello(heartbeat(self.status))
-        for peer in self.link.peers.values():
-            self._telemetry_for(peer, now)
-
-    def _telemetry_for(self, peer: Peer, now: float) -> None:
-        for name, due in peer.due.items():
-            if now < due:
-                continue
-            period = peer.periods[name]
-            if period is None:
-                peer.due[name] = now + 1.0
-                continue
-            self.link.send(telemetry_message(name, self.status), peer)
-            peer.due[name] = due + period if now - due < _LATE else now + period
-        if peer.parameter is not None:
-            last = int(peer.parameter)
-            peer.parameter += max(1.0, RATE * _NAP)
-            for number in range(last, min(int(peer.parameter), len(self._parameters.entries))):
-                self.link.send(self._parameters.message(number), peer)
-            if peer.parameter >= len(self._parameters.entries):
-                peer.parameter = None

@@ -14,7 +14,8 @@ from planfly.files import default_folder, prepare_folder, refuse_existing, refus
 from planfly.progress import progress
 from world.errors import PlanflyError, ScenarioError
 from world.files import write_whole
-from world.scenario import Scenario, embedded_scenarios, load_scenario, over_terrain, with_flight, with_wind
+from world.scenario import Scenario, embedded_scenarios, load_scenario
+from world.scenario_changes import over_terrain, with_flight, with_wind
 
 if TYPE_CHECKING:
     pass
@@ -38,9 +39,8 @@ def run(args: argparse.Namespace) -> int:
 
 def plan(args: argparse.Namespace) -> int:
     """``planfly plan``, and planning again with ``--from``."""
-    from planfly.pipeline import choose_seed, load_vehicle
-    from planfly.planning import make_plan, prepare
-    from planfly.results import print_plan
+    from planfly.planning import make_plan, prepare, print_plan
+    from planfly.vehicle import choose_seed, load_vehicle
     from planner.plan import plan_json
 
     scenario, old = prepare(args, load_scenario(args.scenario))

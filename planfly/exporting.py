@@ -12,8 +12,8 @@ from logs.reader import read_log
 from planfly.exit_codes import FLYABLE, LOSS
 from planfly.files import refuse_existing
 from planfly.missions import open_mission
-from planfly.pipeline import load_vehicle
 from planfly.results import print_warnings
+from planfly.vehicle import load_vehicle
 from planner.plan import read_plan
 from world.errors import MissionError
 from world.files import write_whole

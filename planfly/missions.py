@@ -8,7 +8,8 @@ from flight.export import plan_mission
 from flight.foreign import foreign_scenario
 from flight.mission_files import read_mission
 from flight.setup import FlightSetup
-from planfly.pipeline import Vehicle, choose_seed, load_vehicle, make_setup
+from planfly.pipeline import make_setup
+from planfly.vehicle import Vehicle, choose_seed, load_vehicle
 from planner.plan import read_plan
 from world.errors import MissionError
 from world.scenario import Scenario, load_scenario

@@ -12,7 +12,9 @@ from multiprocessing import get_context
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.pipeline import Advance, load_vehicle, make_plan
+from planfly.pipeline import make_plan
+from planfly.progress import Advance
+from planfly.vehicle import load_vehicle
 from planner.algorithms import find_algorithm
 from planner.plan import Objective
 from world.scenario import Scenario, load_scenario

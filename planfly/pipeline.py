@@ -1,13 +1,8 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from aircraft.catalog import Aircraft, find_aircraft, model_hash
-from aircraft.envelope import Envelope
-from flight.envelope import load_envelope
 from flight.export import plan_mission
 from flight.mission import Mission
 from flight.mission_files import mission_text
@@ -20,15 +15,14 @@ from logs.check import judge_flight, judge_plan_only
 from logs.reader import LogEvent
 from logs.recorder import Recorder, thin_track
 from logs.verdict import Verdict
+from planfly.progress import Advance
+from planfly.vehicle import Vehicle, choose_seed, load_vehicle
 from planner.plan import Plan
 from planner.search import plan_path
-from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
 
 # Seconds of flight that are written at a time: some milliseconds of a simulated flight.
 _BATCH = 10
-
-Advance = Callable[[float, float, str], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,20 +33,6 @@ class PlanThenFly:
     mission: Mission
     track: Track | None
     verdict: Verdict
-
-
-@dataclass(frozen=True, slots=True)
-class Vehicle:
-    """The aircraft of a scenario and what it can do.
-
-    airspeed: m/s.  max_bank: rad.  battery: Wh.
-    """
-
-    aircraft: Aircraft
-    envelope: Envelope
-    airspeed: float
-    max_bank: float
-    battery: float
 
 
 def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
@@ -72,37 +52,6 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     setup = make_setup(world, vehicle, mission, number, plan=plan)
     track, _, verdict = fly(setup, vehicle, None if log is None else Path(log))
     return PlanThenFly(plan, mission, track, verdict)
-
-
-def choose_seed(scenario: Scenario, seed: int | None) -> int:
-    """The seed asked for, else the scenario's, else 1."""
-    if seed is not None:
-        return seed
-    return scenario.planner.seed if scenario.planner.seed is not None else 1
-
-
-def load_vehicle(scenario: Scenario) -> Vehicle:
-    """The scenario's aircraft.  Raises ScenarioError for an unknown one or a speed it cannot fly."""
-    table = scenario.flight
-    try:
-        aircraft = find_aircraft(table.aircraft)
-        model_hash(aircraft)
-    except ValueError as error:
-        raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
-    airspeed = aircraft.airspeed if table.airspeed_mps is None else table.airspeed_mps
-    if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        raise ScenarioError(
-            f"{scenario.name}: flight.airspeed_mps: {airspeed:g}: {aircraft.name} flies "
-            f"{aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
-        )
-    if scenario.wind.speed > 0.8 * airspeed:
-        raise ScenarioError(
-            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: at most 80 % of the airspeed {airspeed:g}, "
-            "to make way on every course"
-        )
-    envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
-    battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
-    return Vehicle(aircraft, envelope, airspeed, min(math.radians(table.max_bank_deg), envelope.max_bank), battery)
 
 
 def make_plan(

@@ -9,13 +9,16 @@ from pathlib import Path
 from types import FrameType
 
 from flight.setup import make_limits
-from planfly.pipeline import Advance, Vehicle
-from planner.plan import Plan, read_plan
+from planfly.progress import Advance
+from planfly.vehicle import Vehicle
+from planner.blocked import what_blocks
+from planner.plan import Objective, Plan, read_plan
 from planner.replan import replan
 from planner.run import Stop
 from planner.search import plan_path
 from world.errors import ScenarioError
-from world.scenario import Scenario, with_planner, with_threats
+from world.scenario import Scenario
+from world.scenario_changes import with_planner, with_threats
 
 
 @contextmanager
@@ -75,3 +78,20 @@ def make_plan(
         return replan(
             scenario, limits, old, args.at_leg, seed=seed, algorithm=args.algorithm, progress=advance, stop=stop
         )
+
+
+def print_plan(plan: Plan) -> None:
+    """A plan on the terminal."""
+    state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
+    length = float(plan.objectives[Objective.LENGTH_RATIO])
+    print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
+    if plan.ended != "completed":
+        why = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
+        print(f"  note    the search was ended {why}, after {plan.evaluations:,} evaluations: the best plan so far")
+    if plan.flown_legs:
+        print(f"  note    legs 0..{plan.flown_legs - 1} are flown and kept; judged is what follows them")
+    for problem in plan.certificate.problems:
+        print(f"  failed  {problem}")
+    if not plan.feasible:
+        for line in what_blocks(plan):
+            print(f"  note    {line}")

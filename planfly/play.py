@@ -5,11 +5,11 @@ import time
 
 import numpy as np
 
+from flight.downlink import INFO
 from flight.link import Link
 from flight.mission import Home
 from flight.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, status_texts, telemetry_message
 from flight.track import COLUMNS
-from flight.vehicle import INFO
 from flight.watch import Watcher
 from logs.reader import FlightLog
 from planfly.link_options import Stopped, link_access, stop_signals

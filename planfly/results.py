@@ -10,8 +10,6 @@ from flight.setup import FlightSetup
 from flight.track import Track
 from logs.reader import LogEvent
 from logs.verdict import Finding, Verdict, verdict_json
-from planner.blocked import what_blocks
-from planner.plan import Objective, Plan
 from world.files import write_whole
 
 # Findings of a passing rule are many; the terminal shows the closest one of each.
@@ -66,23 +64,6 @@ def _state(findings: list[Finding]) -> str:
                 f" against {tightest.limit:.4g} ({tightest.limit_source})"
             )
     return text
-
-
-def print_plan(plan: Plan) -> None:
-    """A plan on the terminal."""
-    state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
-    length = float(plan.objectives[Objective.LENGTH_RATIO])
-    print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
-    if plan.ended != "completed":
-        why = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
-        print(f"  note    the search was ended {why}, after {plan.evaluations:,} evaluations: the best plan so far")
-    if plan.flown_legs:
-        print(f"  note    legs 0..{plan.flown_legs - 1} are flown and kept; judged is what follows them")
-    for problem in plan.certificate.problems:
-        print(f"  failed  {problem}")
-    if not plan.feasible:
-        for line in what_blocks(plan):
-            print(f"  note    {line}")
 
 
 def print_warnings(warnings: Iterable[str]) -> None:

@@ -9,13 +9,15 @@ from flight.export import plan_mission
 from logs.check import judge_plan_only
 from logs.verdict import Verdict
 from planfly.files import RUN_FILES, default_folder, prepare_folder, refuse_folder
-from planfly.pipeline import choose_seed, flight_events, fly, load_vehicle, make_plan, make_setup
+from planfly.pipeline import flight_events, fly, make_plan, make_setup
 from planfly.progress import progress
 from planfly.refine import refine
 from planfly.results import print_verdict, write_missions, write_pictures, write_verdict
+from planfly.vehicle import choose_seed, load_vehicle
 from planner.plan import plan_json
 from world.files import write_whole
-from world.scenario import Scenario, load_scenario, with_flight
+from world.scenario import Scenario, load_scenario
+from world.scenario_changes import with_flight
 
 
 def run(args: argparse.Namespace) -> Verdict:

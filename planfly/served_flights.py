@@ -9,19 +9,20 @@ from pathlib import Path
 
 import numpy as np
 
+from flight.downlink import CRITICAL, INFO, NOTICE, WARNING
 from flight.flight_process import Judge, Landed, Ready, Up, Words, answer, serve_flights
 from flight.mission import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.setup import FlightSetup
 from flight.simulate import Flight, as_track
 from flight.track import Track, join_tracks
-from flight.vehicle import CRITICAL, INFO, NOTICE, WARNING
 from flight.watch import Watcher
 from logs.check import judge_flight, judge_geometry
 from logs.recorder import Recorder
 from logs.verdict import Finding, Verdict
 from planfly.missions import open_mission
-from planfly.pipeline import Vehicle as Airframe
-from planfly.pipeline import load_vehicle, make_setup
+from planfly.pipeline import make_setup
+from planfly.vehicle import Vehicle as Airframe
+from planfly.vehicle import load_vehicle
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario

@@ -1,7 +1,6 @@
 """The continuous check of a finished path: every leg and every fly-by arc, not six points a leg."""
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +21,7 @@ from planner.plan import Certificate
 from planner.problem import SPARE, Problem
 from planner.reserve import RESERVE_GROWTH
 from planner.rules import Rules
-from world.geometry import leg_runs, leg_slopes, sphere_window, turning_angles
+from world.geometry import leg_runs, leg_slopes, turning_angles
 from world.limits import arc_slope, turn_tangents
 from world.terrain import segment_clearance
 
@@ -45,17 +44,6 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     clearance = _clearance(rules, waypoints, problems)
     bounds = _bounds(rules, waypoints, problems)
     return Certificate(turn, room, slope, clearance, bounds, kill_distance(rules, waypoints), tuple(problems))
-
-
-def pieces(rules: Rules, waypoints: Floats) -> Iterator[tuple[str, Floats, Floats]]:
-    """Segments of the path and of its fly-by arcs: what it is ("leg 2"), and both ends (3,)."""
-    for i in range(len(waypoints) - 1):
-        yield f"leg {i}", waypoints[i], waypoints[i + 1]
-    radii = corner_radii(rules, waypoints)
-    for i in range(1, len(waypoints) - 1):
-        arc = corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
-        for k in range(max(1, len(arc) - 1)):
-            yield f"turn at waypoint {i}", arc[k], arc[min(k + 1, len(arc) - 1)]
 
 
 def kill_distance(rules: Rules, waypoints: Floats) -> float:
@@ -184,8 +172,7 @@ def _arc_slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
 
 def _slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
     least = _arc_slopes(rules, waypoints, problems)
-    for i, slope in enumerate(leg_slopes(waypoints)):
-        climb, dive = slope_limits(rules, waypoints[i], waypoints[i + 1])
+    for i, (slope, (climb, dive)) in enumerate(zip(leg_slopes(waypoints), _leg_limits(rules, waypoints), strict=True)):
         inside = min(climb - slope, dive + slope)
         least = min(least, inside + rules.spare)
         if inside < -_EPSILON:
@@ -195,18 +182,29 @@ def _slopes(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
     return float(least)
 
 
+@compiled
+def _leg_limits(rules: Rules, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
+    """Steepest climb and dive (w - 1, 2) of each leg, rad."""
+    out = np.empty((waypoints.shape[0] - 1, 2))
+    for i in range(out.shape[0]):
+        out[i, 0], out[i, 1] = slope_limits(rules, waypoints[i], waypoints[i + 1])
+    return out
+
+
 def _clearance(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
     least = math.inf
     low: dict[str, float] = {}
-    for name, a, b in pieces(rules, waypoints):
-        height, _ = segment_clearance(rules.heights, rules.to_pixel, a, b)
+    for turn, place, height, reserve in _heights(rules, waypoints):
+        if height - rules.clearance >= reserve - _EPSILON:
+            least = min(least, height - rules.clearance) if not math.isnan(least) else least
+            continue
+        name = f"turn at waypoint {place:.0f}" if turn else f"leg {place:.0f}"
         if math.isnan(height):
-            low[name] = math.nan
-            least = math.nan
+            low[name] = least = math.nan
             continue
         margin = float(height) - rules.clearance
         least = min(least, margin) if not math.isnan(least) else least
-        if margin < _reserve(rules, a, b) - _EPSILON and not low.get(name, math.inf) <= margin:
+        if not low.get(name, math.inf) <= margin:
             low[name] = margin
     for name, margin in low.items():
         if math.isnan(margin):
@@ -217,7 +215,36 @@ def _clearance(rules: Rules, waypoints: Floats, problems: list[str]) -> float:
     return float(least)
 
 
-def _reserve(rules: Rules, a: Floats, b: Floats) -> float:
+@compiled
+def _heights(rules: Rules, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
+    """Segments of the path and then of its fly-by arcs, one a row.
+
+    Columns: 1 for an arc's; number of the leg or waypoint; least height above ground, NaN off the terrain; reserve
+    wanted.
+    """
+    last = waypoints.shape[0] - 1
+    radii = corner_radii(rules, waypoints)
+    out = np.empty((last, 4))
+    for i in range(last):
+        _height(rules, waypoints[i], waypoints[i + 1], 0.0, i, out[i])
+    for i in range(1, last):
+        arc = corner(rules, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        rows = np.empty((max(1, arc.shape[0] - 1), 4))
+        for k in range(rows.shape[0]):
+            _height(rules, arc[k], arc[min(k + 1, arc.shape[0] - 1)], 1.0, i, rows[k])
+        out = np.concatenate((out, rows))
+    return out
+
+
+@compiled
+def _height(rules: Rules, a: Floats, b: Floats, turn: float, place: int, out: Floats) -> None:  # pragma: no cover
+    out[0], out[1] = turn, place
+    out[2], _ = segment_clearance(rules.heights, rules.to_pixel, a, b)
+    out[3] = _reserve(rules, a, b)
+
+
+@compiled
+def _reserve(rules: Rules, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
     """Reserve wanted on a piece: fixed ends may have less, and it grows from where the piece is nearest to them.
 
     It grows half as fast as a search asks, for what lies between the search's samples.
@@ -225,10 +252,12 @@ def _reserve(rules: Rules, a: Floats, b: Floats) -> float:
     reserve = rules.reserve
     for end, slack in ((rules.start, rules.start_slack), (rules.destination, rules.destination_slack)):
         if slack < reserve:
-            flat = np.array([end[0], end[1], 0.0])
-            away, _, _ = sphere_window(np.array([a[0], a[1], 0.0]), np.array([b[0], b[1], 0.0]), flat, 0.0)
+            dx, dy, x, y = b[0] - a[0], b[1] - a[1], a[0] - end[0], a[1] - end[1]
+            run2 = dx * dx + dy * dy
+            f = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
+            away = math.sqrt((x + f * dx) ** 2 + (y + f * dy) ** 2)
             reserve = min(reserve, slack + 0.5 * RESERVE_GROWTH * away)
-    return float(reserve)
+    return reserve
 
 
 def _bounds(rules: Rules, waypoints: Floats, problems: list[str]) -> float:

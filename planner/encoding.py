@@ -101,11 +101,9 @@ def rotated(space: Space, waypoints: int) -> Encoding:
     """Paper's encoding: inner waypoint i lies in the i-th of w - 2 equal intervals along the way (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
-    lower, upper = np.empty((waypoints - 2, 3)), np.empty((waypoints - 2, 3))
-    for i in range(waypoints - 2):
-        low, high = _across_span(frame, space, edges[i], edges[i + 1])
-        lower[i] = edges[i], low, space.up[0]
-        upper[i] = edges[i + 1], high, space.up[1]
+    left, right = _across_spans(frame, space, edges)
+    lower = np.column_stack([edges[:-1], left, np.full(waypoints - 2, space.up[0])])
+    upper = np.column_stack([edges[1:], right, np.full(waypoints - 2, space.up[1])])
 
     def decode(vectors: Floats) -> Floats:
         return _with_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
@@ -119,23 +117,25 @@ def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
     return np.clip(inner.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
-def _across_span(frame: Frame, space: Space, low: float, high: float) -> tuple[float, float]:
-    """Span across the line that the map covers between two distances along; +-across where that is given."""
+def _across_spans(frame: Frame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
+    """Span (k,), (k,) across the line that the map covers between each two edges (k + 1,) along.
+
+    +-across where that is given.
+    """
     if space.across is not None:
-        return -space.across, space.across
+        return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
     c, s = frame.direction
-    best_low, best_high = math.inf, -math.inf
-    for along in np.linspace(low, high, 9):
-        a, b = -math.inf, math.inf
-        for axis, (base, slope) in enumerate(((c * along, -s), (s * along, c))):
-            first = space.bounds[axis, 0] - frame.origin[axis] - base
-            last = space.bounds[axis, 1] - frame.origin[axis] - base
-            if abs(slope) > 1e-12:
-                a, b = max(a, min(first / slope, last / slope)), min(b, max(first / slope, last / slope))
-        best_low, best_high = min(best_low, a), max(best_high, b)
-    if not best_high - best_low >= 1.0:
-        return -1.0, 1.0
-    return best_low, best_high
+    along = np.linspace(edges[:-1], edges[1:], 9, axis=1)
+    a, b = np.full(along.shape, -math.inf), np.full(along.shape, math.inf)
+    for axis, (share, slope) in enumerate(((c, -s), (s, c))):
+        first = space.bounds[axis, 0] - frame.origin[axis] - share * along
+        last = space.bounds[axis, 1] - frame.origin[axis] - share * along
+        if abs(slope) > 1e-12:
+            a = np.maximum(a, np.minimum(first / slope, last / slope))
+            b = np.minimum(b, np.maximum(first / slope, last / slope))
+    low, high = a.min(axis=1), b.max(axis=1)
+    narrow = ~(high - low >= 1.0)
+    return np.where(narrow, -1.0, low), np.where(narrow, 1.0, high)
 
 
 def cartesian(space: Space, waypoints: int) -> Encoding:

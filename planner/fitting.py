@@ -1,6 +1,8 @@
 """Waypoints along a grid's route: a dynamic programme over places near it, in which whole legs are judged."""
 
 import math
+from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,14 +10,14 @@ from numpy.typing import NDArray
 from aircraft.compiled import compiled
 from planner.encoding import Frame
 from planner.graded import kill_density, pixels, terrain_excess
+from planner.grids import KILL_COST
 from planner.legs import Gauge, make_gauge, slope_excess
 from planner.rules import Rules
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Cost of a m inside a kill sphere, of a m of depth x km, and of a unit of slope excess, in m of path.
-KILL_COST = 40.0
+# Cost of a m of depth x km, and of a unit of slope excess, in m of path.
 DEPTH_COST = 2e4
 SLOPE_COST = 1e6
 
@@ -77,26 +79,42 @@ def _choose(rules: Rules, candidates: Floats) -> Ints:  # pragma: no cover - com
     return out
 
 
-def fit_waypoints(rules: Rules, frame: Frame, route: Floats, waypoints: int, rounds: int = 2) -> Floats:
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How closely waypoints are fitted to a route.
+
+    places: along each interval.  lifts: m above the route.  rounds: of moves of each waypoint.  diagonal: to the 26
+    places around it, not the 6 beside it.
+    """
+
+    places: int
+    lifts: tuple[float, ...]
+    rounds: int
+    diagonal: bool
+
+
+CLOSE, QUICK = Fit(9, (0.0, 20.0, 60.0), 2, diagonal=True), Fit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
+# Steps to the places around a place, and to itself, along, across and up.
+_AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
+_BESIDE = _AROUND[np.abs(_AROUND).sum(axis=1) <= 1.0]
+
+
+def fit_waypoints(rules: Rules, frame: Frame, route: Floats, waypoints: int, fit: Fit = CLOSE) -> Floats:
     """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one an interval, tight as whole legs allow."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
-    shares = np.linspace(0.1, 0.9, 9)
-    height = 20.0
-    candidates = np.empty((waypoints, shares.size * 3, 3))
-    for i in range(waypoints - 2):
-        along = edges[i] + shares * (edges[i + 1] - edges[i])
-        points = np.column_stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))])
-        for k, lift in enumerate((0.0, height, 3.0 * height)):
-            candidates[i + 1, k * shares.size : (k + 1) * shares.size] = points + np.array([0.0, 0.0, lift])
-    chosen = _pick(rules, frame, candidates)
     span = edges[1] - edges[0]
-    offsets = np.array([[a, b, c] for a in (-1, 0, 1) for b in (-1, 0, 1) for c in (-1, 0, 1)], dtype=np.float64)
-    reach = np.array([0.25 * span, 0.2 * span, 40.0])
-    for _ in range(rounds):
-        candidates = np.repeat(chosen[:, None, :], len(offsets), axis=1)
-        candidates[1:-1] += offsets * reach
-        low, high = edges[:-1, None], edges[1:, None]
-        candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
+    shares = np.linspace(0.1, 0.9, fit.places)
+    along = edges[:-1, None] + shares * span
+    points = np.stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))], axis=-1)
+    candidates = np.zeros((waypoints, fit.places * len(fit.lifts), 3))
+    candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
+    candidates[1:-1, :, 2] += np.repeat(fit.lifts, fit.places)
+    chosen = _pick(rules, frame, candidates)
+    reach, steps = np.array([0.25 * span, 0.2 * span, 40.0]), _AROUND if fit.diagonal else _BESIDE
+    for _ in range(fit.rounds):
+        candidates = np.repeat(chosen[:, None, :], len(steps), axis=1)
+        candidates[1:-1] += steps * reach
+        candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], edges[:-1, None], edges[1:, None])
         candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], rules.floor, rules.ceiling)
         chosen = _pick(rules, frame, candidates)
         reach *= 0.7

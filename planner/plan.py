@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from world.errors import MissionError, ScenarioError
-from world.scenario import Scenario, fixed_ends, from_spec
+from world.scenario import Scenario, from_spec
+from world.scenario_changes import fixed_ends
 from world.scenario_file import first_error
 from world.terrain import Terrain
 

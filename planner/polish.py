@@ -5,6 +5,7 @@ way round the obstacles; the last percent of its length this finds with fewer ev
 """
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from planner.legs import Gauge, make_gauge
 from planner.rules import Rules
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 # Prices of violations, in length ratios: a unit of turn (rad), slope, terrain (m x km), bounds (m), and of exposure.
 PRICES = np.array([2.0, 20.0, 0.5, 1.0, 5.0])
@@ -37,16 +39,18 @@ def polish(rules: Rules, encoding: Encoding, vector: Floats, evaluations: int) -
     inner = encoding.waypoints - 2
     span = frame.length / inner
     packed = np.array([*frame.origin, *frame.direction])
-    moves, steps = _moves(inner, np.array([FIRST_ALONG * span, FIRST_ACROSS * span, FIRST_UP]))
+    moves, axes = _hats(inner)
+    steps = np.array([FIRST_ALONG * span, FIRST_ACROSS * span, FIRST_UP])[axes]
     start = np.array(vector, dtype=np.float64)
     found, fit, made = _search(rules, packed, encoding.lower, encoding.upper, start, moves, steps, evaluations)
     return found[:1] if fit else found[1:] if math.isinf(found[0, 0]) else found, int(made)
 
 
-def _moves(inner: int, first: Floats) -> tuple[Floats, Floats]:
-    """Moves (k, 3 inner) and their first steps (k,): hats of 1, 2, 4, ... waypoints to either side, by axis."""
+@cache
+def _hats(inner: int) -> tuple[Floats, Ints]:
+    """Moves (k, 3 inner), hats of 1, 2, 4, ... waypoints to either side, and the axis (k,) along which each is."""
     rows: list[Floats] = []
-    sizes: list[float] = []
+    axes: list[int] = []
     place = np.arange(inner, dtype=np.float64)
     width = 1
     while width <= max(1, inner // 2):
@@ -58,9 +62,9 @@ def _moves(inner: int, first: Floats) -> tuple[Floats, Floats]:
                 move = np.zeros((inner, 3))
                 move[:, axis] = hat
                 rows.append(move.ravel())
-                sizes.append(float(first[axis]))
+                axes.append(axis)
         width *= 2
-    return np.array(rows), np.array(sizes)
+    return np.array(rows), np.array(axes)
 
 
 @compiled

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import make_cells
+from planner.cells import Cells, make_cells
 from planner.encoding import Space
 from planner.rules import CORNER_SLACK, Rules
 from world.errors import ScenarioError
@@ -61,18 +61,20 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
         if value is not None and value <= SPARE:
             allowed = 'a plan keeps 0.5 inside it; allowed: above 0.5, or "aircraft"'
             raise ScenarioError(f"{scenario.name}: limits.{name}_deg: {math.degrees(value):g}: {allowed}")
+    certified = _rules(scenario, limits)
     reserve = SEARCH_RESERVE + attempt * ATTEMPT_RESERVE
-    search = _inset(_rules(scenario, limits, reserve, SEARCH_KILL_MARGIN))
+    search = _inset(_with_margins(certified, scenario, limits, reserve, SEARCH_KILL_MARGIN))
     return Problem(
         scenario=scenario,
         limits=limits,
         search=search,
-        certified=_rules(scenario, limits, CERTIFIED_RESERVE, CERTIFIED_KILL_MARGIN, CERTIFIED_SLACK),
+        certified=certified,
         space=_space(scenario, search),
     )
 
 
-def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: float, share: float = 1.0) -> Rules:
+def _rules(scenario: Scenario, limits: Limits) -> Rules:
+    """Rules of the certificate."""
     terrain, threats = scenario.terrain, scenario.threats
     if terrain is None:  # pragma: no cover - make_problem has checked
         raise ScenarioError(f"{scenario.name}: terrain: none given")
@@ -80,13 +82,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         [threats.position, threats.kill_radius, threats.kill_scale, threats.detection_radius, threats.detection_scale]
     )
 
-    def slack(point: Floats) -> float:
-        above = float(point[2] - terrain.height(point[0], point[1]))
-        left = above - limits.min_clearance - 0.01
-        return reserve if left >= reserve else share * max(0.0, left)
-
     reach = np.maximum(threats.kill_radius, threats.detection_radius)
-    armed = np.where(threats.kill_radius > 0.0, threats.kill_radius + kill_margin, 0.0)
 
     def or_nan(value: float | None) -> float:
         return math.nan if value is None else float(value)
@@ -108,18 +104,45 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         dive=or_nan(limits.max_dive),
         spare=SPARE,
         clearance=float(limits.min_clearance),
-        reserve=reserve,
-        kill_margin=kill_margin,
+        reserve=CERTIFIED_RESERVE,
+        kill_margin=CERTIFIED_KILL_MARGIN,
         pitch=min(50.0, max(15.0, 0.4 * terrain.spacing)),
         start_course=or_nan(scenario.start_course),
         destination_course=or_nan(scenario.destination_course),
-        start_slack=slack(scenario.start),
-        destination_slack=slack(scenario.destination),
+        start_slack=_slack(scenario, limits, scenario.start, CERTIFIED_RESERVE, CERTIFIED_SLACK),
+        destination_slack=_slack(scenario, limits, scenario.destination, CERTIFIED_RESERVE, CERTIFIED_SLACK),
         near=make_cells(threats.position, reach, scenario.bounds),
-        # Half a cell's side on either side of points that stand a side apart.
-        missiles=make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK),
+        missiles=_missiles(scenario, CERTIFIED_KILL_MARGIN),
         steepest=float(steepest_slope(terrain.heights, terrain.spacing)),
     )
+
+
+def _with_margins(rules: Rules, scenario: Scenario, limits: Limits, reserve: float, kill_margin: float) -> Rules:
+    """The same rules with another reserve and another distance from missiles."""
+    return rules._replace(
+        reserve=reserve,
+        kill_margin=kill_margin,
+        start_slack=_slack(scenario, limits, scenario.start, reserve),
+        destination_slack=_slack(scenario, limits, scenario.destination, reserve),
+        missiles=_missiles(scenario, kill_margin),
+    )
+
+
+def _slack(scenario: Scenario, limits: Limits, point: Floats, reserve: float, share: float = 1.0) -> float:
+    """Reserve at a fixed end, m: all of it, or the share of what the end leaves."""
+    if scenario.terrain is None:  # pragma: no cover - make_problem has checked
+        return reserve
+    above = float(point[2] - scenario.terrain.height(point[0], point[1]))
+    left = above - limits.min_clearance - 0.01
+    return reserve if left >= reserve else share * max(0.0, left)
+
+
+def _missiles(scenario: Scenario, kill_margin: float) -> Cells:
+    """Missiles by the stretches of path that they may reach."""
+    threats = scenario.threats
+    armed = np.where(threats.kill_radius > 0.0, threats.kill_radius + kill_margin, 0.0)
+    # Half a cell's side on either side of points that stand a side apart.
+    return make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK)
 
 
 def _with_share(limits: Limits, turbulence: str) -> Floats:

@@ -21,6 +21,7 @@ from world.errors import ScenarioError
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
 Stop = Callable[[], str]
+Improved = Callable[[Floats], None]
 
 # Columns of the scores that a search ranks: four violations, then the four objectives.
 VIOLATIONS = Level((0, 1, 2, 3), (0.0, 0.0, 0.0, 0.0))
@@ -62,7 +63,8 @@ class Run:
     """What attempts share: how much was evaluated, and what was seen after each generation.
 
     stop: asked after each generation and each seed; a text ends the search and says why.  wanted: distance (m) from
-    missiles that the certificate of a finished path has.  ended: why the search ended.
+    missiles that the certificate of a finished path has.  improved: called with each path (w, 3) that is the best yet
+    of those that meet the constraints.  ended: why the search ended.  judged: certificates by the path's vector.
     """
 
     problem: Problem
@@ -73,11 +75,13 @@ class Run:
     stop: Stop | None
     first_safe: bool
     wanted: float
+    improved: Improved | None = None
     archive: Archive = field(init=False)
     evaluations: int = 0
     done: int = 0
     ended: str = "completed"
     history: list[tuple[float, float, float]] = field(default_factory=list)
+    judged: dict[bytes, Certificate] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Begin with nothing."""
@@ -93,7 +97,11 @@ class Run:
             violations, objectives = paper_scores(self.problem.search, paths)
         scores = np.concatenate([violations.astype(np.float64), objectives], axis=1)
         self.evaluations += len(vectors)
+        before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
+        best = self.archive.vectors[:1]
+        if self.improved is not None and not self.archive.scores[0, :4].any() and not np.array_equal(before, best):
+            self.improved(self.encoding.decode(best)[0])
         return scores
 
     def polish(self, vector: Floats, most: int) -> Floats:
@@ -144,11 +152,11 @@ class Run:
 
     def best_certified(self) -> tuple[Floats, Certificate]:
         """First of the archive that is certified and out of reach; or certified and farthest; or the first."""
-        paths = np.ascontiguousarray(self.encoding.decode(self.archive.vectors))
         first: tuple[Floats, Certificate] | None = None
         reachable: tuple[Floats, Certificate] | None = None
-        for path in paths:
-            certificate = certify(self.problem, path)
+        for vector in self.archive.vectors:
+            path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
+            certificate = self._certificate(vector, path)
             if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
                 return path, certificate
             first = first or (path, certificate)
@@ -159,3 +167,11 @@ class Run:
         if result is None:  # pragma: no cover - an archive is never empty after an attempt
             raise ScenarioError(f"{self.problem.scenario.name}: planner: nothing was evaluated")
         return result
+
+    def _certificate(self, vector: Floats, path: Floats) -> Certificate:
+        """Certificate of a vector's path: the same in all attempts, so it is made once."""
+        key = vector.tobytes()
+        known = self.judged.get(key)
+        if known is None:
+            known = self.judged[key] = certify(self.problem, path)
+        return known

@@ -1,7 +1,6 @@
 """Running an algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
-from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,13 +11,26 @@ from planner.chain import Chain
 from planner.criteria import paper_scores
 from planner.differential import Differential
 from planner.emna import Emna
-from planner.encoding import ENCODINGS, rotated_vectors
+from planner.encoding import ENCODINGS, rotated_frame, rotated_vectors
+from planner.fitting import QUICK, fit_waypoints
 from planner.plan import Certificate, Plan
 from planner.preference import NO_GOAL, Level, ranks
 from planner.problem import CERTIFIED_KILL_MARGIN, make_problem
-from planner.run import ARCHIVE_LEVELS, DETECTION, HEIGHT, KILL, LENGTH, VIOLATIONS, Archive, Progress, Run, Stop
+from planner.run import (
+    ARCHIVE_LEVELS,
+    DETECTION,
+    HEIGHT,
+    KILL,
+    LENGTH,
+    VIOLATIONS,
+    Archive,
+    Improved,
+    Progress,
+    Run,
+    Stop,
+)
 from planner.sampling import bridge_basis, first_samples
-from planner.seeding import routes
+from planner.seeding import Route, grid_routes
 from planner.umda import Umda
 from world.errors import ScenarioError
 from world.limits import Limits
@@ -39,8 +51,8 @@ ATTEMPTS = (
 PATIENCE, GAIN = 10, 2e-4
 # Of the evaluations that the paper's planner makes, the share that a seeded search spends before its last polish.
 SHARE = 0.3
-# Evaluations that each seed, and the best path at the end, are polished with, at most.
-SEED_POLISH, LAST_POLISH = 500, 2500
+# Evaluations that a quick path, each seed, and the best path at the end are polished with, at most.
+QUICK_POLISH, SEED_POLISH, LAST_POLISH = 50, 500, 2500
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
 
@@ -53,6 +65,7 @@ def plan_path(
     algorithm: str | None = None,
     progress: Progress | None = None,
     stop: Stop | None = None,
+    improved: Improved | None = None,
     first_safe: bool = False,
     previous: Floats | None = None,
 ) -> Plan:
@@ -60,7 +73,8 @@ def plan_path(
 
     algorithm: a name of `planner.algorithms`; None takes the scenario's, or the default.  progress: called with
     generations done, generations in all, and a short text.  stop: asked between generations; a text such as
-    "interrupted" ends the search with the best path yet, and stands in the plan.  first_safe: end with the first
+    "interrupted" ends the search with the best path yet, and stands in the plan.  improved: called with each path
+    (w, 3) that meets the constraints better than all before it, not yet certified.  first_safe: end with the first
     safe path.  previous: (w, 3) an older path of the same ends and number of waypoints to start from.
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
@@ -71,7 +85,7 @@ def plan_path(
     # No path is further from a missile's sphere than its own ends are.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
-    run = Run(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted)
+    run = Run(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
     waypoints, certificate = _attempts(run, previous)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
@@ -196,20 +210,41 @@ def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | Non
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += older
     polished = [run.polish(vector, SEED_POLISH) for vector in starts]
-    if run.algorithm.seeded:
-        if run.progress is not None:
-            run.progress(run.done, run.done + run.problem.scenario.planner.generations, "grid routes")
-        span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-        found = (routes(run.problem.search, span, waypoints, (stages,), each) for stages, each in grids)
-        for path in chain.from_iterable(found):
-            starts.append(rotated_vectors(space, encoding, path[None])[0])
-            polished.append(run.polish(starts[-1], SEED_POLISH))
-            if run.over() or run.safe_already():
-                break
+    for route in _routes(run, grids) if run.algorithm.seeded else ():
+        if run.over() or run.safe_already():
+            break
+        path = fit_waypoints(run.problem.search, rotated_frame(space.start, space.destination), route.points, waypoints)
+        starts.append(rotated_vectors(space, encoding, path[None])[0])
+        polished.append(run.polish(starts[-1], SEED_POLISH))
     if not starts:
         return np.empty((0, encoding.lower.size))
     order = np.argsort(ranks(np.array(polished), ARCHIVE_LEVELS), kind="stable")
     return np.array([starts[order[0]], *older])
+
+
+def _routes(run: Run, grids: tuple[tuple[int, int], ...]) -> list[Route]:
+    """Find the grids' routes; the archive sees a path that is quickly fitted to each as soon as it is found.
+
+    Those with the best such paths come first.
+    """
+    encoding, space, rules = run.encoding, run.problem.space, run.problem.search
+    if run.progress is not None:
+        run.progress(run.done, run.done + run.problem.scenario.planner.generations, "grid routes")
+    frame = rotated_frame(space.start, space.destination)
+    span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
+    found, scores = [], []
+    for route in grid_routes(rules, frame, span, grids):
+        found.append(route)
+        path = fit_waypoints(rules, frame, route.points, encoding.waypoints, QUICK)
+        vectors = rotated_vectors(space, encoding, path[None])
+        scores.append(run.evaluate(vectors)[0])
+        if not run.safe_already():
+            scores[-1] = run.polish(vectors[0], QUICK_POLISH)
+        if run.over() or run.safe_already():
+            break
+    if not found:
+        return []
+    return [found[k] for k in np.argsort(ranks(np.array(scores), ARCHIVE_LEVELS), kind="stable")]
 
 
 def _known(scores: Floats | None) -> Floats:

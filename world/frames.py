@@ -8,13 +8,15 @@ import itertools
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pyproj import CRS, Proj, Transformer
-from pyproj.exceptions import ProjError
 
 from aircraft.compiled import compiled
+
+if TYPE_CHECKING:
+    from pyproj import Proj, Transformer
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +30,10 @@ class GeoOrigin:
 
 
 @lru_cache(maxsize=32)
-def _aeqd(origin: GeoOrigin) -> Proj:
+def _aeqd(origin: GeoOrigin) -> "Proj":
+    # Imported here, and below: it brings an HTTP client along, and a scenario in metres needs none of it.
+    from pyproj import Proj
+
     return Proj(proj="aeqd", lat_0=origin.lat_deg, lon_0=origin.lon_deg, ellps="WGS84")
 
 
@@ -44,12 +49,15 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
     return np.asarray(lat), np.asarray(lon)
 
 
-def crs_transformer(crs: str) -> Transformer:
+def crs_transformer(crs: str) -> "Transformer":
     """Make the transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
 
     Heights are never passed through: without a geoid grid PROJ would return them unchanged, in silence.
     Raises ValueError for a CRS that PROJ does not know.
     """
+    from pyproj import CRS, Transformer
+    from pyproj.exceptions import ProjError
+
     try:
         return Transformer.from_crs(CRS.from_epsg(4326), CRS.from_user_input(crs), always_xy=True)
     except ProjError as error:

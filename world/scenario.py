@@ -1,9 +1,9 @@
 """A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, partial
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
@@ -26,7 +26,6 @@ from world.scenario_file import (
     ScenarioFile,
     TerrainTable,
     ThreatTable,
-    WindTable,
     check_scenario,
     first_error,
     parse_scenario,
@@ -163,15 +162,15 @@ def from_spec(
         folder = str(Path(base or "", spec.flight.aircraft).resolve())
         spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft": folder})})
     # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
-    place = _checked(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
-    area = spec.area or _checked(
+    place = checked_table(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
+    area = spec.area or checked_table(
         lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
     )
     spec = spec.model_copy(update={"origin": place, "area": area})
     return _assemble(spec, source, origin, bounds, ground, foreign=foreign, replaced=terrain is not None)
 
 
-def _checked(make: Callable[[], Table], source: str) -> Table:
+def checked_table(make: Callable[[], Table], source: str) -> Table:
     """Make a table of values that no file was checked for.  Raises ScenarioError."""
     try:
         return make()
@@ -182,11 +181,11 @@ def _checked(make: Callable[[], Table], source: str) -> Table:
 def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
     """Replace the terrain by a file, and keep the map where it is: its origin may be the old tile's centre."""
     changes: dict[str, Any] = {
-        "terrain": _checked(lambda: TerrainTable(kind="dem", path=terrain), "--terrain"),
+        "terrain": checked_table(lambda: TerrainTable(kind="dem", path=terrain), "--terrain"),
     }
     if spec.origin is None and spec.terrain.kind == "dem":
         centre = _open_terrain(spec.terrain, source, base)[0].centre
-        changes["origin"] = _checked(
+        changes["origin"] = checked_table(
             lambda: OriginTable(lat_deg=centre.lat_deg, lon_deg=centre.lon_deg), f"{source}: origin"
         )
     return spec.model_copy(update=changes)
@@ -247,104 +246,13 @@ def _assemble(
         start_course=None if spec.start.course_deg is None else math.radians(spec.start.course_deg),
         destination_course=None if spec.destination.course_deg is None else math.radians(spec.destination.course_deg),
         terrain=ground,
-        threats=_threats(spec.threats, source, origin, ground),
+        threats=make_threats(spec.threats, source, origin, ground),
         limits=spec.limits,
         planner=spec.planner,
         flight=spec.flight,
         wind=wind,
         foreign=foreign,
     )
-
-
-def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
-    """Make the same scenario over another elevation file.
-
-    Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
-    Raises TerrainError.
-    """
-    spec = fixed_ends(scenario.to_json(), scenario.start, scenario.destination)
-    return from_spec(spec, scenario.name, terrain=terrain, foreign=scenario.foreign)
-
-
-def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
-    """Give the start and destination of a scenario's JSON data these heights (m AMSL), whatever is below them."""
-    changed = dict(spec)
-    for key, point in (("start", start), ("destination", destination)):
-        if isinstance(spec.get(key), dict):
-            kept = {name: value for name, value in spec[key].items() if name != "height_m"}
-            changed[key] = kept | {"amsl_m": float(point[2])}
-    return changed
-
-
-def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
-    """Make the same scenario in another wind (m/s, rad); None keeps what it has.
-
-    Raises ScenarioError for a wind that a scenario file may not have either.
-    """
-    table = scenario.spec.wind
-    changes: dict[str, Any] = {}
-    if speed is not None and from_course is not None:
-        changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
-    if turbulence is not None:
-        changes["turbulence"] = turbulence
-    changed = _checked(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
-    spec = scenario.spec.model_copy(update={"wind": changed})
-    wind = replace(
-        scenario.wind,
-        speed=spec.wind.speed_mps,
-        from_course=math.radians(spec.wind.from_deg),
-        turbulence=spec.wind.turbulence,
-    )
-    return replace(scenario, spec=spec, wind=wind)
-
-
-def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
-    """Make the same scenario with other entries of [flight]; None keeps what it has.
-
-    Raises ScenarioError for a value that a scenario file may not have either.
-    """
-    given = {key: value for key, value in changes.items() if value is not None}
-    table = _checked(lambda: FlightTable(**(scenario.flight.model_dump() | given)), f"{scenario.name}: flight")
-    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
-
-
-def with_threats(
-    scenario: Scenario,
-    added: Sequence[tuple[float, float, float, float]],
-    source: str,
-    kept: Sequence[ThreatTable] = (),
-) -> Scenario:
-    """Make the same scenario with more threats on its ground: east, north, kill and detection radius (m; 0 for none).
-
-    Their scales are the median shares of the radius of those that the scenario has, or a quarter and a third.
-    source: names them in messages.  kept: tables that come before them.  Raises ScenarioError for a threat that a
-    scenario file may not have either.
-    """
-
-    def share(radius: Floats, scale: Floats, default: float) -> float:
-        armed = radius > 0.0
-        return float(np.median(scale[armed] / radius[armed])) if armed.any() else default
-
-    known = scenario.threats
-    kill_share = share(known.kill_radius, known.kill_scale, 1.0 / 4.0)
-    seen_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
-    tables = [*scenario.spec.threats, *kept]
-    for number, (east, north, kill, seen) in enumerate(added):
-        data: dict[str, Any] = {"name": f"pop-up {len(kept) + number + 1}", "east_m": east, "north_m": north}
-        if kill != 0.0:
-            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_share}
-        if seen != 0.0:
-            data |= {"detection_radius_m": seen, "detection_scale_m": seen * seen_share}
-        tables.append(_checked(partial(ThreatTable, **data), source))
-    spec = scenario.spec.model_copy(update={"threats": tables})
-    return replace(scenario, spec=spec, threats=_threats(tables, source, scenario.origin, scenario.terrain))
-
-
-def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
-    """Make the same scenario with other keys of [planner].  Raises ScenarioError as a file with them would."""
-    table = scenario.planner.model_dump() | changes
-    changed = _checked(lambda: PlannerTable(**table), source)
-    return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed}), planner=changed)
 
 
 def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
@@ -392,7 +300,8 @@ def _check_inside(
             )
 
 
-def _threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
+def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
+    """Stand threats on the ground, or at their own heights.  Raises ScenarioError."""
     positions = np.zeros((len(tables), 3))
     for k, table in enumerate(tables):
         on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})

@@ -1,7 +1,7 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
-``python -m tests.bench [chain] [planner] [peers] [--runs N] [--seconds S]``: parts to measure (default: all), seeds of
-each whole planner run (15), and what OMPL is given (10 s).
+``python -m tests.bench [chain] [planner] [peers] [flight] [aircraft] [--runs N] [--seconds S] [--seeds N]``: parts to
+measure (default: all), seeds of each whole planner run (15), what OMPL is given (10 s), and seeds of flights (20).
 """
 
 import argparse
@@ -14,7 +14,7 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = ("chain", "planner", "peers")
+PARTS = ("chain", "planner", "peers", "flight", "aircraft")
 TARGET = Path("runs") / "bench.json"
 
 
@@ -24,11 +24,12 @@ def main() -> None:
     parser.add_argument("parts", nargs="*", default=[], help=f"of {', '.join(PARTS)}; default: all")
     parser.add_argument("--runs", type=int, default=15, help="seeds of each whole planner run")
     parser.add_argument("--seconds", type=float, default=10.0, help="what OMPL is given")
+    parser.add_argument("--seeds", type=int, default=20, help="seeds of each kind of flight")
     args = parser.parse_args()
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f"{', '.join(sorted(unknown))}: not a part")
     # Imported here: the setting above must come first.
-    from tests.bench import chain, peers, planner
+    from tests.bench import aircraft, chain, flight, peers, planner
 
     TARGET.parent.mkdir(exist_ok=True)
     kept = json.loads(TARGET.read_text(encoding="utf-8")) if TARGET.exists() else {}
@@ -38,6 +39,8 @@ def main() -> None:
         "chain": chain.run,
         "planner": lambda: planner.run(args.runs),
         "peers": lambda: peers.run(args.seconds),
+        "flight": lambda: flight.run(args.seeds),
+        "aircraft": aircraft.run,
     }
     for part in args.parts or PARTS:
         record[part] = work[part]()

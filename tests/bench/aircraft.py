@@ -1,9 +1,10 @@
 """The rows of the aircraft: trim and modes against the book, and predicted limits against flown ones.
 
-``python -m tests.bench.aircraft`` prints them alone; `report` is for ``make bench``.
+``python -m tests.bench.aircraft`` prints them alone; `run` is for ``make bench``.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -97,6 +98,12 @@ def report(*, whole: bool = True) -> dict[str, float]:
     figures["wind: most optimistic leg, m"] = max(x.optimistic for x in windy if x.kind == "leg")
     figures["wind: most conservative, share"] = max(x.conservative for x in windy)
     return figures
+
+
+def run() -> dict[str, Any]:
+    """Measure everything, print a table, and return it."""
+    print()
+    return dict(report())
 
 
 if __name__ == "__main__":

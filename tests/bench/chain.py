@@ -16,7 +16,8 @@ from flight.simulate import FDM_HZ, simulate
 from logs.check import judge_flight
 from logs.reader import read_log
 from logs.recorder import Recorder
-from planfly.pipeline import load_vehicle, make_plan, make_setup
+from planfly.pipeline import make_plan, make_setup
+from planfly.vehicle import load_vehicle
 from world.scenario import load_scenario
 
 ROUNDS = 5

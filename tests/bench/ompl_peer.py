@@ -1,10 +1,15 @@
-"""OMPL's Informed RRT* on a scenario: ``python -m tests.bench.ompl_peer NAME SEED SECONDS`` prints one line of JSON.
+"""OMPL's Informed RRT* on a scenario: ``python -m tests.bench.ompl_peer NAME SEED SECONDS [RATIO]`` prints JSON.
 
 States are points of the map between floor and ceiling; a motion is valid if its leg meets slope, terrain and map and
 no missile reaches it, by the same compiled judge and margins that our search uses.  A tree of straight motions
 knows no turns: each path that is shorter than the last is certified, and the last that passes is reported.
+
+The planner is asked after each of its steps whether its best cost has fallen; if it has, the path is certified, and
+the search goes on.  Seconds are CPU time of the process without those certificates: they are ours.  With RATIO it ends
+with the first certified path of at most that length ratio.
 """
 
+import math
 import sys
 import time
 
@@ -19,8 +24,8 @@ from tests.bench.task import Task, graded_scores, is_safe, make_task
 
 Floats = NDArray[np.float64]
 
-# Between looks at the best cost so far, s.
-SLICE = 0.1
+# Steps of the planner between looks at the clock; to its best cost it looks after each.
+STEPS = 20
 
 
 class Motions(ob.MotionValidator):
@@ -53,6 +58,28 @@ class Motions(ob.MotionValidator):
         return not violations.any() and float(objectives[0, 1]) == 0.0
 
 
+class Watch:
+    """Ends a stretch of the search when its best cost falls, or at a time."""
+
+    def __init__(self, planner: og.InformedRRTstar, seconds: float) -> None:
+        self.planner, self.seconds = planner, seconds
+        self.best, self.steps, self.certifying = math.inf, 0, 0.0
+        self.began = time.process_time()
+
+    def spent(self) -> float:
+        """CPU s since the search began, without our certificates."""
+        return time.process_time() - self.began - self.certifying
+
+    def __call__(self) -> bool:
+        """Whether to end this stretch; the library's callback."""
+        self.steps += 1
+        cost = float(self.planner.bestCost().value())
+        if cost < self.best:
+            self.best = cost
+            return True
+        return self.steps % STEPS == 0 and self.spent() >= self.seconds
+
+
 class Anywhere(ob.StateValidityChecker):
     """States need no check of their own: every motion is judged whole."""
 
@@ -61,13 +88,16 @@ class Anywhere(ob.StateValidityChecker):
         return True
 
 
-def plan(task: Task, seed: int, seconds: float) -> Found:
-    """Run for so many seconds of CPU, compiled code warm; trace: the best cost after each slice that shortened it."""
+def plan(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
+    """Run for so many seconds of CPU, compiled code warm, or to a certified path of this length ratio.
+
+    trace: each certified path that is shorter than those before it.
+    """
     ou.noOutputHandler()
     ou.RNG.setSeed(seed)
-    rules = task.problem.search
     space = ob.RealVectorStateSpace(3)
     box = ob.RealVectorBounds(3)
+    rules = task.problem.search
     low, high = [*rules.bounds[:, 0], rules.floor], [*rules.bounds[:, 1], rules.ceiling]
     for axis in range(3):
         box.setLow(axis, float(low[axis]))
@@ -84,29 +114,34 @@ def plan(task: Task, seed: int, seconds: float) -> Found:
         for axis in range(3):
             state[axis] = float(point[axis])
     setup.setStartAndGoalStates(ends[0], ends[1], 1.0)
-    setup.setPlanner(og.InformedRRTstar(information))
+    planner = og.InformedRRTstar(information)
+    setup.setPlanner(planner)
     setup.setup()
     motions.judge(ends[0], ends[1])
-    straight = float(np.linalg.norm(task.scenario.destination - task.scenario.start))
-    trace: list[tuple[float, float]] = []
-    path, certified = np.stack([task.scenario.start, task.scenario.destination]), False
+    path, shortest = np.stack([task.scenario.start, task.scenario.destination]), math.inf
     is_safe(task.certificate(path))
-    began = time.process_time()
-    while time.process_time() - began < seconds:
-        setup.solve(SLICE)
+    motions.count, motions.nanoseconds = 0, 0
+    trace: list[tuple[float, float]] = []
+    watch = Watch(planner, seconds)
+    spent = 0.0
+    while spent < seconds and not shortest <= ratio:
+        # A condition that has ended one stretch ends every later one: each gets its own.
+        setup.solve(ob.PlannerTerminationCondition(watch))
+        spent = watch.spent()
         if not setup.haveExactSolutionPath():
             continue
-        ratio = float(setup.getSolutionPath().length()) / straight
-        if not trace or ratio < trace[-1][1]:
-            trace.append((time.process_time() - began, ratio))
-            latest = np.array([[state[axis] for axis in range(3)] for state in setup.getSolutionPath().getStates()])
-            latest[-1] = task.scenario.destination
-            safe = is_safe(task.certificate(latest))
-            if safe or not certified:
-                path, certified = latest, safe
-    spent = time.process_time() - began
+        before = time.process_time()
+        latest = np.array([[state[axis] for axis in range(3)] for state in setup.getSolutionPath().getStates()])
+        latest[-1] = task.scenario.destination
+        safe, length = is_safe(task.certificate(latest)), task.length_ratio(latest)
+        if safe and length < shortest:
+            shortest = length
+            trace.append((spent, length))
+        if safe or math.isinf(shortest):
+            path = latest
+        watch.certifying += time.process_time() - before
     return found(task, path, spent, motions.count, motions.nanoseconds / 1e9, trace)
 
 
 if __name__ == "__main__":
-    print(as_json(plan(make_task(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3]))))
+    print(as_json(plan(make_task(sys.argv[1]), int(sys.argv[2]), *(float(text) for text in sys.argv[3:]))))

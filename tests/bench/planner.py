@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.pipeline import load_vehicle
+from planfly.vehicle import load_vehicle
 from planner.algorithms import DEFAULT
 from planner.criteria import paper_scores
 from planner.preference import NO_GOAL, Level, ranks

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.setup import make_limits
-from planfly.pipeline import Vehicle, load_vehicle
+from planfly.vehicle import Vehicle, load_vehicle
 from planner.certify import certify
 from planner.encoding import ENCODINGS, Encoding, rotated_vectors
 from planner.graded import graded_scores
@@ -74,6 +74,11 @@ def best_known(name: str) -> float:
     """Length ratio of the best certified path that is known, NaN where none is (tests/authorities/best_known.json)."""
     known = json.loads(BEST_KNOWN.read_text(encoding="utf-8"))
     return float(known[name]["length_ratio"]) if name in known else float("nan")
+
+
+def all_known() -> list[str]:
+    """The problems of which a best path is known."""
+    return list(json.loads(BEST_KNOWN.read_text(encoding="utf-8")))
 
 
 def with_planner(scenario: Scenario, **changes: object) -> Scenario:

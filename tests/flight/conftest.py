@@ -39,12 +39,12 @@ def make_setup(aerosonde: Aircraft) -> MakeSetup:
     return setup_maker(aerosonde)
 
 
-def setup_maker(aerosonde: Aircraft) -> MakeSetup:
+def setup_maker(aircraft: Aircraft) -> MakeSetup:
     """A setup through these points, (w, 3) m, without a mission file.
 
     wind: speed m/s, from degrees.  speeds: m/s, one or one a leg.  More keywords replace tables of the scenario.
     """
-    envelope = load_envelope(aerosonde)
+    envelope = load_envelope(aircraft)
 
     def make(
         points: ArrayLike,
@@ -81,6 +81,6 @@ def setup_maker(aerosonde: Aircraft) -> MakeSetup:
         cruise = float(route.airspeed[0])
         mission = Mission(None, (), source="made")
         bank = math.radians(bank_deg)
-        return FlightSetup(scenario, mission, "", route, envelope, "aerosonde", cruise, bank, 888.0, seed)
+        return FlightSetup(scenario, mission, "", route, envelope, aircraft.name, cruise, bank, 888.0, seed)
 
     return make

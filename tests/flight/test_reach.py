@@ -19,19 +19,27 @@ def test_calm() -> None:
     assert found.height_max <= 0.2
 
 
+def test_bank_stays_clear_of_the_verdicts_limit() -> None:
+    # The verdict allows 35 degrees; in gusts it judges the mean over a second.
+    found = [bench.calm(), *bench.steady(range(20 if SOAK else 2))]
+    assert all(item.completed for item in found)
+    assert max(item.peak_bank for item in found) <= 34.0
+    assert float(np.percentile([item.cross_max for item in found], 95)) <= 0.4
+
+
 def test_wind_and_moderate_turbulence() -> None:
     found = bench.moderate(range(20 if SOAK else 2))
     assert all(item.completed for item in found)
     assert float(np.median([item.cross_rms for item in found])) <= 0.10
     assert float(np.median([item.height_rms for item in found])) <= 0.20
-    assert float(np.percentile([item.cross_max for item in found], 95)) <= 1.0
-    assert float(np.percentile([item.height_max for item in found], 95)) <= 1.0
+    assert float(np.percentile([item.cross_max for item in found], 95)) <= 0.6
+    assert float(np.percentile([item.height_max for item in found], 95)) <= 0.8
 
 
 def test_any_wind() -> None:
     found = bench.anywhere(range(100 if SOAK else 4))
     assert all(item.completed for item in found)
-    assert float(np.percentile([item.worst for item in found], 95)) <= 1.0
+    assert float(np.percentile([item.worst for item in found], 95)) <= 0.8
 
 
 def test_an_aircraft_that_differs_from_its_model() -> None:
@@ -51,5 +59,5 @@ def test_rivals_on_straight_legs() -> None:
 @pytest.mark.bench
 def test_the_closed_loop_costs_little() -> None:
     # A ratio, side by side; the 1.30 and 1.15 are printed by the bench, with room here for a busy machine.
-    assert bench.loop_ratio(60, rounds=5, seconds=60)[0] < 1.5
-    assert bench.loop_ratio(30, rounds=5, seconds=60)[0] < 1.3
+    assert bench.loop_cost(60, rounds=5, seconds=60).ratio < 1.3
+    assert bench.loop_cost(30, rounds=5, seconds=60).ratio < 1.2

@@ -21,7 +21,8 @@ from planner.plan import Certificate, Plan
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo
 from world.geometry import leg_runs, leg_slopes, turning_angles
-from world.scenario import from_spec, load_scenario, with_wind
+from world.scenario import from_spec, load_scenario
+from world.scenario_changes import with_wind
 from world.terrain import Terrain, flat_terrain
 
 SAMPLES = Path(__file__).parent / "missions"

@@ -9,7 +9,10 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy.signal import welch
 
+from aircraft.catalog import Aircraft
+from flight.simulate import Flight, as_track
 from flight.turbulence import GUST_STATES, dryden_scales, start_gusts, step_gusts
+from tests.flight.conftest import MakeSetup
 
 Floats = NDArray[np.float64]
 SPEED, DT = 25.0, 1.0 / 60.0
@@ -132,3 +135,27 @@ def test_same_noise_same_gusts() -> None:
     assert not np.array_equal(_gusts(500, 60.0, seed=7), _gusts(500, 60.0, seed=8))
     assert np.isfinite(_gusts(100, math.inf)).all()
     assert np.isfinite(_gusts(100, -5.0, speed=0.0)).all()
+
+
+def test_gusts_of_a_flight_turn_with_the_wind_and_count_height_from_the_ground(
+    make_setup: MakeSetup, aerosonde: Aircraft
+) -> None:
+    # JSBSim's own model fails both: it leaves a pure east wind's gusts unrotated and counts height from the sea.
+    def gusts(from_deg: float, ground: float = 100.0) -> Floats:
+        course = math.radians(from_deg)
+        way = np.array(
+            [[0.0, 0.0, ground + 100.0], [3000.0 * math.sin(course), 3000.0 * math.cos(course), ground + 100.0]]
+        )
+        setup = make_setup(way, wind=(6.0, from_deg), turbulence="moderate", terrain={"kind": "flat", "amsl_m": ground})
+        flight = Flight(setup, aerosonde)
+        rows, _ = flight.block(120)
+        wind = as_track(rows).wind[1:].astype(np.float64)
+        along = -np.array([math.sin(course), math.cos(course)])
+        return np.column_stack([wind[:, :2] @ along - 6.0, wind[:, :2] @ np.array([along[1], -along[0]]), wind[:, 2]])
+
+    north = gusts(0.0)
+    assert float(np.abs(north).max()) > 0.5
+    for from_deg in (90.0, 200.0):
+        assert gusts(from_deg) == pytest.approx(north, abs=0.03)
+    # Thinner air, the same heights above ground.
+    assert gusts(0.0, ground=1500.0) == pytest.approx(north, abs=0.1)

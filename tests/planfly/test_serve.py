@@ -18,7 +18,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from flight.simulate import simulate
 from logs.reader import read_log
 from planfly.cli import main
-from planfly.pipeline import load_vehicle
+from planfly.vehicle import load_vehicle
 from tests.planfly.conftest import FIELD, Served
 from tests.stations import UdpStation, item
 

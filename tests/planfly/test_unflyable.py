@@ -7,7 +7,8 @@ import pytest
 
 from flight.export import plan_mission
 from logs.verdict import Verdict
-from planfly.pipeline import Vehicle, fly, load_vehicle, make_plan, make_setup
+from planfly.pipeline import fly, make_plan, make_setup
+from planfly.vehicle import Vehicle, load_vehicle
 from planner.plan import Plan
 from world.scenario import load_scenario
 

@@ -12,7 +12,8 @@ SOAK = os.environ.get("PLANFLY_SOAK") == "1"
 ROOT = Path(__file__).parents[2]
 SCRIPT = """
 import hashlib, sys
-from planfly.pipeline import load_vehicle, make_plan
+from planfly.pipeline import make_plan
+from planfly.vehicle import load_vehicle
 from planner.plan import plan_json
 from world.scenario import load_scenario
 for name in sys.argv[1:]:

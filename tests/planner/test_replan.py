@@ -13,7 +13,8 @@ from planner.search import plan_path
 from world.errors import MissionError, ScenarioError
 from world.geometry import turning_angles
 from world.limits import Limits
-from world.scenario import Scenario, with_planner, with_threats
+from world.scenario import Scenario
+from world.scenario_changes import with_planner, with_threats
 
 
 @pytest.fixture(scope="module")
