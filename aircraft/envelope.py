@@ -1,7 +1,7 @@
 """What an aircraft can do: steady climb, descent and speed over airspeed and height, with its interpolation."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from aircraft.compiled import compiled
 Floats = NDArray[np.float64]
 
 GRAVITY = 9.80665
+# Names of the tables of an `Envelope`, and of those of its power.
+TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
+POWERS = ("power_idle", "power_level", "power_full")
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +24,8 @@ class Envelope:
     positive in the direction of their name (a negative climb means the aircraft cannot hold height there);
     NaN where no trim exists at all.  level_speed_min, level_speed_max: (h,) m/s.
     max_bank: rad, the aircraft's own limit.  motor_braking: whether descent may drive the motor.
+    power_idle, power_level, power_full: (v, h) W from the battery, or of the fuel's heat, at the steepest descent, in
+    level flight and at the steepest climb; (0, 0) where it is not known.  volts: of the battery, 0 without one.
     """
 
     aircraft: str
@@ -33,10 +38,14 @@ class Envelope:
     level_speed_min: Floats
     level_speed_max: Floats
     max_bank: float
+    power_idle: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    power_level: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    power_full: Floats = field(default_factory=lambda: np.zeros((0, 0)))
+    volts: float = 0.0
 
     def __post_init__(self) -> None:
         """Lock the tables."""
-        for name in ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max"):
+        for name in (*TABLES, *POWERS):
             table = np.array(getattr(self, name), dtype=np.float64)
             table.setflags(write=False)
             object.__setattr__(self, name, table)
@@ -66,6 +75,28 @@ class Envelope:
         return (
             ground_slope(climb, airspeed, tailwind, crosswind),
             ground_slope(descent, airspeed, tailwind, crosswind),
+        )
+
+    def power(self, airspeed: float, amsl: float, air_angle: float) -> float:
+        """Power (W) of steady flight at this path angle to the air (rad, climbing positive).
+
+        The parabola through idle, level and full throttle, and beyond them theirs.  NaN where power is not known, or
+        the airspeed is outside the table.
+        """
+        if not self.power_level.size:
+            return math.nan
+        climb, descent = self.air_angles(airspeed, amsl)
+        idle, level, full = (
+            _bilinear(self.airspeed, self.amsl, getattr(self, name), airspeed, amsl) for name in POWERS
+        )
+        x = math.sin(air_angle)
+        low, high = -math.sin(descent), math.sin(climb)
+        if x >= high or x <= low or not low < 0.0 < high:
+            return full if x >= high else idle if x <= low else math.nan
+        return (
+            idle * x * (x - high) / (low * (low - high))
+            + level * (x - low) * (x - high) / (low * high)
+            + full * x * (x - low) / (high * (high - low))
         )
 
     def level_speeds(self, amsl: float) -> tuple[float, float]:

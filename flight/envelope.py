@@ -10,16 +10,17 @@ import numpy as np
 from platformdirs import user_cache_dir
 
 from aircraft.catalog import Aircraft, model_hash
-from aircraft.envelope import Envelope
+from aircraft.envelope import POWERS, TABLES, Envelope
 from flight.fdm import JSBSIM_VERSION, Fdm
-from flight.trim import Floats, Trim, fastest, full_throttle, idle, slowest
+from flight.state import STATE_SIZE, S
+from flight.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
 from world.files import write_whole
 
 # Any change of what the file holds or of how it is computed counts this up.
-_SCHEMA = 3
+_SCHEMA = 4
 _SPEEDS = 11
 _AMSL = np.arange(0.0, 9001.0, 1000.0)
-_TABLES = ("airspeed", "amsl", "climb", "descent", "level_speed_min", "level_speed_max")
+_TABLES = (*TABLES, *POWERS)
 
 
 def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelope:
@@ -40,6 +41,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
         model_hash=model_hash(aircraft),
         motor_braking=motor_braking,
         max_bank=aircraft.max_bank,
+        volts=aircraft.battery_voltage,
         **tables,
     )
 
@@ -60,17 +62,23 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
     airspeeds = _airspeeds(aircraft)
     climb = np.full((airspeeds.size, _AMSL.size), math.nan)
     descent = climb.copy()
+    powers = {name: climb.copy() for name in POWERS}
     slow, fast = np.full(_AMSL.size, math.nan), np.full(_AMSL.size, math.nan)
     for j, amsl in enumerate(_AMSL.tolist()):
         up: Trim | None = None
         down: Trim | None = None
+        even: Trim | None = None
         # From fast to slow: the last ones may not exist, and each trim starts from its neighbour's.
         for i in reversed(range(airspeeds.size)):
             airspeed = float(airspeeds[i])
             if found := full_throttle(fdm, airspeed, amsl, up):
                 up, climb[i, j] = found, found.climb
+                powers["power_full"][i, j] = _power(fdm, found)
             if found := idle(fdm, airspeed, amsl, down):
                 down, descent[i, j] = found, -found.climb
+                powers["power_idle"][i, j] = _power(fdm, found)
+            if found := straight(fdm, airspeed, amsl, near=even):
+                even, powers["power_level"][i, j] = found, _power(fdm, found)
         if found := fastest(fdm, amsl):
             fast[j] = found.airspeed
         if found := slowest(fdm, amsl):
@@ -83,7 +91,16 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
         "descent": descent.round(9),
         "level_speed_min": slow.round(9),
         "level_speed_max": fast.round(9),
+        **{name: table.round(6) for name, table in powers.items()},
     }
+
+
+def _power(fdm: Fdm, at: Trim) -> float:
+    """Power of a trim, W."""
+    state = np.zeros(STATE_SIZE)
+    fdm.balance(at.vector())
+    fdm.read(state)
+    return float(state[S.POWER])
 
 
 def _airspeeds(aircraft: Aircraft) -> Floats:
@@ -112,7 +129,7 @@ def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Float
     except (OSError, ValueError, KeyError, TypeError):
         return None
     grid = (airspeeds.size, _AMSL.size)
-    shapes = {"climb": grid, "descent": grid, "airspeed": airspeeds.shape}
+    shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
     if any(tables[name].shape != shapes.get(name, _AMSL.shape) for name in _TABLES):
         return None
     if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _AMSL)):

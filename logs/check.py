@@ -9,10 +9,10 @@ from flight.track import Track
 from logs.flown import lay_track
 from logs.geometric import geometric_findings, judge_geometry, judge_plan_only
 from logs.route_shape import RouteShape, route_shape
+from logs.rules_energy import energy_findings
 from logs.rules_flight import (
     completion_findings,
     departure_findings,
-    energy_findings,
     speed_findings,
     waypoint_findings,
 )

@@ -4,7 +4,8 @@ import math
 
 from flight.setup import FlightSetup
 from logs.route_shape import RouteShape, route_shape
-from logs.rules_flight import energy_findings, speed_findings
+from logs.rules_energy import energy_findings
+from logs.rules_flight import speed_findings
 from logs.rules_loiter import fold_loiters
 from logs.rules_mission import mission_findings
 from logs.rules_slope import slope_findings

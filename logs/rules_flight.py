@@ -1,4 +1,4 @@
-"""The rules about the flight itself: waypoints, speed, energy, departure, completion."""
+"""The rules about the flight itself: waypoints, speed, departure, completion."""
 
 import math
 
@@ -23,8 +23,6 @@ PASS_HEIGHT = 15.0
 OFF_MEAN = 1.0
 # The time over which a gust lasts, s.
 _GUST_TIME = 10.0
-# Reserve of the battery.
-RESERVE = 0.2
 # A departure: bank beyond this (rad), or airspeed below this; for another aircraft below this share of its slowest
 # level speed, which for the Aerosonde is the same.
 MOST_BANK = math.radians(75.0)
@@ -176,34 +174,6 @@ def _measured(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float, 
     total = np.concatenate([[0.0], np.cumsum(speed)])
     least = float(((total[width:] - total[:-width]) / width).min())
     return float(speed.mean()), 2.0 * gust * math.sqrt(min(1.0, 2.0 * _GUST_TIME / max(lasts, 1e-3))), least
-
-
-def energy_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool = False) -> list[Finding]:
-    """One finding: the energy used against the battery less its reserve."""
-    setup = shape.setup
-    usable = (1.0 - RESERVE) * setup.battery
-    used, reason = math.nan, "the energy is known from a flight only" if geometric else "nothing was flown"
-    if flown is not None:
-        track = flown.track
-        used = float(track.energy.max())
-        reason = f"{used:.1f} Wh of {setup.battery:.0f} Wh used, peak current {float(track.current.max()):.1f} A"
-        if used > usable:
-            reason += f"; {RESERVE:.0%} are to be left"
-    return [
-        make_finding(
-            "energy",
-            "flight",
-            ok=None if flown is None else used <= usable,
-            reason=reason,
-            flown=used,
-            limit=usable,
-            source="aircraft" if setup.scenario.flight.battery_wh is None else "scenario",
-            tolerance=0.0,
-            margin=usable - used,
-            unit="Wh",
-            method="battery power over time",
-        )
-    ]
 
 
 def departure_findings(shape: RouteShape, flown: Flown | None) -> list[Finding]:

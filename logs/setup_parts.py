@@ -84,6 +84,10 @@ class EnvelopeFile(SetupModel):
     level_speed_min_mps: Column
     level_speed_max_mps: Column
     max_bank_rad: Finite
+    power_idle_w: Table = []
+    power_level_w: Table = []
+    power_full_w: Table = []
+    battery_v: Finite = 0.0
 
 
 def _item_file(item: MissionItem) -> _Item:
@@ -181,6 +185,10 @@ def envelope_file(envelope: Envelope) -> EnvelopeFile:
         level_speed_min_mps=envelope.level_speed_min.tolist(),
         level_speed_max_mps=envelope.level_speed_max.tolist(),
         max_bank_rad=envelope.max_bank,
+        power_idle_w=envelope.power_idle.tolist(),
+        power_level_w=envelope.power_level.tolist(),
+        power_full_w=envelope.power_full.tolist(),
+        battery_v=envelope.volts,
     )
 
 
@@ -194,6 +202,10 @@ def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
         if lengths != list(shape):
             raise LogError(f"{source}: envelope.{name}: shape {lengths}: {list(shape)} is expected")
         return np.array(values, dtype=np.float64)
+
+    def power(name: str) -> Floats:
+        # A log of before there was any has none.
+        return table(name, (speeds, heights)) if file.power_level_w else np.zeros((0, 0))
 
     for name in ("airspeed_mps", "amsl_m"):
         if (np.diff(getattr(file, name)) <= 0.0).any():
@@ -209,4 +221,8 @@ def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
         level_speed_min=table("level_speed_min_mps", (heights,)),
         level_speed_max=table("level_speed_max_mps", (heights,)),
         max_bank=file.max_bank_rad,
+        power_idle=power("power_idle_w"),
+        power_level=power("power_level_w"),
+        power_full=power("power_full_w"),
+        volts=file.battery_v,
     )

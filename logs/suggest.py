@@ -44,9 +44,8 @@ def _suggest(shape: RouteShape, flown: Flown | None, item: Finding) -> str:
         return f"fly {item.where} {short:.0f} m higher"
     if item.rule == "bounds" and short > SPARE_LENGTH:
         return f"bring the path {short:.0f} m further inside"
-    if item.rule == "energy" and item.flown is not None and item.flown > item.limit:
-        more = item.flown / item.limit
-        return f"shorten the flight by {100.0 * (1.0 - 1.0 / more):.0f} %, or take a battery {more:.2f} times as large"
+    if item.rule == "energy":
+        return _energy(shape, item)
     if item.rule == "speed":
         return _speed(shape, item)
     return ""
@@ -154,6 +153,16 @@ def _turn_speed(shape: RouteShape, i: int) -> float | None:
         if max(used) + SPARE_LENGTH <= room:
             return speed
     return None
+
+
+def _energy(shape: RouteShape, item: Finding) -> str:
+    used = item.planned if item.flown is None else item.flown
+    if used is None or item.limit is None or used <= item.limit:
+        return ""
+    more = used / item.limit
+    store = "battery" if shape.setup.envelope.volts or not shape.setup.envelope.power_level.size else "tank"
+    shorter, larger = math.ceil(100.0 * (1.0 - 1.0 / more)), math.ceil(100.0 * more) / 100.0
+    return f"shorten the flight by {shorter} %, or take a {store} {larger:.2f} times as large"
 
 
 def _threat(shape: RouteShape, flown: Flown | None, item: Finding) -> str:
