@@ -27,8 +27,10 @@ BANK = math.radians(30.0)
 # the height stays within this (m).
 SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
 # A turn is held if the track stays within this of the fly-by path (m; the verdict lets it swing out by 5 m) and the
-# mean bank of two seconds exceeds the limit by at most this: in a steady turn on a 30 degree arc it is 31 degrees.
-CROSS_HELD, BANK_HELD = 2.0, math.radians(2.0)
+# mean bank of two seconds exceeds the limit by at most this: in a steady turn on a 30 degree arc it is 30.8 degrees.
+# It is a turn at this airspeed if guidance does not slow for it: the mean of five seconds falls by more than this, m/s,
+# at less than cruise throttle (a turn downwind takes airspeed too, but at more).
+CROSS_HELD, BANK_HELD, TURN_SPEED_HELD = 2.0, math.radians(1.3), 1.3
 _BISECTIONS = 7
 
 
@@ -154,20 +156,37 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
         runs = np.array([straight, leg, straight])[:, None]
         return np.array([0.0, 0.0, AMSL]) + np.vstack([np.zeros(3), np.cumsum(runs * ways, axis=0)])
 
-    def holds(leg: float) -> bool:
+    def fly(leg: float) -> Track | None:
         flown = simulate(made_setup(points(leg), aircraft, wind, wind_from), aircraft)
-        if flown.ended != "completed":
+        return (
+            flown.track.rows(int(np.searchsorted(flown.track.time, 5.0)), len(flown.track))
+            if flown.ended == "completed"
+            else None
+        )
+
+    def holds(leg: float) -> bool:
+        track = fly(leg)
+        if track is None or _most(track, track.attitude[:, 0], 2.0) > BANK + BANK_HELD:
             return False
-        late = flown.track.time > 5.0
-        bank = flown.track.attitude[late, 0].astype(np.float64)
-        width = round(2.0 / float(np.median(np.diff(flown.track.time))))
-        mean = np.abs(np.convolve(bank, np.full(width, 1.0 / width), "valid")).max()
-        return bool(np.abs(flown.track.cross_track[late]).max() <= CROSS_HELD and mean <= BANK + BANK_HELD)
+        return _slowed(track, aircraft) <= TURN_SPEED_HELD and float(np.abs(track.cross_track).max()) <= CROSS_HELD
 
     far = points(4000.0)
     shape = route_shape(made_setup(far, aircraft, wind, wind_from))
     predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
     return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
+
+
+def _most(track: Track, values: NDArray[np.float32], seconds: float) -> float:
+    """Largest mean over so many seconds, either way."""
+    width = round(seconds / float(np.median(np.diff(track.time))))
+    return float(np.abs(np.convolve(values.astype(np.float64), np.full(width, 1.0 / width), "valid")).max())
+
+
+def _slowed(track: Track, aircraft: Aircraft) -> float:
+    """By how much the mean airspeed of five seconds falls below the command at less than cruise throttle, m/s."""
+    throttle = track.controls[:, 3]
+    eased = throttle < np.median(throttle[track.leg == 0])
+    return _most(track, np.where(eased, np.minimum(track.airspeed - np.float32(aircraft.airspeed), 0.0), 0.0), 5.0)
 
 
 def calm_limits(*, whole: bool) -> list[Limit]:
