@@ -142,11 +142,9 @@ def _gentler_turn(shape: RouteShape, i: int, allowed: float) -> float:
         points = np.array(shape.points[first:last])
         change = math.copysign(math.radians(degrees), shape.turns[i]) - float(shape.turns[i])
         cos, sin = math.cos(change), math.sin(change)
-        points[i + 1 :, :2] = points[i, :2] + (points[i + 1 :, :2] - points[i, :2]) @ np.array(
-            [[cos, -sin], [sin, cos]]
-        )
-        setup = replace(shape.setup, route=replace(shape.setup.route, waypoints=points))
-        limit, _ = turn_limit(route_shape(setup), i)
+        onward = points[at + 1 :, :2] - points[at, :2]
+        points[at + 1 :, :2] = points[at, :2] + onward @ np.array([[cos, -sin], [sin, cos]])
+        limit, _ = turn_limit(route_shape(replace(shape.setup, route=replace(near, waypoints=points))), at)
         if limit >= math.radians(degrees):
             return degrees
         allowed = min(allowed, limit) - SPARE_ANGLE
