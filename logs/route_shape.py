@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.setup import FlightSetup, limits_of
-from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
+from world.geometry import arc_cut, arc_reach, leg_courses, leg_runs, leg_slopes, signed_turns
 from world.limits import (
     BLEND_ACCELERATION,
     Limits,
@@ -120,8 +120,8 @@ def route_shape(setup: FlightSetup, *, envelope: bool = True) -> RouteShape:
     reversal = _reversals(setup, packed, courses, turns, radius, points[:, 2])
     blend, sag = _blends(setup, points, runs, turns, radius, after)
     cut = np.zeros(count)
-    finite = np.isfinite(radius) & ~route.fly_over
-    cut[finite] = radius[finite] * np.minimum(1.0 / np.maximum(np.cos(0.5 * turns[finite]), 1e-6) - 1.0, _LARGEST_CUT)
+    for i in np.flatnonzero(np.isfinite(radius) & ~route.fly_over).tolist():
+        cut[i] = min(arc_cut(abs(float(turns[i])), float(radius[i])), _LARGEST_CUT * float(radius[i]))
     return RouteShape(
         setup=setup,
         limits=limits,
@@ -170,18 +170,14 @@ def _blends(
 
 
 def turn_room(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
-    """Length of leg (m) that a turn (rad) uses before and after its waypoint.
-
-    A fly-by uses R tan(turn/2) on either side.  A fly-over turns past the course and back again: with overshoot angle
-    phi, cos phi = (1 + cos turn)/2, it is back on the leg after R (sin turn + 2 sin phi).
-    """
+    """Length of leg (m) that a turn (rad) uses before and after its waypoint; a fly-over only after it."""
     if turn < 1e-9:
         return 0.0, 0.0
     if fly_over:
         return 0.0, radius * fly_over_run(turn)
     if turn > _U_TURN:
         return math.inf, math.inf
-    reach = radius * math.tan(0.5 * turn)
+    reach = arc_reach(turn, radius)
     return reach, reach
 
 

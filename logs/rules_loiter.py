@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from logs.flown import Flown
 from logs.route_shape import RouteShape
 from logs.verdict import Finding, make_finding
+from world.geometry import arc_reach
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +56,7 @@ def _middle(shape: RouteShape, i: int) -> Floats:
         return np.array(shape.points[i, :2])
     ux, uy = shape.leg_unit(i - 1)
     side = math.copysign(1.0, shape.turns[i])
-    reach = shape.radius[i] * math.tan(0.5 * abs(float(shape.turns[i])))
+    reach = arc_reach(abs(float(shape.turns[i])), float(shape.radius[i]))
     return np.array(shape.points[i, :2] - reach * np.array([ux, uy]) + side * shape.radius[i] * np.array([uy, -ux]))
 
 

@@ -127,9 +127,9 @@ def _steep_arc(shape: RouteShape, leg: int) -> list[str]:
     legs = " and ".join(f"{math.degrees(abs(float(shape.slopes[k]))):.1f}°" for k in (leg, i))
     missing = (abs(tangent) - can) * length
     return [
-        f"the fly-by arc at {shape.waypoint(i)} {verb} {math.degrees(math.atan(abs(tangent))):.1f}° for {length:.0f} m,"
-        f" where legs {leg} and {i} have {legs}: it is shorter than the {2.0 * float(shape.before[i]):.0f} m of leg"
-        f" that it replaces; the aircraft can {math.degrees(math.atan(can)):.1f}° there, {missing:.0f} m less"
+        f"the arc at {shape.waypoint(i)} {verb} {math.degrees(math.atan(abs(tangent))):.1f}° for {length:.0f} m,"
+        f" where legs {leg} and {i} have {legs}: flown by, it is shorter than the"
+        f" {2.0 * float(shape.before[i]):.0f} m of leg that it replaces; the aircraft can {math.degrees(math.atan(can)):.1f}° there, {missing:.0f} m less"
     ]
 
 

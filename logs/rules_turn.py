@@ -8,6 +8,7 @@ from logs.flown import Flown
 from logs.measure_turn import TurnMeasure, measure_turn
 from logs.route_shape import ON_THE_SPOT, RouteShape
 from logs.verdict import Finding, make_finding
+from world.geometry import arc_cut
 
 # A turn passes if the bank stays within the limit and this, the aircraft within this of its arc on the outside, and the
 # cross-track settles under this before the next turn; the design document's figures.
@@ -150,11 +151,11 @@ def _evidence(shape: RouteShape, i: int, measure: TurnMeasure, limit: float) -> 
 def _too_tight(shape: RouteShape, i: int, measure: TurnMeasure) -> list[str]:
     """What is wrong with a turn flown tighter than the bank limit's arc, by how closely it passed its waypoint.
 
-    An arc of radius R between two courses passes their corner at R (1 / cos(turn / 2) - 1).  The legs of a turn that
-    they have no room for are joined by a tighter arc, and a flight that follows it has used bank that it does not have.
+    The legs of a turn that they have no room for are joined by a tighter arc, and a flight that follows it has used
+    bank that it does not have, or slowed down.
     """
     turn, setup = abs(float(shape.turns[i])), shape.setup
-    least = (1.0 / math.cos(0.5 * turn) - 1.0) * float(shape.tightest[i]) if turn < SHARPEST else math.inf
+    least = arc_cut(turn, float(shape.tightest[i])) if turn < SHARPEST else math.inf
     if measure.passed is None or not math.isfinite(least) or setup.route.fly_over[i] or setup.guidance != "path":
         return []
     slack = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence] + _NAV_SIGMAS * ERRORS[setup.nav][0]

@@ -43,6 +43,9 @@ def _suggest(shape: RouteShape, flown: Flown | None, item: Finding) -> str:
     if item.limit is None or item.margin is None:
         return ""
     short = -item.margin + SPARE_LENGTH
+    if item.rule == "clearance" and item.planned is not None:
+        # A flight that ended early did not get to the lowest place.
+        short = max(short, item.limit - item.planned + SPARE_LENGTH)
     if item.rule == "clearance" and short > SPARE_LENGTH:
         return f"fly {item.where} {short:.0f} m higher"
     if item.rule == "bounds" and short > SPARE_LENGTH:

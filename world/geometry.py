@@ -62,6 +62,16 @@ def path_length(waypoints: ArrayLike) -> Floats:
     return np.asarray(np.sqrt((legs**2).sum(axis=-1)).sum(axis=-1))
 
 
+def arc_reach(turn: float, radius: float) -> float:
+    """Length of leg (m) that a fly-by arc takes on each side of its waypoint, R tan(turn / 2); turn in rad below pi."""
+    return radius * math.tan(0.5 * turn)
+
+
+def arc_cut(turn: float, radius: float) -> float:
+    """Distance (m) at which a fly-by arc passes its waypoint: R (1 / cos(turn / 2) - 1), turn in rad below pi."""
+    return radius * (1.0 / math.cos(0.5 * turn) - 1.0)
+
+
 @compiled
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
     """Bring an angle into [-pi, pi), rad."""
