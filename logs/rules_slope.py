@@ -128,8 +128,8 @@ def _steep_arc(shape: RouteShape, leg: int) -> list[str]:
     missing = (abs(tangent) - can) * length
     return [
         f"the arc at {shape.waypoint(i)} {verb} {math.degrees(math.atan(abs(tangent))):.1f}° for {length:.0f} m,"
-        f" where legs {leg} and {i} have {legs}: flown by, it is shorter than the"
-        f" {2.0 * float(shape.before[i]):.0f} m of leg that it replaces; the aircraft can {math.degrees(math.atan(can)):.1f}° there, {missing:.0f} m less"
+        f" where legs {leg} and {i} have {legs}: flown by, it is shorter than the {2.0 * float(shape.before[i]):.0f} m"
+        f" of leg that it replaces; the aircraft can {math.degrees(math.atan(can)):.1f}° there, {missing:.0f} m less"
     ]
 
 
