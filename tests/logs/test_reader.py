@@ -146,7 +146,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[FlightSetup]) == 14
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 8
-    assert len(names[Envelope]) == 10
+    assert len(names[Envelope]) == 14
     assert len(dataclasses.fields(MissionItem)) == 8
 
 
