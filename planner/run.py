@@ -11,6 +11,7 @@ from planner.algorithms import Algorithm
 from planner.certify import certify
 from planner.criteria import paper_scores
 from planner.encoding import Encoding
+from planner.fitting import tighten
 from planner.graded import graded_scores
 from planner.plan import Certificate
 from planner.polish import polish
@@ -115,6 +116,12 @@ class Run:
         self.evaluations += made - len(found)
         return np.asarray(scores[0])
 
+    def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
+        """Move all waypoints of a vector (d,) at once, then polish it.  Gives the best scores (8,)."""
+        moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
+        self.evaluations += made
+        return self.polish(moved, most)
+
     def over(self) -> bool:
         """Whether the search is to end now."""
         if self.evaluations >= self._budget():
@@ -122,6 +129,10 @@ class Run:
         elif self.stop is not None:
             self.ended = self.stop() or "completed"
         return self.ended != "completed"
+
+    def missed(self) -> bool:
+        """Whether the best path yet violates something or is in a missile's reach."""
+        return bool(self.archive.scores[0, :4].any() or self.archive.scores[0, KILL] > 0.0)
 
     def safe_already(self) -> bool:
         """Whether the first safe path was asked for, and is there."""
