@@ -53,7 +53,7 @@ PATIENCE, GAIN = 10, 2e-4
 # path, while it has no safe one and once it has.
 SHARE, SAFE_SHARE = 0.3, 0.15
 # Evaluations that a quick path, each seed, and the best path at the end are polished with, at most.
-QUICK_POLISH, SEED_POLISH, LAST_POLISH = 50, 500, 300
+QUICK_POLISH, SEED_POLISH, LAST_POLISH = 50, 300, 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 # Numbers a population may hold.
