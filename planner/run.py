@@ -40,19 +40,24 @@ class Archive:
     scores: Floats
 
     def take(self, vectors: Floats, scores: Floats) -> None:
-        """Let new rows in; equal ranks keep their order, older first."""
-        fit = len(self.scores) == ARCHIVE_SIZE and not self.scores[:, :4].any()
-        if fit:
-            # Among rows that meet the constraints the order is by exposure, then by length.
-            last = self.scores[-1]
-            shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
-            rows = np.flatnonzero((shorter | (scores[:, KILL] < last[KILL])) & ~scores[:, :4].any(axis=1))
-            if not rows.size:
+        """Let new rows in; equal ranks keep their order, older first.
+
+        Once a row meets the constraints, those that do not are let go: there can be thousands of them to rank.
+        """
+        fit = ~scores[:, :4].any(axis=1)
+        if len(self.scores) and not self.scores[0, :4].any():
+            if len(self.scores) == ARCHIVE_SIZE:
+                last = self.scores[-1]
+                shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
+                fit &= shorter | (scores[:, KILL] < last[KILL])
+            if not fit.any():
                 return
-            vectors, scores = vectors[rows], scores[rows]
-        every = np.concatenate([self.scores, scores])
-        joined = np.concatenate([self.vectors, vectors])
-        if fit:
+        elif fit.any():
+            self.vectors, self.scores = self.vectors[:0], self.scores[:0]
+        every = np.concatenate([self.scores, scores[fit] if fit.any() else scores])
+        joined = np.concatenate([self.vectors, vectors[fit] if fit.any() else vectors])
+        if fit.any():
+            # Among rows that meet the constraints the order is by exposure, then by length.
             order = np.lexsort((every[:, LENGTH], every[:, KILL]))[:ARCHIVE_SIZE]
         else:
             order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
