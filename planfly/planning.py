@@ -25,7 +25,7 @@ from world.scenario_changes import with_planner, with_threats
 def best_so_far(seconds: float | None) -> Iterator[Stop]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
-    A second Ctrl-C interrupts at once.
+    A second Ctrl-C ends the process.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     pressed = False
@@ -33,7 +33,8 @@ def best_so_far(seconds: float | None) -> Iterator[Stop]:
     def press(_signal: int, _frame: FrameType | None) -> None:
         nonlocal pressed
         pressed = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        # Python's own handler would wait again for compiled code to come back.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def stop() -> str:
         if pressed:
