@@ -146,9 +146,9 @@ def schema_of(descriptor: "Descriptor") -> bytes:
     return out.SerializeToString(deterministic=True)
 
 
-def times_ns(track: Track) -> NDArray[np.int64]:
-    """log_time of each row: ns since 1970, simulation time 0 being `EPOCH_NS`."""
-    return np.rint(track.time * 1e9).astype(np.int64) + EPOCH_NS
+def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
+    """log_time of each simulation time (s): ns since 1970, time 0 being `EPOCH_NS`."""
+    return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
 def _template() -> Rows:
@@ -163,23 +163,23 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def encode_rows(track: Track, first_row: int, channel: int, kept: slice = slice(None)) -> Rows:
-    """Encode rows as MCAP message records, (t,) of `RECORD`.
+def encode_rows(rows: NDArray[np.float64], first_row: int, channel: int) -> Rows:
+    """Encode flown rows (t, columns), in the order of `flight.track.COLUMNS`, as MCAP message records (t,) of `RECORD`.
 
-    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.  kept: the rows to encode.
+    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
     """
-    stamps = times_ns(track)[kept]
+    stamps = times_ns(rows[:, 0])
     records: Rows = np.repeat(_TEMPLATE, len(stamps))
     numbers = np.arange(first_row, first_row + len(stamps)).astype(np.uint32)
     records["channel"] = channel
     records["sequence"] = numbers
     records["log_time"] = stamps
     records["publish_time"] = stamps
-    rows = records["state"]
-    rows["row"] = numbers
-    for name, _, field, column in FIELDS:
-        values = getattr(track, field)
-        rows[name] = values[kept] if values.ndim == 1 else values[kept, column]
+    state = records["state"]
+    state["row"] = numbers
+    with np.errstate(over="ignore", invalid="ignore"):
+        for column, (name, _, _, _) in enumerate(FIELDS):
+            state[name] = rows[:, column]
     return records
 
 

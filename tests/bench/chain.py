@@ -60,7 +60,7 @@ def run() -> dict[str, Any]:
         blocks = [flown.track.rows(start, min(rows, start + 60)) for start in range(0, rows, 60)]
 
         def record(every: int = 1) -> None:
-            with Recorder(log, setup, every=every, batch=10) as recorder:
+            with Recorder(log, setup, every=every, batch=30) as recorder:
                 for block in blocks:
                     recorder.write(block)
                 recorder.finish("completed", None)
