@@ -26,7 +26,7 @@ from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
 
 # Seconds of flight that are written at a time: some twenty milliseconds of a simulated flight.
-_BATCH = 30
+BATCH = 30
 
 Advance = Callable[[float, float, str], None]
 
@@ -159,7 +159,7 @@ def fly(
     if log is None:
         flown = simulate(setup, vehicle.aircraft, progress=tell)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
-    with Recorder(log, setup, every=every, batch=_BATCH) as recorder:
+    with Recorder(log, setup, every=every, batch=BATCH) as recorder:
         flown = simulate(setup, vehicle.aircraft, sink=recorder.write_rows, progress=tell)
         track = thin_track(flown.track, every)
         verdict = judge_flight(setup, track, flown.ended)
