@@ -11,6 +11,7 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from flight.track import COLUMNS, Track
 
 if TYPE_CHECKING:
@@ -211,6 +212,16 @@ def parse_row(data: bytes, parser: "type[Message]") -> Rows:
     return record
 
 
+@compiled
+def _alike(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
+    """How many of the first rows have just the expected bytes in these columns."""
+    for row in range(len(raw)):
+        for k in range(len(columns)):
+            if raw[row, columns[k]] != expected[k]:
+                return row
+    return len(raw)
+
+
 class RowMatcher:
     """Finds runs of state messages of the known layout in a chunk's bytes."""
 
@@ -229,14 +240,5 @@ class RowMatcher:
         """Return the records from ``offset`` on that have the layout and follow each other, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
-        found = 0
-        step = 16
-        while found < count:
-            part = raw[found : found + step]
-            same = (part[:, self._columns] == self._expected).all(axis=1)
-            if not same.all():
-                found += int(np.argmin(same))
-                break
-            found += len(part)
-            step = 1024
+        found = _alike(raw, self._columns, self._expected)
         return raw[:found].reshape(-1).view(RECORD)
