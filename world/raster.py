@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.errors import TerrainError
-from world.frames import GeoOrigin, crs_transformer, fit_polymap, to_geo, to_map
+from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map
 from world.raster_file import (
     MOST_PIXELS,
     RasterFile,
@@ -37,6 +37,9 @@ UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
 LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
 # Worst error allowed for the polynomial from map to pixels, in pixels.
 PIXEL_TOLERANCE = 1e-3
+METRES = ("m", "metre", "metres", "meter", "meters")
+# A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
+MOST_BLOCK = 32 * 2**20
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
@@ -200,6 +203,8 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         "GDAL_PAM_ENABLED": "NO",
         "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
         "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+        # The vertical part of the reference system too, for its unit.
+        "GTIFF_REPORT_COMPD_CS": "YES",
     }
     try:
         with warnings.catch_warnings(), rasterio.Env(**guard):
@@ -209,13 +214,19 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
                 crs, forward, kind = source.crs, source.transform, np.dtype(source.dtypes[0]).kind
                 rows, cols, bands = source.height, source.width, source.count
                 scale, offset = float(source.scales[0]), float(source.offsets[0])
+                block, unit = math.prod(source.block_shapes[0]), source.units[0]
         transformer = None if crs is None else crs_transformer(crs.to_wkt())
+        stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
     except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
         raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}") from error
     if bands != 1 or kind not in "iuf":
         raise TerrainError(f"{file}: bands: {bands} of kind {kind!r}; an elevation file has 1 band of numbers")
     if transformer is None or forward.determinant == 0.0:
         raise TerrainError(f"{file}: no coordinate reference system and position are stated")
+    if (unit or "m").lower() not in METRES or metres != 1.0:
+        raise TerrainError(f"{file}: heights in {stated if metres != 1.0 else unit}: metres are expected")
+    if block > MOST_BLOCK:
+        raise TerrainError(f"{file}: blocks of {block:,} pixels, read whole: at most {MOST_BLOCK:,} are; tile the file")
     if min(rows, cols) < 2:
         raise TerrainError(f"{file}: size {cols} x {rows}: at least 2 x 2 pixels are expected")
 
