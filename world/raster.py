@@ -40,6 +40,8 @@ PIXEL_TOLERANCE = 1e-3
 METRES = ("m", "metre", "metres", "meter", "meters")
 # A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
 MOST_BLOCK = 32 * 2**20
+# Pixels without data that are looked at before the next ones: one inside the area is enough.
+_HOLES_AT_ONCE = 2**16
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
@@ -125,21 +127,23 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:
         return
-    # Newton's method with one slope: the map is affine but for a few metres over the box.
-    wanted = np.stack([cols, rows]).astype(np.float64)
     to_map_metres = np.linalg.inv(per_metre)
-    place = np.repeat(box.mean(axis=1)[:, None], rows.size, axis=1)
-    for _ in range(8):
-        place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
     # A height is made of the four pixels around it.
     reach = np.abs(to_map_metres).sum(axis=1)[:, None]
-    inside = ((place > box[:, :1] - reach) & (place < box[:, 1:] + reach)).all(axis=0)
-    if inside.any():
-        east, north = place[:, int(np.argmax(inside))]
-        raise TerrainError(
-            f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m "
-            f"({int(inside.sum())} of {terrain.heights.size} pixels of the area have none); choose an area with data"
-        )
+    for first in range(0, rows.size, _HOLES_AT_ONCE):
+        part = slice(first, first + _HOLES_AT_ONCE)
+        wanted = np.stack([cols[part], rows[part]]).astype(np.float64)
+        # Newton's method with one slope: the map is affine but for a few metres over the box.
+        place = np.repeat(box.mean(axis=1)[:, None], wanted.shape[1], axis=1)
+        for _ in range(8):
+            place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
+        inside = ((place > box[:, :1] - reach) & (place < box[:, 1:] + reach)).all(axis=0)
+        if inside.any():
+            east, north = place[:, int(np.argmax(inside))]
+            raise TerrainError(
+                f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m ({rows.size:,} of "
+                f"{terrain.heights.size:,} pixels in and about the area have none); choose an area with data"
+            )
 
 
 def _outline_window(
