@@ -67,6 +67,11 @@ def test_pictures_and_page(log_file: Path, other: FlightLog, tmp_path: Path) -> 
     assert all(data.startswith(b"\x89PNG") for data in first[:2])
     assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first[2:4])
     assert b"energy used" in first[4]
+    # Both verdicts in a sentence first, and the pictures inside: the page can be sent alone.
+    page = first[4].decode("utf-8")
+    assert 0 < page.index("a.mcap:</strong>") < page.index("b.mcap:</strong>") < page.index("<table")
+    assert page.count("data:image/png;base64,") == 2
+    assert 'src="compare' not in page
     assert [file.read_bytes() for file in write_comparison(tmp_path / "out", found, svg=True)] == first
 
 
