@@ -33,13 +33,24 @@ def replay(args: argparse.Namespace) -> int:
 
         play(log, args)
         return _whole_or_loss(args, log)
+    if args.foxglove and args.movie:
+        raise PlanflyError("--foxglove, --movie: one of the two is expected")
     start = args.start if args.start is not None else float(log.track.time[0])
     end = log.end_time if args.to is None else min(args.to, log.end_time)
     if start > log.end_time:
         raise LogError(f"{args.log}: --from {start:g}: the log ends at {log.end_time:.1f} s")
     if end < start:
         raise LogError(f"{args.log}: --to {end:g}: at or after --from, {start:g} s, is expected")
-    if sys.stdout.isatty() and not args.at_once:
+    if args.movie:
+        from planfly.movie import write_movie
+
+        for file in write_movie(log, args, start, end)[:3]:
+            print(f"movie     {file}")
+    elif args.foxglove:
+        from planfly.foxglove_server import serve_log
+
+        serve_log(args, start, end)
+    elif sys.stdout.isatty() and not args.at_once:
         from logs.instruments import make_instruments
 
         _show_instruments(make_instruments(log), start, end, args.speed or 1.0)
