@@ -30,14 +30,23 @@ MAP, AIRCRAFT = "map", "aircraft"
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
 MOST_VERTICES = 80  # a side of the terrain mesh
 
-# A Point3 and a Color inside a repeated field of a mesh (2 and 4), in protobuf's encoding: its tag, its length, and a
-# tag before each double.  Ten thousand message objects would take as long as some minutes of flight.
-_POINT = np.dtype(
-    [("tag", "u1"), ("size", "u1"), *((name, kind) for k in "xyz" for name, kind in ((f"tag_{k}", "u1"), (k, "<f8")))]
-)
-_COLOUR = np.dtype(
-    [("tag", "u1"), ("size", "u1"), *((name, kind) for k in "rgba" for name, kind in ((f"tag_{k}", "u1"), (k, "<f8")))]
-)
+
+def _of_doubles(names: str) -> np.dtype[np.void]:
+    """A message of doubles as an element of a repeated field: its tag, its length, and a tag before each."""
+    fields = [("tag", "u1"), ("size", "u1")]
+    for name in names:
+        fields += [(f"tag_{name}", "u1"), (name, "<f8")]
+    return np.dtype(fields)
+
+
+# In protobuf's encoding: ten thousand message objects would take as long as some minutes of flight.
+_POINT, _COLOUR = _of_doubles("xyz"), _of_doubles("rgba")
+# Fields of SceneEntity, LinePrimitive and TriangleListPrimitive.
+_ENTITY_LINES = SceneEntity.LINES_FIELD_NUMBER
+_ENTITY_TRIANGLES = SceneEntity.TRIANGLES_FIELD_NUMBER
+_LINE_POINTS = LinePrimitive.POINTS_FIELD_NUMBER
+_MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
+_MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
 _LOW = np.array([0.36, 0.52, 0.30])
 _HIGH = np.array([0.80, 0.74, 0.62])
@@ -109,8 +118,8 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the room.
     shown = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
-    body += _doubles(_POINT, 2, np.round(points * 16.0) / 16.0) + _doubles(_COLOUR, 4, shown)
-    return _length_delimited(12, body)
+    body += _doubles(_POINT, _MESH_POINTS, np.round(points * 16.0) / 16.0) + _doubles(_COLOUR, _MESH_COLOURS, shown)
+    return _length_delimited(_ENTITY_TRIANGLES, body)
 
 
 def _doubles(kind: np.dtype[np.void], number: int, values: Floats) -> bytes:
@@ -151,7 +160,8 @@ def threats_scene(time_ns: int, threats: Threats) -> bytes:
 def plan_scene(time_ns: int, waypoints: Floats) -> bytes:
     """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots."""
     entity = _entity(time_ns, "plan")
-    _add_line(entity, waypoints, _PLAN)
+    entity.lines.append(_line(_PLAN))
+    entity.lines[0].points.extend(_points(waypoints))
     for point in waypoints:
         entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
     return _update(entity)
@@ -159,9 +169,9 @@ def plan_scene(time_ns: int, waypoints: Floats) -> bytes:
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
     """Draw the flown track so far, (n, 3)."""
-    entity = _entity(time_ns, "track")
-    _add_line(entity, positions, _TRACK)
-    return _update(entity)
+    line = _line(_TRACK).SerializeToString(deterministic=True) + _doubles(_POINT, _LINE_POINTS, positions)
+    entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
+    return _length_delimited(2, entity + _length_delimited(_ENTITY_LINES, line))
 
 
 def _update(entity: SceneEntity) -> bytes:
@@ -173,13 +183,13 @@ def _entity(time_ns: int, name: str) -> SceneEntity:
     return SceneEntity(timestamp=timestamp(time_ns), frame_id=MAP, id=name, frame_locked=True)
 
 
-def _add_line(entity: SceneEntity, points: Floats, colour: tuple[float, float, float, float]) -> None:
-    entity.lines.add(
+def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
+    """A line without points yet."""
+    return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
         pose=_pose((0.0, 0.0, 0.0)),
         thickness=3.0,
         scale_invariant=True,
-        points=_points(points),
         color=_colour(colour),
     )
 

@@ -25,8 +25,8 @@ from planner.search import plan_path
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
 
-# Seconds of flight that are written at a time: some twenty milliseconds of a simulated flight.
-BATCH = 30
+# Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
+BATCH = 60
 
 Advance = Callable[[float, float, str], None]
 
