@@ -16,15 +16,15 @@ DIGITS = {
     "position": 14,  # 0.06 mm
     "velocity": 10,  # 1 mm/s
     "attitude": 16,  # 0.0009 degrees
-    "rates": 14,  # 0.0035 degrees/s
+    "rates": 13,  # 0.007 degrees/s
     "airspeed": 10,
     "flow": 16,
-    "controls": 16,
-    "commands": 16,
+    "controls": 14,  # 0.0035 degrees
+    "commands": 14,
     "wind": 10,
-    "load_factor": 12,
+    "load_factor": 10,
     "current": 10,
-    "energy": 12,  # 0.24 mWh
+    "energy": 14,  # 0.06 mWh, a twentieth of what a tick takes
     "cross_track": 10,
     "height_error": 10,
     "speed_command": 10,
