@@ -73,7 +73,8 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
     assert velocity == pytest.approx(track.velocity[5:-5], abs=0.02)
     east, north = setup.scenario.wind.at(500.0)
     assert track.wind == pytest.approx(np.tile([east, north, 0.0], (len(track), 1)), abs=5e-4)
-    # Speeds are kept to 1 mm/s on each axis.  Ground velocity less wind is what the air sees: its size the airspeed, its direction the nose's but for sideslip.
+    # Ground velocity less wind is what the air sees: its size the airspeed, its direction the nose's but for sideslip.
+    # Each axis is kept to 1 mm/s.
     air = track.velocity.astype(np.float64) - track.wind
     assert np.linalg.norm(air, axis=1) == pytest.approx(track.airspeed, abs=3e-3)
     heading = np.arctan2(air[:, 0], air[:, 1])
