@@ -27,14 +27,14 @@ def replay(args: argparse.Namespace) -> int:
     """``planfly replay``: instruments on a terminal, the timeline elsewhere."""
     from logs.reader import read_log
 
+    if bool(args.foxglove) + bool(args.movie) + isinstance(args.to, str) > 1:
+        raise PlanflyError("--foxglove, --movie, --to IP:PORT: one of them is expected")
     log = read_log(Path(args.log))
     if isinstance(args.to, str):
         from planfly.play import play
 
         play(log, args)
         return _whole_or_loss(args, log)
-    if args.foxglove and args.movie:
-        raise PlanflyError("--foxglove, --movie: one of the two is expected")
     start = args.start if args.start is not None else float(log.track.time[0])
     end = log.end_time if args.to is None else min(args.to, log.end_time)
     if start > log.end_time:

@@ -86,7 +86,8 @@ def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
         ("film.mp4", (), "needs ffmpeg, which is not installed"),
         ("none/film.gif", (), "does not exist"),
         ("film.gif", ("--speed", "0.001"), "frames: at most 5,000; raise --speed"),
-        ("film.gif", ("--foxglove",), "one of the two"),
+        ("film.gif", ("--foxglove",), "one of them is expected"),
+        ("film.gif", ("--to", "127.0.0.1:9"), "one of them is expected"),
     ],
 )
 def test_what_cannot_be_filmed(
