@@ -126,3 +126,11 @@ def positive_count(text: str) -> int:
     if not 1 <= value <= 1000:
         raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 1 to 1,000 is expected")
     return value
+
+
+def port(text: str) -> int:
+    """Number of a TCP port, or 0."""
+    value = int(text) if text.isdecimal() else -1
+    if not 0 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r}: a port, 0..65535, is expected")
+    return value

@@ -64,6 +64,23 @@ def crs_transformer(crs: str) -> "Transformer":
         raise ValueError(str(error)) from error
 
 
+def height_unit(crs: str) -> tuple[str, float]:
+    """Name of a CRS' unit of height and its length in m; ("metre", 1) where it has none.
+
+    Raises ValueError for a CRS that PROJ does not know.
+    """
+    from pyproj import CRS
+    from pyproj.exceptions import ProjError
+
+    try:
+        axes = CRS.from_user_input(crs).axis_info
+    except ProjError as error:
+        raise ValueError(str(error)) from error
+    return next(
+        ((a.unit_name, a.unit_conversion_factor) for a in axes if a.direction in ("up", "down")), ("metre", 1.0)
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class PolyMap:
     """A smooth map of the plane, as a polynomial fitted to it over a rectangle.
