@@ -14,6 +14,8 @@ Short = NDArray[np.int32]
 # Side of a cell, as a share of the median reach; and cells of one grid, at most.
 CELL = 0.2
 MOST_CELLS = 300_000
+# Highest whole metre that a cell notes.
+MOST = 2_000_000_000
 # Ground beyond the map that the grid covers, as a share of the map's sides.
 BEYOND = 0.1
 
@@ -21,11 +23,12 @@ BEYOND = 0.1
 class Cells(NamedTuple):
     """Lists of units by cell, in the form that the compiled functions take.
 
-    Cell c holds units[first[c] : first[c + 1]], in increasing order.  The last cell stands for all places outside the
-    grid and holds every unit.  west, south, side: m.  cols, rows: cells across and up.
+    table: (c, 4) of each cell: where its units begin in `units`, their number, and the lowest and the highest place (m)
+    that any of them reaches.  Units stand in increasing order.  The last cell stands for all places outside the grid and
+    holds every unit.  west, south, side: m.  cols, rows: cells across and up.
     """
 
-    first: Short
+    table: Short
     units: Short
     west: float
     south: float
@@ -35,7 +38,7 @@ class Cells(NamedTuple):
 
 
 def make_cells(position: Floats, reach: Floats, bounds: Floats, spread: float = 0.0, slack: float = 0.0) -> Cells:
-    """Lists of the units (m, 3) whose horizontal reach (m,), where it is above 0, meets a cell.
+    """Lists of the units (m, 3) whose reach (m,), where it is above 0, meets a cell seen from above.
 
     bounds: (2, 2) map.  spread: cell sides by which each cell is widened for them.  slack: m, the same.
     """
@@ -49,7 +52,26 @@ def make_cells(position: Floats, reach: Floats, bounds: Floats, spread: float = 
     cols, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
     widened = np.where(reach > 0.0, reach + spread * side + slack, 0.0)
     first, units = _lists(np.ascontiguousarray(position), widened, float(low[0]), float(low[1]), side, cols, rows)
-    return Cells(first, units, float(low[0]), float(low[1]), side, cols, rows)
+    # Whole metres, a hair wider, for what rounding would leave out.
+    lowest = np.clip(np.floor(position[:, 2] - reach - slack) - 1.0, -MOST, MOST).astype(np.int32)
+    highest = np.clip(np.ceil(position[:, 2] + reach + slack) + 1.0, -MOST, MOST).astype(np.int32)
+    table = _table(first, units, lowest, highest)
+    for array in (table, units):
+        array.setflags(write=False)
+    return Cells(table, units, float(low[0]), float(low[1]), side, cols, rows)
+
+
+@compiled
+def _table(first: Short, units: Short, lowest: Short, highest: Short) -> Short:  # pragma: no cover - compiled
+    out = np.zeros((first.size - 1, 4), dtype=np.int32)
+    for cell in range(first.size - 1):
+        out[cell, 0], out[cell, 1] = first[cell], first[cell + 1] - first[cell]
+        for entry in range(first[cell], first[cell + 1]):
+            k = units[entry]
+            fresh = entry == first[cell]
+            out[cell, 2] = lowest[k] if fresh else min(out[cell, 2], lowest[k])
+            out[cell, 3] = highest[k] if fresh else max(out[cell, 3], highest[k])
+    return out
 
 
 @compiled

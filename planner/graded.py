@@ -100,7 +100,7 @@ def kill_density(
     run2 = dx * dx + dy * dy
     length2 = run2 + dz * dz
     west, south, per_metre, cols, rows = grid_of(cells)
-    first, units = cells.first, cells.units
+    table, units = cells.table, cells.units
     pieces = int(max(1.0, math.ceil(math.sqrt(run2) * per_metre)))
     dose, gap, before = 0.0, CORNER_SLACK, -1
     for piece in range(pieces + 1):
@@ -109,7 +109,7 @@ def kill_density(
         if cell == before:
             continue
         before = cell
-        for entry in range(first[cell], first[cell + 1]):
+        for entry in range(table[cell, 0], table[cell, 0] + table[cell, 1]):
             k = np.uintp(units[entry])
             if seen[k] == stamp:
                 continue

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from planner.cells import make_cells
 from planner.encoding import Space
-from planner.rules import CORNER_SLACK, Rules
+from planner.rules import CORNER_SLACK, Rules, pack_spheres
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
@@ -95,6 +95,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.packed,
         threats=units,
+        spheres=pack_spheres(units),
         aircraft=_with_share(limits, scenario.wind.turbulence),
         bounds=scenario.bounds,
         start=scenario.start,

@@ -12,12 +12,15 @@ Heights = NDArray[np.float32]
 
 # Reach beside a leg that is looked into for missiles, m: what the arcs that cut its corners may use of it.
 CORNER_SLACK = 30.0
+# Numbers of a row of `Rules.spheres`: as long as a line of the processor's cache.
+SPHERE = 8
 
 
 class Rules(NamedTuple):
     """What paths are judged against, in the form that the compiled functions take.
 
-    threats: (m, 7) east, north, up, kill radius and scale, detection radius and scale.  aircraft: packed limits.
+    threats: (m, 7) east, north, up, kill radius and scale, detection radius and scale.  spheres: the same, of
+    `pack_spheres`.  aircraft: packed limits.
     max_turn: rad.  room: whether a leg must hold its turns.  fly_over: whether a
     turn begins at its waypoint, not before it.  climb, dive: rad, NaN to ask the aircraft.
     spare: rad kept inside slope limits.  clearance, reserve: m, required and kept on top.  kill_margin: m.
@@ -30,6 +33,7 @@ class Rules(NamedTuple):
     heights: Heights
     to_pixel: Floats
     threats: Floats
+    spheres: Floats
     aircraft: Floats
     bounds: Floats
     start: Floats
@@ -53,3 +57,16 @@ class Rules(NamedTuple):
     near: Cells
     missiles: Cells
     steepest: float
+
+
+def pack_spheres(threats: Floats) -> Floats:
+    """Threats (m, 7) as a point is compared with them, (m, 8): place, r^2 and scale^4 of missile and radar, and 0."""
+    out = np.zeros((len(threats), SPHERE))
+    out[:, :3] = threats[:, :3]
+    for column in (3, 5):
+        radius = threats[:, column]
+        # A radius of 0 is no weapon, and no square is below this.
+        out[:, column] = np.where(radius > 0.0, radius * radius, -1.0)
+        out[:, column + 1] = threats[:, column + 1] ** 4
+    out.setflags(write=False)
+    return out

@@ -83,7 +83,8 @@ def test_cells_hold_every_threat_that_reaches_them() -> None:
     grid = grid_of(cells)
     for place in rng.uniform(-8000, 8000, (2000, 2)):
         cell = cell_at(*grid, *place)
-        listed = set(cells.units[cells.first[cell] : cells.first[cell + 1]].tolist())
+        first, number = cells.table[cell, :2]
+        listed = set(cells.units[first : first + number].tolist())
         away = np.hypot(*(position[:, :2] - place).T)
         assert set(np.flatnonzero((away <= reach) & (reach > 0)).tolist()) <= listed
 
