@@ -148,27 +148,30 @@ def _add_exposures(spheres: Floats, units: Short, size: int, w: Floats, t: Ints)
     In rounds: the first unit of each list, then the second, as long as there are any.  Within a round no loop depends
     on what is in a list, which nobody could guess.
     """
-    count = 0
+    # Unsigned: numba would look whether each index counts from the end.
+    east, north, up = np.uintp(POINT + EAST), np.uintp(POINT + NORTH), np.uintp(POINT + UP)
+    kill, seen, asked = np.uintp(KILL), np.uintp(SEEN), np.uintp(ASKED)
+    one, r2_kill, kill4, r2_seen, seen4 = np.uintp(1), np.uintp(3), np.uintp(4), np.uintp(5), np.uintp(6)
+    count = np.uintp(0)
     for b in range(size):
-        t[ASKED + count] = b
-        count += 1 if t[NUMBER + b] > 0 else 0
+        t[asked + count] = b
+        count += one if t[NUMBER + b] > 0 else np.uintp(0)
     turn = 0
     while count > 0:
-        left = 0
+        left = np.uintp(0)
         for entry in range(count):
-            b = np.uintp(t[ASKED + entry])
-            k = np.uintp(units[np.uintp(t[FIRST + b] + turn)]) * np.uintp(SPHERE)
-            dx = w[POINT + EAST + b] - spheres[k]
-            dy = w[POINT + NORTH + b] - spheres[k + np.uintp(1)]
-            dz = w[POINT + UP + b] - spheres[k + np.uintp(2)]
+            b = np.uintp(t[asked + np.uintp(entry)])
+            k = np.uintp(units[np.uintp(t[np.uintp(FIRST) + b] + turn)]) * np.uintp(SPHERE)
+            dx, dy = w[east + b] - spheres[k], w[north + b] - spheres[k + one]
+            dz = w[up + b] - spheres[k + np.uintp(2)]
             d2 = dx * dx + dy * dy + dz * dz
             closest2 = d2 if d2 > CLOSEST * CLOSEST else CLOSEST * CLOSEST
             share = 1.0 / (closest2 * closest2)
             # By multiplication: whether a radius is passed cannot be guessed, and a wrong guess costs more.
-            w[KILL + b] += spheres[k + np.uintp(4)] * share * (1.0 if d2 <= spheres[k + np.uintp(3)] else 0.0)
-            w[SEEN + b] += spheres[k + np.uintp(6)] * share * (1.0 if d2 <= spheres[k + np.uintp(5)] else 0.0)
-            t[ASKED + left] = np.int64(b)
-            left += 1 if t[NUMBER + b] > turn + 1 else 0
+            w[kill + b] += spheres[k + kill4] * share * (1.0 if d2 <= spheres[k + r2_kill] else 0.0)
+            w[seen + b] += spheres[k + seen4] * share * (1.0 if d2 <= spheres[k + r2_seen] else 0.0)
+            t[asked + left] = np.int64(b)
+            left += one if t[np.uintp(NUMBER) + b] > turn + 1 else np.uintp(0)
         count = left
         turn += 1
 
