@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
 from planner.cells import Cells, cell_at, grid_of
-from planner.corners import ARC_STEP, blend_reach, corner
+from planner.corners import ARC_STEP, blend_reach, corner_past
 from planner.criteria import POINTS
 from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs, required_clearance
-from planner.rules import CORNER_SLACK, Rules
+from planner.rules import CORNER_SLACK, Rules, Steep
 from world.frames import polymap
 from world.geometry import window_exposure
-from world.terrain import pixel_height
+from world.terrain import TILE, pixel_height
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -27,6 +27,10 @@ Pixels = tuple[float, float, float, float]
 
 # Height above the required clearance that steps over the ground leave unseen, m: corners may use it.
 SEEN = 10.0
+# Rise of an arc above its chord, as a share of its radius.
+CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
+# Columns of `Bench.bends`.
+RADIUS, DROP, ASIDE, REACH = 0, 1, 2, 3
 # Violation of a sample without known ground, m.
 UNKNOWN = 1000.0
 
@@ -34,6 +38,7 @@ UNKNOWN = 1000.0
 @compiled
 def terrain_excess(
     heights: Heights,
+    steep: Steep,
     clear: Floats,
     ends: Pixels,
     ax: float,
@@ -42,31 +47,46 @@ def terrain_excess(
     bx: float,
     by: float,
     bz: float,
-) -> tuple[float, float]:  # pragma: no cover - compiled
+    first: float,
+    last: float,
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Depth below the required clearance along a-b, summed over samples (m x km), and the least height above it.
 
-    ends: columns and rows of a and b.  clear: of `pack_clearance`.  The least height is right up to `SEEN`; above that
-    it says no more than "at least `SEEN`".
+    ends: columns and rows of a and b.  steep: of the rules.  clear: of `pack_clearance`.  first, last: lengths (m) at
+    a and at b: the least heights are those there.  They are right up to `SEEN`; above that they say no more than "at
+    least `SEEN`".
     """
     col, row, across, down, rise = ends[0], ends[1], ends[2] - ends[0], ends[3] - ends[1], bz - az
     run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
     step = 1.0 / max(1.0, math.ceil(run / clear[8]))
-    # Fastest loss of height above ground, m for the whole segment.
-    per_fall = 1.0 / (clear[9] * run + abs(rise) + 1e-9)
+    per_metre = 1.0 / max(run, 1e-9)
+    # A sample stands for the step that follows it, and for the one before.
+    until, since = first * per_metre + step, 1.0 - last * per_metre - step
+    tiles_down, tiles_across = np.int64(steep.slopes.shape[0] - 1), np.int64(steep.slopes.shape[1] - 1)
+    tile = steep.reach * per_metre
     need, whole = clear[0] + clear[1], clear[10] > 0.0
-    depth, least, f = 0.0, math.inf, 0.0
+    depth, near_a, near_b, f = 0.0, math.inf, math.inf, 0.0
     while True:
-        ground = pixel_height(heights, col + f * across, row + f * down)
+        c, r = col + f * across, row + f * down
+        ground = pixel_height(heights, c, r)
         if not whole:
             need = required_clearance(clear, ax + f * (bx - ax), ay + f * (by - ay))
         gap = az + f * rise - ground - need if ground == ground else -UNKNOWN
-        least = min(least, gap)
+        near_a = gap if gap < near_a and f <= until else near_a
+        near_b = gap if gap < near_b and f >= since else near_b
         if gap < 0.0:
             depth -= gap
         if f >= 1.0:
             break
-        f = min(1.0, f + max(step, (gap - SEEN) * per_fall))
-    return depth * max(run, 1.0) * step / 1000.0, least
+        ahead = step
+        if gap > SEEN:
+            i = min(max(np.int64(r) // TILE, 0), tiles_down)
+            j = min(max(np.int64(c) // TILE, 0), tiles_across)
+            # Fastest loss of height above ground, m for the whole segment.
+            fall = (steep.slopes[np.uintp(i), np.uintp(j)] + clear[11]) * run + abs(rise) + 1e-9
+            ahead = max(step, min(tile, (gap - SEEN) / fall))
+        f = min(1.0, f + ahead)
+    return depth * max(run, 1.0) * step / 1000.0, near_a, near_b
 
 
 @compiled
@@ -90,40 +110,63 @@ def kill_density(
     bx: float,
     by: float,
     bz: float,
-) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Mean kill density over the segment a-b, radii grown by the margin, and distance to the nearest such sphere, m.
+    first: float,
+    last: float,
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Mean kill density over the segment a-b, radii grown by the margin, and distances to the nearest such sphere, m.
 
-    cells: the rules' missiles.  The distance is right up to `CORNER_SLACK`.  seen (m,), stamp: scratch; units seen
-    with this stamp are left out.
+    cells: the rules' missiles.  first, last: lengths (m) at a and at b: the distances are from there.  They are right
+    up to `CORNER_SLACK`.  seen (m,), stamp: scratch; units seen with this stamp are left out.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     run2 = dx * dx + dy * dy
     length2 = run2 + dz * dz
+    inverse = 1.0 / length2 if length2 > 0.0 else 0.0
     west, south, per_metre, cols, rows = grid_of(cells)
     table, units = cells.table, cells.units
     pieces = int(max(1.0, math.ceil(math.sqrt(run2) * per_metre)))
-    dose, gap, before = 0.0, CORNER_SLACK, -1
+    share = 1.0 / pieces
+    # The part of the leg for which a cell is asked ends halfway to its neighbours.
+    beside = 0.5 * share * abs(dz)
+    dose, near_a, near_b, before = 0.0, CORNER_SLACK, CORNER_SLACK, -1
     for piece in range(pieces + 1):
-        f = piece / pieces
+        f = piece * share
         cell = cell_at(west, south, per_metre, cols, rows, ax + f * dx, ay + f * dy)
-        if cell == before:
+        z = az + f * dz
+        c = np.uintp(cell)
+        if cell == before or z + beside < table[c, 2] or z - beside > table[c, 3]:
             continue
         before = cell
-        for entry in range(table[cell, 0], table[cell, 0] + table[cell, 1]):
-            k = np.uintp(units[entry])
+        for entry in range(table[c, 0], table[c, 0] + table[c, 1]):
+            k = np.uintp(units[np.uintp(entry)])
             if seen[k] == stamp:
                 continue
             seen[k] = stamp
             x, y, z = ax - threats[k, 0], ay - threats[k, 1], az - threats[k, 2]
             radius = threats[k, 3] + margin
             along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
-            nearest = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
-            closest2 = max(0.0, start2 + 2.0 * nearest * along + nearest * nearest * length2)
+            closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
             if closest2 < (radius + CORNER_SLACK) * (radius + CORNER_SLACK):
-                gap = min(gap, math.sqrt(closest2) - radius)
+                length = math.sqrt(length2)
+                one = _closest2(-along * inverse, 0.0, first / max(length, first), along, start2, length2)
+                two = _closest2(-along * inverse, 1.0 - last / max(length, last), 1.0, along, start2, length2)
+                near_a, near_b = min(near_a, math.sqrt(one) - radius), min(near_b, math.sqrt(two) - radius)
                 if closest2 < radius * radius:
                     dose += _dose(along, start2, length2, radius, threats[k, 4])
-    return dose, gap
+    return dose, near_a, near_b
+
+
+@compiled
+def _closest2(
+    nearest: float, low: float, high: float, along: float, start2: float, length2: float
+) -> float:  # pragma: no cover - compiled
+    """Squared distance from a point to the part low..high (fractions) of a segment.
+
+    nearest: fraction of the whole line that is nearest to it.  along, start2, length2: see `window_exposure`.
+    """
+    f = nearest if nearest < high else high
+    f = f if f > low else low
+    return max(0.0, start2 + f * (2.0 * along + f * length2))
 
 
 @compiled
@@ -138,10 +181,15 @@ def _dose(along: float, start2: float, length2: float, radius: float, scale: flo
 
 
 class Bench(NamedTuple):
-    """Scratch for judging one path after another: legs, corners, gaps of each leg, units seen, and the last stamp."""
+    """Scratch for judging one path after another.
+
+    legs, corners: measured.  bends: (w, 4) of `_measure_bend`.  gaps: (w - 1, 4) height over ground near both ends of
+    each leg, and distance from missiles.  seen, stamp: units seen, and the last stamp.
+    """
 
     legs: Floats
     corners: Floats
+    bends: Floats
     gaps: Floats
     seen: Ints
     stamp: Ints
@@ -151,8 +199,14 @@ class Bench(NamedTuple):
 def make_bench(rules: Rules, count: int) -> Bench:  # pragma: no cover - compiled
     """Scratch for paths of `count` waypoints."""
     seen = np.zeros(rules.threats.shape[0], dtype=np.int64)
-    shape = count - 1
-    return Bench(np.empty((shape, 4)), np.zeros((count, 2)), np.empty((shape, 2)), seen, np.zeros(1, dtype=np.int64))
+    return Bench(
+        np.empty((count - 1, 4)),
+        np.zeros((count, 2)),
+        np.zeros((count, 4)),
+        np.empty((count - 1, 4)),
+        seen,
+        np.zeros(1, dtype=np.int64),
+    )
 
 
 @compiled
@@ -162,31 +216,47 @@ def score_path(
     """Judge path n of (n, w, 3): rows n of missed (n, 4), which must be 0, and of objectives."""
     # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
     heights, to_pixel, threats, missiles = rules.heights, rules.to_pixel, rules.threats, rules.missiles
-    clear, margin = gauge.clear, rules.kill_margin
-    legs, corners, gaps, seen, stamp = bench.legs, bench.corners, bench.gaps, bench.seen, bench.stamp[0]
+    steep, packed, clear, margin = rules.steep, rules.aircraft, gauge.clear, rules.kill_margin
+    legs, corners, bends, gaps = bench.legs, bench.corners, bench.bends, bench.gaps
+    seen, stamp = bench.seen, bench.stamp[0]
     count = paths.shape[1]
     measure_legs(paths, n, legs)
     measure_corners(rules, gauge, paths, n, legs, corners)
     constraints(rules, gauge, paths, n, legs, corners, True, missed)
+    room, fly_over = rules.room, rules.fly_over
+    for i in range(1, count - 1):
+        _measure_bend(packed, room, fly_over, paths, n, i, legs, corners, bends)
     length, kill = 0.0, 0.0
     after = polymap(to_pixel, paths[n, 0, 0], paths[n, 0, 1])
     for i in range(count - 1):
         stamp += 1
         x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
         x2, y2, z2 = paths[n, i + 1, 0], paths[n, i + 1, 1], paths[n, i + 1, 2]
+        first, last = bends[i, REACH], bends[i + 1, REACH]
         before = after
         after = polymap(to_pixel, x2, y2)
         ends = (before[0], before[1], after[0], after[1])
-        depth, gaps[i, 0] = terrain_excess(heights, clear, ends, x, y, z, x2, y2, z2)
-        dose, gaps[i, 1] = kill_density(threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2)
+        depth, gaps[i, 0], gaps[i, 1] = terrain_excess(
+            heights, steep, clear, ends, x, y, z, x2, y2, z2, first, last
+        )
+        dose, gaps[i, 2], gaps[i, 3] = kill_density(
+            threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2, first, last
+        )
         missed[n, 2] += depth
         kill += dose * legs[i, 3]
         length += legs[i, 3]
     for i in range(1, count - 1):
-        low, close, radius = _corner_matters(rules, gauge, paths, n, i, legs, corners, gaps)
-        if low or close:
-            stamp, dose = _judge_corner(rules, clear, paths, n, i, radius, low, close, seen, stamp, missed)
-            kill += dose
+        drop, aside = bends[i, DROP], bends[i, ASIDE]
+        low = min(gaps[i - 1, 1], gaps[i, 0]) < drop + clear[9] * aside
+        close = min(gaps[i - 1, 3], gaps[i, 2]) < drop + aside
+        if drop + aside < 0.01 or not (low or close):
+            continue
+        arc = corner_past(packed, paths[n, i - 1], paths[n, i], paths[n, i + 1], bends[i, RADIUS])
+        if low:
+            missed[n, 2] += _corner_depth(heights, steep, to_pixel, clear, arc)
+        if close:
+            kill += _corner_kill(threats, missiles, margin, seen, stamp, arc)
+            stamp += arc.shape[0]
     bench.stamp[0] = stamp
     objectives[n, 0] = length / gauge.straight
     objectives[n, 1] = kill * POINTS * (count - 1) / length
@@ -229,54 +299,50 @@ def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # 
 
 
 @compiled
-def _corner_matters(
-    rules: Rules, gauge: Gauge, paths: Floats, n: int, i: int, legs: Floats, corners: Floats, gaps: Floats
-) -> tuple[bool, bool, float]:  # pragma: no cover - compiled
-    """Whether ground and missiles may be closer to the flown corner at waypoint i than to its legs; its arc's radius.
+def _measure_bend(
+    packed: Floats, room: bool, fly_over: bool, paths: Floats, n: int, i: int, legs: Floats, corners: Floats, out: Floats
+) -> None:  # pragma: no cover - compiled
+    """Fill out[i]: radius of the flown arc at waypoint i, and how far the flown corner departs from the legs, m.
 
-    They are not where the legs stay further from them than the corner departs from the legs: sideways by at most
-    R(1/cos(theta/2) - 1) and a chord's rise, downwards by the crest that is cut.
+    Downwards it is by the crest that is cut, and sideways by at most R(1/cos(theta/2) - 1) and a chord's rise; and it
+    does so within `REACH` of the waypoint: within the tangent and half the arc, or the blend of heights.
     """
-    radius = 0.0 if rules.fly_over else _arc_radius(rules.room, legs, corners, i)
+    radius = 0.0 if fly_over else _arc_radius(room, legs, corners, i)
     tangent = corners[i, 0] if radius > 0.0 else 0.0
     before, after = max(legs[i - 1, 2], 1e-6), max(legs[i, 2], 1e-6)
     slope_in, slope_out = (paths[n, i, 2] - paths[n, i - 1, 2]) / before, (paths[n, i + 1, 2] - paths[n, i, 2]) / after
     crest = max(0.0, slope_in - slope_out)
-    reach = blend_reach(rules.aircraft, paths[n, i, 2])
+    reach = blend_reach(packed, paths[n, i, 2])
     aside = math.sqrt(radius * radius + tangent * tangent) - radius
-    aside += min(aside, radius * (1.0 - math.cos(0.5 * ARC_STEP)))
-    drop = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
-    if aside + drop < 0.01:
-        return False, False, radius
-    ground, missile = min(gaps[i - 1, 0], gaps[i, 0]), min(gaps[i - 1, 1], gaps[i, 1])
-    return ground < drop + gauge.clear[9] * aside, missile < drop + aside, radius
+    aside += min(aside, radius * CHORD_RISE)
+    out[i, RADIUS] = radius
+    out[i, DROP] = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
+    out[i, ASIDE] = aside
+    out[i, REACH] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * reach
 
 
 @compiled
-def _judge_corner(
-    rules: Rules,
-    clear: Floats,
-    paths: Floats,
-    n: int,
-    i: int,
-    radius: float,
-    low: bool,
-    close: bool,
-    seen: Ints,
-    stamp: int,
-    missed: Floats,
-) -> tuple[int, float]:  # pragma: no cover - compiled
-    """Add what the flown corner at waypoint i violates; return the stamp used last and its kill density x length."""
-    arc = corner(rules, paths[n, i - 1], paths[n, i], paths[n, i + 1], radius)
-    kill = 0.0
+def _corner_depth(
+    heights: Heights, steep: Steep, to_pixel: Floats, clear: Floats, arc: Floats
+) -> float:  # pragma: no cover - compiled
+    """Depth below the required clearance along a flown corner (k, 3), m x km."""
+    total = 0.0
     for k in range(arc.shape[0] - 1):
         x, y, z, x2, y2, z2 = arc[k, 0], arc[k, 1], arc[k, 2], arc[k + 1, 0], arc[k + 1, 1], arc[k + 1, 2]
-        if low:
-            ends = pixels(rules.to_pixel, x, y, x2, y2)
-            depth, _ = terrain_excess(rules.heights, clear, ends, x, y, z, x2, y2, z2)
-            missed[n, 2] += depth
-        if close:
-            stamp += 1
-            dose, _ = kill_density(rules.threats, rules.missiles, rules.kill_margin, seen, stamp, x, y, z, x2, y2, z2)
-            kill += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
-    return stamp, kill
+        ends = pixels(to_pixel, x, y, x2, y2)
+        depth, _, _ = terrain_excess(heights, steep, clear, ends, x, y, z, x2, y2, z2, 0.0, 0.0)
+        total += depth
+    return total
+
+
+@compiled
+def _corner_kill(
+    threats: Floats, missiles: Cells, margin: float, seen: Ints, stamp: int, arc: Floats
+) -> float:  # pragma: no cover - compiled
+    """Kill density x length along a flown corner (k, 3); uses the stamps after this one, one a piece."""
+    total = 0.0
+    for k in range(arc.shape[0] - 1):
+        x, y, z, x2, y2, z2 = arc[k, 0], arc[k, 1], arc[k, 2], arc[k + 1, 0], arc[k + 1, 1], arc[k + 1, 2]
+        dose, _, _ = kill_density(threats, missiles, margin, seen, stamp + k + 1, x, y, z, x2, y2, z2, 0.0, 0.0)
+        total += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
+    return total

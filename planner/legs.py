@@ -301,14 +301,15 @@ def pack_clearance(rules: Rules) -> Floats:  # pragma: no cover - compiled
     """What the terrain is judged with, (12,): clearance, reserve; east, north, slack of both ends; and steps.
 
     The last four: pitch of samples (m), the steepest loss of height above the required clearance (m per m), whether
-    the reserve is the same everywhere (1 or 0), and nothing.
+    the reserve is the same everywhere (1 or 0), and what the reserve alone adds to the ground's slope.
     """
     out = np.zeros(12)
     out[0], out[1] = rules.clearance, rules.reserve
     out[2], out[3], out[4] = rules.start[0], rules.start[1], rules.start_slack
     out[5], out[6], out[7] = rules.destination[0], rules.destination[1], rules.destination_slack
     whole = min(rules.start_slack, rules.destination_slack) >= rules.reserve
-    out[8], out[9] = rules.pitch, rules.steepest + (0.0 if whole else RESERVE_GROWTH)
+    out[11] = 0.0 if whole else RESERVE_GROWTH
+    out[8], out[9] = rules.pitch, rules.steep.most + out[11]
     out[10] = 1.0 if whole else 0.0
     return out
 

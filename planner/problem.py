@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from planner.cells import make_cells
 from planner.encoding import Space
-from planner.rules import CORNER_SLACK, Rules, pack_spheres
+from planner.rules import CORNER_SLACK, Rules, Steep, pack_spheres
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
-from world.terrain import steepest_slope
+from world.terrain import TILE, Terrain, steepest_slopes
 
 Floats = NDArray[np.float64]
 
@@ -119,8 +119,19 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         near=make_cells(threats.position, reach, scenario.bounds),
         # Half a cell's side on either side of points that stand a side apart.
         missiles=make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK),
-        steepest=float(steepest_slope(terrain.heights, terrain.spacing)),
+        steep=_steep(terrain),
     )
+
+
+def _steep(terrain: Terrain) -> Steep:
+    slopes = steepest_slopes(terrain.heights, terrain.spacing)
+    most = float(slopes.max())
+    # Each tile with its neighbours, so that a tile's side from any place of it is known.
+    padded = np.pad(slopes, 1)
+    shape = slopes.shape
+    around = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
+    around.setflags(write=False)
+    return Steep(most, around, TILE * terrain.spacing)
 
 
 def _with_share(limits: Limits, turbulence: str) -> Floats:

@@ -16,6 +16,17 @@ CORNER_SLACK = 30.0
 SPHERE = 8
 
 
+class Steep(NamedTuple):
+    """How steep the ground is, m per m: nowhere more than `most`; within `reach` m of a tile's pixels than slopes (i, j).
+
+    Tiles are of `world.terrain.TILE` pixels a side.
+    """
+
+    most: float
+    slopes: Heights
+    reach: float
+
+
 class Rules(NamedTuple):
     """What paths are judged against, in the form that the compiled functions take.
 
@@ -27,7 +38,7 @@ class Rules(NamedTuple):
     pitch: m between terrain samples of the graded judge.
     start_course, destination_course: rad or NaN.  start_slack, destination_slack: m of reserve at the ends.
     near: the threats that may reach a point.  missiles: those whose missile, the margin added, may reach a stretch of
-    path as long as a cell, and `CORNER_SLACK` m beside it.  steepest: of the ground, m per m.
+    path as long as a cell, and `CORNER_SLACK` m beside it.  steep: how steep the ground is.
     """
 
     heights: Heights
@@ -56,7 +67,7 @@ class Rules(NamedTuple):
     destination_slack: float
     near: Cells
     missiles: Cells
-    steepest: float
+    steep: Steep
 
 
 def pack_spheres(threats: Floats) -> Floats:
