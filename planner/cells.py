@@ -6,13 +6,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, inlined
 
 Floats = NDArray[np.float64]
 Short = NDArray[np.int32]
 
-# Side of a cell, as a share of the median reach; and cells of one grid, at most.
+# Side of a cell, as a share of the median reach: for points, and for lines; and cells of one grid, at most.
 CELL = 0.2
+SOLID_CELL = 0.7
 MOST_CELLS = 300_000
 # Highest whole metre that a cell notes.
 MOST = 2_000_000_000
@@ -24,41 +25,90 @@ class Cells(NamedTuple):
     """Lists of units by cell, in the form that the compiled functions take.
 
     table: (c, 4) of each cell: where its units begin in `units`, their number, and the lowest and the highest place (m)
-    that any of them reaches.  Units stand in increasing order.  The last cell stands for all places outside the grid and
-    holds every unit.  west, south, side: m.  cols, rows: cells across and up.
+    that any of them reaches.  Units stand in increasing order.  The last cell stands for all places outside the map and
+    holds every unit.  west, south, bottom, side: m.  cols, rows, slabs: cells across, along and up; the lowest slab
+    reaches down, and the highest up, without end.
     """
 
     table: Short
     units: Short
     west: float
     south: float
+    bottom: float
     side: float
     cols: int
     rows: int
+    slabs: int
 
 
-def make_cells(position: Floats, reach: Floats, bounds: Floats, spread: float = 0.0, slack: float = 0.0) -> Cells:
+class Grid(NamedTuple):
+    """What `cell_at` takes of some cells; per_metre: cells a metre."""
+
+    west: float
+    south: float
+    bottom: float
+    per_metre: float
+    cols: int
+    rows: int
+    slabs: int
+
+
+def make_cells(position: Floats, reach: Floats, bounds: Floats) -> Cells:
     """Lists of the units (m, 3) whose reach (m,), where it is above 0, meets a cell seen from above.
 
-    bounds: (2, 2) map.  spread: cell sides by which each cell is widened for them.  slack: m, the same.
+    bounds: (2, 2) map.
     """
-    low, high = bounds[:, 0], bounds[:, 1]
-    low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
-    size = high - low
-    side = math.sqrt(float(size[0] * size[1]) / MOST_CELLS)
+    low, high = _wider(bounds)
+    side = math.sqrt(float(np.prod(high - low)) / MOST_CELLS)
     armed = reach[reach > 0.0]
     if armed.size:
-        side = min(max(side, CELL * float(np.median(armed))), float(size.max()))
-    cols, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
-    widened = np.where(reach > 0.0, reach + spread * side + slack, 0.0)
-    first, units = _lists(np.ascontiguousarray(position), widened, float(low[0]), float(low[1]), side, cols, rows)
+        side = min(max(side, CELL * float(np.median(armed))), float((high - low).max()))
+    return _make(position, reach, reach, low, high, (0.0, 0.0), side)
+
+
+def make_solid_cells(
+    position: Floats, reach: Floats, bounds: Floats, heights: tuple[float, float], slack: float
+) -> Cells:
+    """Lists of the units (m, 3) for points that stand a side apart along a line: those that may reach half-way.
+
+    reach: (m,) m, the slack (m) not included, of units with any.  bounds: (2, 2) map.  heights: m, lowest and highest
+    of a path.
+    """
+    low, high = _wider(bounds)
+    side = float((high - low).max())
+    armed = reach[reach > 0.0]
+    if armed.size:
+        side = min(SOLID_CELL * (float(np.median(armed)) + slack), side)
+    while np.prod(np.ceil((high - low) / side)) * math.ceil(max(1.0, heights[1] - heights[0]) / side) > MOST_CELLS:
+        side *= 1.1
+    # Half a side along each axis, seen from above and from the side.
+    widened = np.where(reach > 0.0, reach + slack + 0.5 * side, 0.0)
+    return _make(position, reach + slack + 0.5 * side, widened, low, high, heights, side)
+
+
+def _wider(bounds: Floats) -> tuple[Floats, Floats]:
+    low, high = bounds[:, 0], bounds[:, 1]
+    return low - BEYOND * (high - low), high + BEYOND * (high - low)
+
+
+def _make(
+    position: Floats, tall: Floats, wide: Floats, low: Floats, high: Floats, heights: tuple[float, float], side: float
+) -> Cells:
+    """Cells of this side; tall, wide: how far units reach up and down, and sideways, m."""
+    cols, rows, slabs = (
+        max(1, math.ceil(size / side)) for size in (high[0] - low[0], high[1] - low[1], heights[1] - heights[0])
+    )
+    west, south, bottom = float(low[0]), float(low[1]), float(heights[0])
     # Whole metres, a hair wider, for what rounding would leave out.
-    lowest = np.clip(np.floor(position[:, 2] - reach - slack) - 1.0, -MOST, MOST).astype(np.int32)
-    highest = np.clip(np.ceil(position[:, 2] + reach + slack) + 1.0, -MOST, MOST).astype(np.int32)
+    lowest = np.clip(np.floor(position[:, 2] - tall) - 1.0, -MOST, MOST).astype(np.int32)
+    highest = np.clip(np.ceil(position[:, 2] + tall) + 1.0, -MOST, MOST).astype(np.int32)
+    between = np.stack([lowest, highest], axis=1)
+    place = np.ascontiguousarray(position[:, :2] - low)
+    first, units = _lists(place / side, wide / side, (between - bottom) / side, cols, rows, slabs)
     table = _table(first, units, lowest, highest)
     for array in (table, units):
         array.setflags(write=False)
-    return Cells(table, units, float(low[0]), float(low[1]), side, cols, rows)
+    return Cells(table, units, west, south, bottom, side, cols, rows, slabs)
 
 
 @compiled
@@ -74,46 +124,54 @@ def _table(first: Short, units: Short, lowest: Short, highest: Short) -> Short: 
     return out
 
 
-@compiled
-def grid_of(cells: Cells) -> tuple[float, float, float, int, int]:  # pragma: no cover - compiled
-    """What `cell_at` takes of a grid."""
-    return cells.west, cells.south, 1.0 / cells.side, cells.cols, cells.rows
+@inlined
+def grid_of(cells: Cells) -> Grid:  # pragma: no cover - compiled
+    """What `cell_at` takes of some cells."""
+    return Grid(cells.west, cells.south, cells.bottom, 1.0 / cells.side, cells.cols, cells.rows, cells.slabs)
 
 
-@compiled
-def cell_at(
-    west: float, south: float, per_metre: float, cols: int, rows: int, east: float, north: float
-) -> int:  # pragma: no cover - compiled
-    """Number of the cell at a place, of a grid as `grid_of` gives it; per_metre: cells a metre."""
-    col, row = (east - west) * per_metre, (north - south) * per_metre
+@inlined
+def cell_at(grid: Grid, east: float, north: float, up: float) -> int:  # pragma: no cover - compiled
+    """Number of the cell at a place."""
+    col, row = (east - grid.west) * grid.per_metre, (north - grid.south) * grid.per_metre
     # Written so that NaN falls outside.
-    if col >= 0.0 and row >= 0.0 and col < cols and row < rows:
-        return int(row) * cols + int(col)
-    return cols * rows
+    if col >= 0.0 and row >= 0.0 and col < grid.cols and row < grid.rows:
+        slab = (up - grid.bottom) * grid.per_metre
+        slab = slab if slab > 0.0 else 0.0
+        slab = slab if slab < grid.slabs - 1.0 else grid.slabs - 1.0
+        return (int(slab) * grid.rows + int(row)) * grid.cols + int(col)
+    return grid.slabs * grid.cols * grid.rows
 
 
 @compiled
 def _lists(
-    position: Floats, reach: Floats, west: float, south: float, side: float, cols: int, rows: int
+    place: Floats, reach: Floats, between: Floats, cols: int, rows: int, slabs: int
 ) -> tuple[Short, Short]:  # pragma: no cover - compiled
-    count = cols * rows
+    """Where the units of each cell begin, and the units.
+
+    place: (m, 2), reach: (m,), and between: (m, 2), the lowest and highest height reached, in sides.
+    """
+    count = cols * rows * slabs
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)
     filled = first[:0].copy()
     # Counted first, then filled.
     for turn in range(2):
-        for k in range(position.shape[0]):
+        for k in range(place.shape[0]):
             if reach[k] <= 0.0:
                 continue
-            x, y, r = (position[k, 0] - west) / side, (position[k, 1] - south) / side, reach[k] / side
             # A hair wider, for what rounding would leave out.
-            r += 1e-6
+            x, y, r = place[k, 0], place[k, 1], reach[k] + 1e-6
+            lowest = min(slabs - 1, max(0, math.floor(between[k, 0])))
+            highest = min(slabs - 1, max(0, math.floor(between[k, 1])))
             for row in range(max(0, math.floor(y - r)), min(rows - 1, math.floor(y + r)) + 1):
                 dy = max(0.0, row - y, y - row - 1.0)
                 for col in range(max(0, math.floor(x - r)), min(cols - 1, math.floor(x + r)) + 1):
                     dx = max(0.0, col - x, x - col - 1.0)
-                    if dx * dx + dy * dy <= r * r:
-                        cell = row * cols + col
+                    if dx * dx + dy * dy > r * r:
+                        continue
+                    for slab in range(lowest, highest + 1):
+                        cell = (slab * rows + row) * cols + col
                         if turn == 0:
                             first[cell + 1] += 1
                         else:

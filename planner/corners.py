@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, inlined
 from planner.rules import Rules
 from world.geometry import turning_angle
 from world.limits import BLEND_ACCELERATION, turn_tangents, wind_speed_at
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 ARC_STEP = math.radians(15.0)
 
 
-@compiled
+@inlined
 def blend_reach(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
     """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
     speed = packed[0, 0] + wind_speed_at(packed, amsl)
@@ -75,7 +75,7 @@ def corner_past(packed: Floats, before: Floats, at: Floats, after: Floats, radiu
     return out
 
 
-@compiled
+@inlined
 def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  # pragma: no cover - compiled
     out[row, 0] = east
     out[row, 1] = north

@@ -13,8 +13,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
-from planner.cells import Cells, Short, grid_of
+from aircraft.compiled import compiled, compiled_views
+from planner.cells import Cells, Short
 from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs, required_clearance
 from planner.rules import SPHERE, Rules
 from world.geometry import CLOSEST
@@ -46,7 +46,7 @@ TOP_LEFT, TOP_RIGHT, LOW_LEFT, LOW_RIGHT = (k * BLOCK for k in range(4))
 AT, FIRST, NUMBER, ASKED = (k * BLOCK for k in range(4))
 
 
-@compiled
+@compiled_views
 def _load(packed: Floats, paths: Floats, begin: int, i: int, size: int, w: Floats) -> None:  # pragma: no cover
     """Fill in waypoint i of each path, and take it to the raster: `polymap`, for all of them at once."""
     for b in range(size):
@@ -73,7 +73,7 @@ def _load(packed: Floats, paths: Floats, begin: int, i: int, size: int, w: Float
                 w[out + b] = w[out + b] * w[A + b] + w[C + b]
 
 
-@compiled
+@compiled_views
 def _ground(heights: Heights, size: int, w: Floats, corners: Heights, t: Ints) -> None:  # pragma: no cover - compiled
     """Fill in the ground's height at the points, as `pixel_height` gives it."""
     rows, cols = heights.shape
@@ -106,7 +106,7 @@ def _ground(heights: Heights, size: int, w: Floats, corners: Heights, t: Ints) -
         w[GROUND + b] = w[GROUND + b] if inside else math.nan
 
 
-@compiled
+@compiled_views
 def _add_terrain(clear: Floats, size: int, inner: bool, w: Floats) -> None:  # pragma: no cover - compiled
     """Add what the ground at the points says of terrain and height (eq. 5, 11)."""
     for b in range(size):
@@ -123,10 +123,11 @@ def _add_terrain(clear: Floats, size: int, inner: bool, w: Floats) -> None:  # p
             w[HEIGHT + b] += above if above > 0.0 else 0.0
 
 
-@compiled
+@compiled_views
 def _find_units(near: Cells, size: int, w: Floats, t: Ints) -> None:  # pragma: no cover - compiled
     """Fill in where the list of the units near each point begins, and its length."""
-    west, south, per_metre, cols, rows = grid_of(near)
+    # These cells are as tall as the world.
+    west, south, per_metre, cols, rows = near.west, near.south, 1.0 / near.side, near.cols, near.rows
     outside = cols * rows
     for b in range(size):
         col, row = (w[POINT + EAST + b] - west) * per_metre, (w[POINT + NORTH + b] - south) * per_metre
@@ -141,7 +142,7 @@ def _find_units(near: Cells, size: int, w: Floats, t: Ints) -> None:  # pragma: 
         t[NUMBER + b] = entries if (z >= low) & (z <= high) else 0
 
 
-@compiled
+@compiled_views
 def _add_exposures(spheres: Floats, units: Short, size: int, w: Floats, t: Ints) -> None:  # pragma: no cover - compiled
     """Add kill and detection exposure of the points to the units that were found near them (eq. 9, 10).
 
@@ -176,7 +177,7 @@ def _add_exposures(spheres: Floats, units: Short, size: int, w: Floats, t: Ints)
         turn += 1
 
 
-@compiled
+@compiled_views
 def _add_leg(gauge: Gauge, size: int, first: bool, w: Floats) -> None:  # pragma: no cover - compiled
     """Add a leg's length, and whether its slope and the turn into it are too much (eq. 1-4, 8)."""
     climb, dive, cosine = gauge.climb, gauge.dive, gauge.cos_turn
@@ -198,7 +199,7 @@ def _add_leg(gauge: Gauge, size: int, first: bool, w: Floats) -> None:  # pragma
         w[RUN_BEFORE + b] = w[RUN + b]
 
 
-@compiled
+@compiled_views
 def _add_outside(rules: Rules, size: int, w: Floats) -> None:  # pragma: no cover - compiled
     """Add whether a waypoint is off the map, below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = rules.bounds[0, 0], rules.bounds[0, 1], rules.bounds[1, 0], rules.bounds[1, 1]
@@ -242,7 +243,7 @@ def _judge_block(
             _add_exposures(spheres, rules.near.units, size, w, t)
 
 
-@compiled
+@compiled_views
 def _by_numbers(rules: Rules, gauge: Gauge) -> bool:  # pragma: no cover - compiled
     """Whether turns and slopes are limited by numbers alone, and the ends have no course."""
     courses = math.isnan(rules.start_course) and math.isnan(rules.destination_course)

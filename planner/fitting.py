@@ -31,9 +31,7 @@ def leg_cost(
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
     steep = slope_excess(rules, gauge, ux, uy, run, a[2], b[2])
     ends = pixels(rules.to_pixel, a[0], a[1], b[0], b[1])
-    depth, _, _ = terrain_excess(
-        rules.heights, rules.steep, gauge.clear, ends, a[0], a[1], a[2], b[0], b[1], b[2], 0.0, 0.0
-    )
+    depth = terrain_excess(rules.heights, rules.steep, gauge.clear, ends, a[0], a[1], a[2], b[0], b[1], b[2])
     total = length + SLOPE_COST * steep + DEPTH_COST * depth
     kill, _, _ = kill_density(
         rules.threats, rules.missiles, rules.kill_margin, seen, stamp, a[0], a[1], a[2], b[0], b[1], b[2], 0.0, 0.0

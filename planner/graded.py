@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views, inlined
 from planner.cells import Cells, cell_at, grid_of
 from planner.corners import ARC_STEP, blend_reach, corner_past
 from planner.criteria import POINTS
@@ -31,11 +31,44 @@ SEEN = 10.0
 CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
 # Columns of `Bench.bends`.
 RADIUS, DROP, ASIDE, REACH = 0, 1, 2, 3
+# Columns of `Bench.lines` that `_sound` is asked for.
+DEPTH, GROUND_A, GROUND_B = 8, 9, 10
 # Violation of a sample without known ground, m.
 UNKNOWN = 1000.0
 
 
-@compiled
+@inlined
+def _look(
+    heights: Heights,
+    slopes: Heights,
+    reach: float,
+    clear: Floats,
+    col: float,
+    row: float,
+    up: float,
+    need: float,
+    run: float,
+    rise: float,
+    step: float,
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Height above the required clearance at a place of a line, and the share of the line that needs no look after it.
+
+    run, rise: of the whole line, m.  step: share from one sample to the next where the ground is near.
+    """
+    ground = pixel_height(heights, col, row)
+    gap = up - ground - need if ground == ground else -UNKNOWN
+    tiles_down, tiles_across = np.int64(slopes.shape[0] - 1), np.int64(slopes.shape[1] - 1)
+    i, j = np.int64(row) // TILE, np.int64(col) // TILE
+    i, j = i if i < tiles_down else tiles_down, j if j < tiles_across else tiles_across
+    i, j = i if i > 0 else 0, j if j > 0 else 0
+    # Fastest loss of height above ground, m for the whole line.
+    fall = (slopes[np.uintp(i), np.uintp(j)] + clear[11]) * run + abs(rise) + 1e-9
+    ahead, known = (gap - SEEN) / fall, reach / (run + 1e-9)
+    ahead = ahead if ahead < known else known
+    return gap, ahead if ahead > step else step
+
+
+@compiled_views
 def terrain_excess(
     heights: Heights,
     steep: Steep,
@@ -47,49 +80,89 @@ def terrain_excess(
     bx: float,
     by: float,
     bz: float,
-    first: float,
-    last: float,
-) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Depth below the required clearance along a-b, summed over samples (m x km), and the least height above it.
+) -> float:  # pragma: no cover - compiled
+    """Depth below the required clearance along a-b, summed over samples (m x km).
 
-    ends: columns and rows of a and b.  steep: of the rules.  clear: of `pack_clearance`.  first, last: lengths (m) at
-    a and at b: the least heights are those there.  They are right up to `SEEN`; above that they say no more than "at
-    least `SEEN`".
+    ends: columns and rows of a and b.  steep: of the rules.  clear: of `pack_clearance`.
     """
     col, row, across, down, rise = ends[0], ends[1], ends[2] - ends[0], ends[3] - ends[1], bz - az
     run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
     step = 1.0 / max(1.0, math.ceil(run / clear[8]))
-    per_metre = 1.0 / max(run, 1e-9)
-    # A sample stands for the step that follows it, and for the one before.
-    until, since = first * per_metre + step, 1.0 - last * per_metre - step
-    tiles_down, tiles_across = np.int64(steep.slopes.shape[0] - 1), np.int64(steep.slopes.shape[1] - 1)
-    tile = steep.reach * per_metre
+    slopes, reach = steep.slopes, steep.reach
     need, whole = clear[0] + clear[1], clear[10] > 0.0
-    depth, near_a, near_b, f = 0.0, math.inf, math.inf, 0.0
+    depth, f = 0.0, 0.0
     while True:
-        c, r = col + f * across, row + f * down
-        ground = pixel_height(heights, c, r)
         if not whole:
             need = required_clearance(clear, ax + f * (bx - ax), ay + f * (by - ay))
-        gap = az + f * rise - ground - need if ground == ground else -UNKNOWN
-        near_a = gap if gap < near_a and f <= until else near_a
-        near_b = gap if gap < near_b and f >= since else near_b
-        if gap < 0.0:
-            depth -= gap
+        gap, ahead = _look(
+            heights, slopes, reach, clear, col + f * across, row + f * down, az + f * rise, need, run, rise, step
+        )
+        depth -= gap if gap < 0.0 else 0.0
         if f >= 1.0:
-            break
-        ahead = step
-        if gap > SEEN:
-            i = min(max(np.int64(r) // TILE, 0), tiles_down)
-            j = min(max(np.int64(c) // TILE, 0), tiles_across)
-            # Fastest loss of height above ground, m for the whole segment.
-            fall = (steep.slopes[np.uintp(i), np.uintp(j)] + clear[11]) * run + abs(rise) + 1e-9
-            ahead = max(step, min(tile, (gap - SEEN) / fall))
+            return depth * max(run, 1.0) * step / 1000.0
         f = min(1.0, f + ahead)
-    return depth * max(run, 1.0) * step / 1000.0, near_a, near_b
 
 
-@compiled
+@compiled_views
+def _sound(
+    heights: Heights,
+    steep: Steep,
+    to_pixel: Floats,
+    clear: Floats,
+    paths: Floats,
+    n: int,
+    legs: Floats,
+    bends: Floats,
+    lines: Floats,
+    asked: Ints,
+) -> None:  # pragma: no cover - compiled
+    """Do the same for all legs of path n: fill lines with depths, and with the least heights near both ends.
+
+    The least heights are right up to `SEEN`; above that they say no more than "at least `SEEN`".  In rounds, a sample
+    of each leg: the next one of the same leg would wait for what this one finds.
+    """
+    count = legs.shape[0]
+    after = polymap(to_pixel, paths[n, 0, 0], paths[n, 0, 1])
+    for i in range(count):
+        before = after
+        after = polymap(to_pixel, paths[n, i + 1, 0], paths[n, i + 1, 1])
+        run = legs[i, 2]
+        step = 1.0 / max(1.0, math.ceil(run / clear[8]))
+        lines[i, 0], lines[i, 1] = before[0], before[1]
+        lines[i, 2], lines[i, 3] = after[0] - before[0], after[1] - before[1]
+        lines[i, 4], lines[i, 5] = step, 0.0
+        # A sample stands for the step that follows it, and for the one before.
+        per_metre = 1.0 / max(run, 1e-9)
+        lines[i, 6] = bends[i, REACH] * per_metre + step
+        lines[i, 7] = 1.0 - bends[i + 1, REACH] * per_metre - step
+        lines[i, DEPTH], lines[i, GROUND_A], lines[i, GROUND_B] = 0.0, math.inf, math.inf
+        asked[i] = i
+    slopes, reach = steep.slopes, steep.reach
+    need, whole = clear[0] + clear[1], clear[10] > 0.0
+    while count > 0:
+        left = 0
+        for entry in range(count):
+            i = np.uintp(asked[entry])
+            f, step = lines[i, 5], lines[i, 4]
+            up, rise = paths[n, i, 2], paths[n, i + np.uintp(1), 2] - paths[n, i, 2]
+            if not whole:
+                dx, dy = paths[n, i + np.uintp(1), 0] - paths[n, i, 0], paths[n, i + np.uintp(1), 1] - paths[n, i, 1]
+                need = required_clearance(clear, paths[n, i, 0] + f * dx, paths[n, i, 1] + f * dy)
+            col, row = lines[i, 0] + f * lines[i, 2], lines[i, 1] + f * lines[i, 3]
+            gap, ahead = _look(heights, slopes, reach, clear, col, row, up + f * rise, need, legs[i, 2], rise, step)
+            lines[i, DEPTH] -= gap if gap < 0.0 else 0.0
+            at_a, at_b = gap if f <= lines[i, 6] else math.inf, gap if f >= lines[i, 7] else math.inf
+            lines[i, GROUND_A] = at_a if at_a < lines[i, GROUND_A] else lines[i, GROUND_A]
+            lines[i, GROUND_B] = at_b if at_b < lines[i, GROUND_B] else lines[i, GROUND_B]
+            asked[left] = np.int64(i)
+            left += 1 if f < 1.0 else 0
+            lines[i, 5] = f + ahead if f + ahead < 1.0 else 1.0
+        count = left
+    for i in range(legs.shape[0]):
+        lines[i, DEPTH] *= max(legs[i, 2], 1.0) * lines[i, 4] / 1000.0
+
+
+@inlined
 def pixels(to_pixel: Floats, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover - compiled
     """Columns and rows of both ends of a segment."""
     col0, row0 = polymap(to_pixel, ax, ay)
@@ -97,7 +170,7 @@ def pixels(to_pixel: Floats, ax: float, ay: float, bx: float, by: float) -> Pixe
     return col0, row0, col1, row1
 
 
-@compiled
+@compiled_views
 def kill_density(
     threats: Floats,
     cells: Cells,
@@ -122,21 +195,18 @@ def kill_density(
     run2 = dx * dx + dy * dy
     length2 = run2 + dz * dz
     inverse = 1.0 / length2 if length2 > 0.0 else 0.0
-    west, south, per_metre, cols, rows = grid_of(cells)
+    grid = grid_of(cells)
     table, units = cells.table, cells.units
-    pieces = int(max(1.0, math.ceil(math.sqrt(run2) * per_metre)))
+    pieces = int(max(1.0, math.ceil(max(math.sqrt(run2), abs(dz)) * grid.per_metre)))
     share = 1.0 / pieces
-    # The part of the leg for which a cell is asked ends halfway to its neighbours.
-    beside = 0.5 * share * abs(dz)
     dose, near_a, near_b, before = 0.0, CORNER_SLACK, CORNER_SLACK, -1
     for piece in range(pieces + 1):
         f = piece * share
-        cell = cell_at(west, south, per_metre, cols, rows, ax + f * dx, ay + f * dy)
-        z = az + f * dz
-        c = np.uintp(cell)
-        if cell == before or z + beside < table[c, 2] or z - beside > table[c, 3]:
+        cell = cell_at(grid, ax + f * dx, ay + f * dy, az + f * dz)
+        if cell == before:
             continue
         before = cell
+        c = np.uintp(cell)
         for entry in range(table[c, 0], table[c, 0] + table[c, 1]):
             k = np.uintp(units[np.uintp(entry)])
             if seen[k] == stamp:
@@ -156,7 +226,7 @@ def kill_density(
     return dose, near_a, near_b
 
 
-@compiled
+@inlined
 def _closest2(
     nearest: float, low: float, high: float, along: float, start2: float, length2: float
 ) -> float:  # pragma: no cover - compiled
@@ -169,7 +239,7 @@ def _closest2(
     return max(0.0, start2 + f * (2.0 * along + f * length2))
 
 
-@compiled
+@compiled_views
 def _dose(along: float, start2: float, length2: float, radius: float, scale: float) -> float:  # pragma: no cover
     """Mean kill density of a segment that enters a sphere; see `window_exposure`."""
     if length2 < 1e-12:
@@ -183,14 +253,17 @@ def _dose(along: float, start2: float, length2: float, radius: float, scale: flo
 class Bench(NamedTuple):
     """Scratch for judging one path after another.
 
-    legs, corners: measured.  bends: (w, 4) of `_measure_bend`.  gaps: (w - 1, 4) height over ground near both ends of
-    each leg, and distance from missiles.  seen, stamp: units seen, and the last stamp.
+    legs, corners: measured.  bends: (w, 4) of `_measure_bends`.  lines: (w - 1, 11) of `_sound`, asked: (w - 1,) legs
+    that it has not finished.  gaps: (w - 1, 2) distance from missiles near both ends of each leg.  seen, stamp: units
+    seen, and the last stamp.
     """
 
     legs: Floats
     corners: Floats
     bends: Floats
+    lines: Floats
     gaps: Floats
+    asked: Ints
     seen: Ints
     stamp: Ints
 
@@ -203,7 +276,9 @@ def make_bench(rules: Rules, count: int) -> Bench:  # pragma: no cover - compile
         np.empty((count - 1, 4)),
         np.zeros((count, 2)),
         np.zeros((count, 4)),
-        np.empty((count - 1, 4)),
+        np.empty((count - 1, 11)),
+        np.empty((count - 1, 2)),
+        np.empty(count - 1, dtype=np.int64),
         seen,
         np.zeros(1, dtype=np.int64),
     )
@@ -217,38 +292,29 @@ def score_path(
     # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
     heights, to_pixel, threats, missiles = rules.heights, rules.to_pixel, rules.threats, rules.missiles
     steep, packed, clear, margin = rules.steep, rules.aircraft, gauge.clear, rules.kill_margin
-    legs, corners, bends, gaps = bench.legs, bench.corners, bench.bends, bench.gaps
-    seen, stamp = bench.seen, bench.stamp[0]
+    legs, corners, bends, lines, gaps = bench.legs, bench.corners, bench.bends, bench.lines, bench.gaps
+    asked, seen, stamp = bench.asked, bench.seen, bench.stamp[0]
     count = paths.shape[1]
     measure_legs(paths, n, legs)
     measure_corners(rules, gauge, paths, n, legs, corners)
     constraints(rules, gauge, paths, n, legs, corners, True, missed)
-    room, fly_over = rules.room, rules.fly_over
-    for i in range(1, count - 1):
-        _measure_bend(packed, room, fly_over, paths, n, i, legs, corners, bends)
+    _measure_bends(packed, rules.room, rules.fly_over, paths, n, legs, corners, bends)
+    _sound(heights, steep, to_pixel, clear, paths, n, legs, bends, lines, asked)
     length, kill = 0.0, 0.0
-    after = polymap(to_pixel, paths[n, 0, 0], paths[n, 0, 1])
     for i in range(count - 1):
         stamp += 1
         x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
         x2, y2, z2 = paths[n, i + 1, 0], paths[n, i + 1, 1], paths[n, i + 1, 2]
-        first, last = bends[i, REACH], bends[i + 1, REACH]
-        before = after
-        after = polymap(to_pixel, x2, y2)
-        ends = (before[0], before[1], after[0], after[1])
-        depth, gaps[i, 0], gaps[i, 1] = terrain_excess(
-            heights, steep, clear, ends, x, y, z, x2, y2, z2, first, last
+        dose, gaps[i, 0], gaps[i, 1] = kill_density(
+            threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2, bends[i, REACH], bends[i + 1, REACH]
         )
-        dose, gaps[i, 2], gaps[i, 3] = kill_density(
-            threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2, first, last
-        )
-        missed[n, 2] += depth
+        missed[n, 2] += lines[i, DEPTH]
         kill += dose * legs[i, 3]
         length += legs[i, 3]
     for i in range(1, count - 1):
         drop, aside = bends[i, DROP], bends[i, ASIDE]
-        low = min(gaps[i - 1, 1], gaps[i, 0]) < drop + clear[9] * aside
-        close = min(gaps[i - 1, 3], gaps[i, 2]) < drop + aside
+        low = min(lines[i - 1, GROUND_B], lines[i, GROUND_A]) < drop + clear[9] * aside
+        close = min(gaps[i - 1, 1], gaps[i, 0]) < drop + aside
         if drop + aside < 0.01 or not (low or close):
             continue
         arc = corner_past(packed, paths[n, i - 1], paths[n, i], paths[n, i + 1], bends[i, RADIUS])
@@ -280,7 +346,7 @@ def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # prag
     return missed, objectives
 
 
-@compiled
+@inlined
 def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # pragma: no cover - compiled
     """Radius of the arc at waypoint i: 0 where a number alone limits turns and a leg there is too short for its two.
 
@@ -298,30 +364,32 @@ def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # 
     return radius
 
 
-@compiled
-def _measure_bend(
-    packed: Floats, room: bool, fly_over: bool, paths: Floats, n: int, i: int, legs: Floats, corners: Floats, out: Floats
+@compiled_views
+def _measure_bends(
+    packed: Floats, room: bool, fly_over: bool, paths: Floats, n: int, legs: Floats, corners: Floats, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Fill out[i]: radius of the flown arc at waypoint i, and how far the flown corner departs from the legs, m.
+    """Fill out (w, 4): radius of the flown arc at each waypoint, and how far the flown corner departs from the legs, m.
 
     Downwards it is by the crest that is cut, and sideways by at most R(1/cos(theta/2) - 1) and a chord's rise; and it
     does so within `REACH` of the waypoint: within the tangent and half the arc, or the blend of heights.
     """
-    radius = 0.0 if fly_over else _arc_radius(room, legs, corners, i)
-    tangent = corners[i, 0] if radius > 0.0 else 0.0
-    before, after = max(legs[i - 1, 2], 1e-6), max(legs[i, 2], 1e-6)
-    slope_in, slope_out = (paths[n, i, 2] - paths[n, i - 1, 2]) / before, (paths[n, i + 1, 2] - paths[n, i, 2]) / after
-    crest = max(0.0, slope_in - slope_out)
-    reach = blend_reach(packed, paths[n, i, 2])
-    aside = math.sqrt(radius * radius + tangent * tangent) - radius
-    aside += min(aside, radius * CHORD_RISE)
-    out[i, RADIUS] = radius
-    out[i, DROP] = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
-    out[i, ASIDE] = aside
-    out[i, REACH] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * reach
+    slope_out = (paths[n, 1, 2] - paths[n, 0, 2]) / max(legs[0, 2], 1e-6)
+    for i in range(1, legs.shape[0]):
+        radius = 0.0 if fly_over else _arc_radius(room, legs, corners, i)
+        tangent = corners[i, 0] if radius > 0.0 else 0.0
+        slope_in = slope_out
+        slope_out = (paths[n, i + 1, 2] - paths[n, i, 2]) / max(legs[i, 2], 1e-6)
+        crest = max(0.0, slope_in - slope_out)
+        reach = blend_reach(packed, paths[n, i, 2])
+        aside = math.sqrt(radius * radius + tangent * tangent) - radius
+        aside += min(aside, radius * CHORD_RISE)
+        out[i, RADIUS] = radius
+        out[i, DROP] = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
+        out[i, ASIDE] = aside
+        out[i, REACH] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * reach
 
 
-@compiled
+@compiled_views
 def _corner_depth(
     heights: Heights, steep: Steep, to_pixel: Floats, clear: Floats, arc: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -330,12 +398,11 @@ def _corner_depth(
     for k in range(arc.shape[0] - 1):
         x, y, z, x2, y2, z2 = arc[k, 0], arc[k, 1], arc[k, 2], arc[k + 1, 0], arc[k + 1, 1], arc[k + 1, 2]
         ends = pixels(to_pixel, x, y, x2, y2)
-        depth, _, _ = terrain_excess(heights, steep, clear, ends, x, y, z, x2, y2, z2, 0.0, 0.0)
-        total += depth
+        total += terrain_excess(heights, steep, clear, ends, x, y, z, x2, y2, z2)
     return total
 
 
-@compiled
+@compiled_views
 def _corner_kill(
     threats: Floats, missiles: Cells, margin: float, seen: Ints, stamp: int, arc: Floats
 ) -> float:  # pragma: no cover - compiled

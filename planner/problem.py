@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import make_cells
+from planner.cells import make_cells, make_solid_cells
 from planner.encoding import Space
 from planner.rules import CORNER_SLACK, Rules, Steep, pack_spheres
 from world.errors import ScenarioError
@@ -117,8 +117,9 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         start_slack=slack(scenario.start),
         destination_slack=slack(scenario.destination),
         near=make_cells(threats.position, reach, scenario.bounds),
-        # Half a cell's side on either side of points that stand a side apart.
-        missiles=make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK),
+        missiles=make_solid_cells(
+            threats.position, armed, scenario.bounds, (scenario.floor, scenario.ceiling), CORNER_SLACK
+        ),
         steep=_steep(terrain),
     )
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pyproj import CRS, Proj, Transformer
 from pyproj.exceptions import ProjError
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views
 
 Floats = NDArray[np.float64]
 
@@ -154,13 +154,13 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
     return out
 
 
-@compiled
+@compiled_views
 def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Both components of a packed `PolyMap` at one point."""
     return polymap_within(packed, packed.shape[1], x, y)
 
 
-@compiled
+@compiled_views
 def polymap_within(packed: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Do the same with a `PolyMap` of this size in the first columns of a wider table (Horner's scheme)."""
     a = (x - packed[0, 0]) / packed[1, 0]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views, inlined
 from world.frames import PolyMap, fit_polymap, polymap
 
 Floats = NDArray[np.float64]
@@ -65,7 +65,7 @@ class Terrain:
         return float(low), float(at)
 
 
-@compiled
+@inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
     """Bilinear height at fractional pixel coordinates; NaN further than `EDGE` outside the outermost pixel centres."""
     rows, cols = heights.shape
@@ -106,7 +106,7 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
     return out
 
 
-@compiled
+@compiled_views
 def ground_height(heights: Heights, packed: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
     """Ground height at one map position; NaN outside the raster."""
     col, row = polymap(packed, east, north)
@@ -121,7 +121,7 @@ def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats)
     return out
 
 
-@compiled
+@compiled_views
 def segment_clearance(
     heights: Heights, packed: Floats, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -146,7 +146,7 @@ def segment_clearance(
     return best, best_at
 
 
-@compiled
+@compiled_views
 def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
     """Next fraction after t at which start + t * step is a whole number; inf if it never is."""
     if step == 0.0:
@@ -156,7 +156,7 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
     return (line - start) / step
 
 
-@compiled
+@compiled_views
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

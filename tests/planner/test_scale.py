@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.cells import cell_at, grid_of, make_cells
+from planner.cells import cell_at, grid_of, make_cells, make_solid_cells
 from planner.criteria import paper_scores
 from planner.encoding import rotated
 from planner.graded import graded_scores
@@ -82,7 +82,7 @@ def test_cells_hold_every_threat_that_reaches_them() -> None:
     cells = make_cells(position, reach, bounds)
     grid = grid_of(cells)
     for place in rng.uniform(-8000, 8000, (2000, 2)):
-        cell = cell_at(*grid, *place)
+        cell = cell_at(grid, place[0], place[1], 0.0)
         first, number = cells.table[cell, :2]
         listed = set(cells.units[first : first + number].tolist())
         away = np.hypot(*(position[:, :2] - place).T)
@@ -117,7 +117,7 @@ def test_cells_change_no_score(
     units = scenario.threats
     everything = rules._replace(
         near=make_cells(units.position, units.detection_radius, far),
-        missiles=make_cells(units.position, units.kill_radius, far),
+        missiles=make_solid_cells(units.position, units.kill_radius, far, (0.0, 0.0), 0.0),
     )
     encoding = rotated(space, 12)
     paths = encoding.decode(rng.uniform(encoding.lower, encoding.upper, (60, encoding.lower.size)))
