@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.compiled import compiled, compiled_views, inlined
-from planner.cells import Cells, cell_at, grid_of
+from planner.cells import Missiles
 from planner.corners import ARC_STEP, blend_reach, corner_past
 from planner.criteria import POINTS
 from planner.legs import Gauge, constraints, make_gauge, measure_corners, measure_legs, required_clearance
@@ -30,7 +30,7 @@ SEEN = 10.0
 # Rise of an arc above its chord, as a share of its radius.
 CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
 # Columns of `Bench.bends`.
-RADIUS, DROP, ASIDE, REACH = 0, 1, 2, 3
+RADIUS, DROP, ASIDE, REACH, WATCH = 0, 1, 2, 3, 4
 # Columns of `Bench.lines` that `_sound` is asked for.
 DEPTH, GROUND_A, GROUND_B = 8, 9, 10
 # Violation of a sample without known ground, m.
@@ -172,11 +172,9 @@ def pixels(to_pixel: Floats, ax: float, ay: float, bx: float, by: float) -> Pixe
 
 @compiled_views
 def kill_density(
-    threats: Floats,
-    cells: Cells,
+    missiles: Missiles,
     margin: float,
-    seen: Ints,
-    stamp: int,
+    slack: float,
     ax: float,
     ay: float,
     az: float,
@@ -188,42 +186,53 @@ def kill_density(
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Mean kill density over the segment a-b, radii grown by the margin, and distances to the nearest such sphere, m.
 
-    cells: the rules' missiles.  first, last: lengths (m) at a and at b: the distances are from there.  They are right
-    up to `CORNER_SLACK`.  seen (m,), stamp: scratch; units seen with this stamp are left out.
+    first, last: lengths (m) at a and at b: the distances are from there, and right up to the slack.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
-    run2 = dx * dx + dy * dy
-    length2 = run2 + dz * dz
-    inverse = 1.0 / length2 if length2 > 0.0 else 0.0
-    grid = grid_of(cells)
-    table, units = cells.table, cells.units
-    pieces = int(max(1.0, math.ceil(max(math.sqrt(run2), abs(dz)) * grid.per_metre)))
-    share = 1.0 / pieces
-    dose, near_a, near_b, before = 0.0, CORNER_SLACK, CORNER_SLACK, -1
-    for piece in range(pieces + 1):
-        f = piece * share
-        cell = cell_at(grid, ax + f * dx, ay + f * dy, az + f * dz)
-        if cell == before:
-            continue
-        before = cell
-        c = np.uintp(cell)
-        for entry in range(table[c, 0], table[c, 0] + table[c, 1]):
-            k = np.uintp(units[np.uintp(entry)])
-            if seen[k] == stamp:
+    length2 = dx * dx + dy * dy + dz * dz
+    inverse, slant = 1.0 / length2 if length2 > 0.0 else 0.0, 1.0 / dy if abs(dy) > 1e-9 else 0.0
+    length = math.sqrt(length2)
+    until, since = first / max(length, first), 1.0 - last / max(length, last)
+    units, starts = missiles.units, missiles.first
+    dose, near_a, near_b = 0.0, math.inf, math.inf
+    for kind in range(missiles.classes.shape[0]):
+        west, south, per_metre = missiles.classes[kind, 0], missiles.classes[kind, 1], missiles.classes[kind, 2]
+        cols, rows, base = missiles.classes[kind, 3], missiles.classes[kind, 4], int(missiles.classes[kind, 5])
+        # A hair more, for what rounding would leave out.
+        reach = missiles.classes[kind, 6] + margin + slack + 1e-6
+        side = 1.0 / per_metre
+        lowest = _cell((min(ay, by) - reach - south) * per_metre, rows)
+        for row in range(max(0, lowest), min(int(rows), _cell((max(ay, by) + reach - south) * per_metre, rows) + 1)):
+            # The part of the segment from which something in this row of cells is in reach.
+            north = south + row * side - ay
+            f, g = (north - reach) * slant, (north + side + reach) * slant
+            f, g = (f, g) if f < g else (g, f)
+            f, g = (f if f > 0.0 else 0.0, g if g < 1.0 else 1.0) if slant != 0.0 else (0.0, 1.0)
+            x, x2 = ax + f * dx - west, ax + g * dx - west
+            left, right = _cell((min(x, x2) - reach) * per_metre, cols), _cell((max(x, x2) + reach) * per_metre, cols)
+            if right < 0 or left >= cols:
                 continue
-            seen[k] = stamp
-            x, y, z = ax - threats[k, 0], ay - threats[k, 1], az - threats[k, 2]
-            radius = threats[k, 3] + margin
-            along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
-            closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
-            if closest2 < (radius + CORNER_SLACK) * (radius + CORNER_SLACK):
-                length = math.sqrt(length2)
-                one = _closest2(-along * inverse, 0.0, first / max(length, first), along, start2, length2)
-                two = _closest2(-along * inverse, 1.0 - last / max(length, last), 1.0, along, start2, length2)
-                near_a, near_b = min(near_a, math.sqrt(one) - radius), min(near_b, math.sqrt(two) - radius)
-                if closest2 < radius * radius:
-                    dose += _dose(along, start2, length2, radius, threats[k, 4])
+            here = base + row * int(cols)
+            for entry in range(starts[here + max(0, left)], starts[here + min(int(cols) - 1, right) + 1]):
+                k = np.uintp(entry)
+                x, y, z = ax - units[k, 0], ay - units[k, 1], az - units[k, 2]
+                radius = units[k, 3] + margin
+                along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
+                closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
+                if closest2 < (radius + slack) * (radius + slack):
+                    one = _closest2(-along * inverse, 0.0, until, along, start2, length2)
+                    two = _closest2(-along * inverse, since, 1.0, along, start2, length2)
+                    near_a, near_b = min(near_a, math.sqrt(one) - radius), min(near_b, math.sqrt(two) - radius)
+                    if closest2 < radius * radius:
+                        dose += _dose(along, start2, length2, radius, units[k, 4])
     return dose, near_a, near_b
+
+
+@inlined
+def _cell(place: float, count: float) -> int:  # pragma: no cover - compiled
+    """Number of the cell along one axis; -1 and `count` stand for what is outside."""
+    inside = place if place > -1.0 else -1.0
+    return math.floor(inside if inside < count else count)
 
 
 @inlined
@@ -253,9 +262,8 @@ def _dose(along: float, start2: float, length2: float, radius: float, scale: flo
 class Bench(NamedTuple):
     """Scratch for judging one path after another.
 
-    legs, corners: measured.  bends: (w, 4) of `_measure_bends`.  lines: (w - 1, 11) of `_sound`, asked: (w - 1,) legs
-    that it has not finished.  gaps: (w - 1, 2) distance from missiles near both ends of each leg.  seen, stamp: units
-    seen, and the last stamp.
+    legs, corners: measured.  bends: (w, 5) of `_measure_bends`.  lines: (w - 1, 11) of `_sound`, asked: (w - 1,) legs
+    that it has not finished.  gaps: (w - 1, 2) distance from missiles near both ends of each leg.
     """
 
     legs: Floats
@@ -264,23 +272,18 @@ class Bench(NamedTuple):
     lines: Floats
     gaps: Floats
     asked: Ints
-    seen: Ints
-    stamp: Ints
 
 
 @compiled
 def make_bench(rules: Rules, count: int) -> Bench:  # pragma: no cover - compiled
     """Scratch for paths of `count` waypoints."""
-    seen = np.zeros(rules.threats.shape[0], dtype=np.int64)
     return Bench(
         np.empty((count - 1, 4)),
         np.zeros((count, 2)),
-        np.zeros((count, 4)),
+        np.zeros((count, 5)),
         np.empty((count - 1, 11)),
         np.empty((count - 1, 2)),
         np.empty(count - 1, dtype=np.int64),
-        seen,
-        np.zeros(1, dtype=np.int64),
     )
 
 
@@ -290,10 +293,10 @@ def score_path(
 ) -> None:  # pragma: no cover - compiled
     """Judge path n of (n, w, 3): rows n of missed (n, 4), which must be 0, and of objectives."""
     # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
-    heights, to_pixel, threats, missiles = rules.heights, rules.to_pixel, rules.threats, rules.missiles
+    heights, to_pixel, missiles = rules.heights, rules.to_pixel, rules.missiles
     steep, packed, clear, margin = rules.steep, rules.aircraft, gauge.clear, rules.kill_margin
     legs, corners, bends, lines, gaps = bench.legs, bench.corners, bench.bends, bench.lines, bench.gaps
-    asked, seen, stamp = bench.asked, bench.seen, bench.stamp[0]
+    asked = bench.asked
     count = paths.shape[1]
     measure_legs(paths, n, legs)
     measure_corners(rules, gauge, paths, n, legs, corners)
@@ -302,11 +305,11 @@ def score_path(
     _sound(heights, steep, to_pixel, clear, paths, n, legs, bends, lines, asked)
     length, kill = 0.0, 0.0
     for i in range(count - 1):
-        stamp += 1
         x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
         x2, y2, z2 = paths[n, i + 1, 0], paths[n, i + 1, 1], paths[n, i + 1, 2]
+        slack = max(bends[i, WATCH], bends[i + 1, WATCH])
         dose, gaps[i, 0], gaps[i, 1] = kill_density(
-            threats, missiles, margin, seen, stamp, x, y, z, x2, y2, z2, bends[i, REACH], bends[i + 1, REACH]
+            missiles, margin, slack, x, y, z, x2, y2, z2, bends[i, REACH], bends[i + 1, REACH]
         )
         missed[n, 2] += lines[i, DEPTH]
         kill += dose * legs[i, 3]
@@ -314,16 +317,14 @@ def score_path(
     for i in range(1, count - 1):
         drop, aside = bends[i, DROP], bends[i, ASIDE]
         low = min(lines[i - 1, GROUND_B], lines[i, GROUND_A]) < drop + clear[9] * aside
-        close = min(gaps[i - 1, 1], gaps[i, 0]) < drop + aside
+        close = drop + aside > CORNER_SLACK or min(gaps[i - 1, 1], gaps[i, 0]) < drop + aside
         if drop + aside < 0.01 or not (low or close):
             continue
         arc = corner_past(packed, paths[n, i - 1], paths[n, i], paths[n, i + 1], bends[i, RADIUS])
         if low:
             missed[n, 2] += _corner_depth(heights, steep, to_pixel, clear, arc)
         if close:
-            kill += _corner_kill(threats, missiles, margin, seen, stamp, arc)
-            stamp += arc.shape[0]
-    bench.stamp[0] = stamp
+            kill += _corner_kill(missiles, margin, arc)
     objectives[n, 0] = length / gauge.straight
     objectives[n, 1] = kill * POINTS * (count - 1) / length
 
@@ -368,10 +369,11 @@ def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # 
 def _measure_bends(
     packed: Floats, room: bool, fly_over: bool, paths: Floats, n: int, legs: Floats, corners: Floats, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Fill out (w, 4): radius of the flown arc at each waypoint, and how far the flown corner departs from the legs, m.
+    """Fill out (w, 5): radius of the flown arc at each waypoint, and how far the flown corner departs from the legs, m.
 
     Downwards it is by the crest that is cut, and sideways by at most R(1/cos(theta/2) - 1) and a chord's rise; and it
-    does so within `REACH` of the waypoint: within the tangent and half the arc, or the blend of heights.
+    does so within `REACH` of the waypoint: within the tangent and half the arc, or the blend of heights.  WATCH: how far
+    from the legs missiles matter to it, 0 where it is judged in any case.
     """
     slope_out = (paths[n, 1, 2] - paths[n, 0, 2]) / max(legs[0, 2], 1e-6)
     for i in range(1, legs.shape[0]):
@@ -387,6 +389,7 @@ def _measure_bends(
         out[i, DROP] = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
         out[i, ASIDE] = aside
         out[i, REACH] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * reach
+        out[i, WATCH] = aside + out[i, DROP] if aside + out[i, DROP] <= CORNER_SLACK else 0.0
 
 
 @compiled_views
@@ -403,13 +406,11 @@ def _corner_depth(
 
 
 @compiled_views
-def _corner_kill(
-    threats: Floats, missiles: Cells, margin: float, seen: Ints, stamp: int, arc: Floats
-) -> float:  # pragma: no cover - compiled
-    """Kill density x length along a flown corner (k, 3); uses the stamps after this one, one a piece."""
+def _corner_kill(missiles: Missiles, margin: float, arc: Floats) -> float:  # pragma: no cover - compiled
+    """Kill density x length along a flown corner (k, 3)."""
     total = 0.0
     for k in range(arc.shape[0] - 1):
         x, y, z, x2, y2, z2 = arc[k, 0], arc[k, 1], arc[k, 2], arc[k + 1, 0], arc[k + 1, 1], arc[k + 1, 2]
-        dose, _, _ = kill_density(threats, missiles, margin, seen, stamp + k + 1, x, y, z, x2, y2, z2, 0.0, 0.0)
+        dose, _, _ = kill_density(missiles, margin, 0.0, x, y, z, x2, y2, z2, 0.0, 0.0)
         total += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
     return total

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import make_cells, make_solid_cells
+from planner.cells import make_cells, make_missiles
 from planner.encoding import Space
-from planner.rules import CORNER_SLACK, Rules, Steep, pack_spheres
+from planner.rules import Rules, Steep, pack_spheres
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
@@ -86,7 +86,6 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         return reserve if left >= reserve else share * max(0.0, left)
 
     reach = np.maximum(threats.kill_radius, threats.detection_radius)
-    armed = np.where(threats.kill_radius > 0.0, threats.kill_radius + kill_margin, 0.0)
 
     def or_nan(value: float | None) -> float:
         return math.nan if value is None else float(value)
@@ -117,9 +116,7 @@ def _rules(scenario: Scenario, limits: Limits, reserve: float, kill_margin: floa
         start_slack=slack(scenario.start),
         destination_slack=slack(scenario.destination),
         near=make_cells(threats.position, reach, scenario.bounds),
-        missiles=make_solid_cells(
-            threats.position, armed, scenario.bounds, (scenario.floor, scenario.ceiling), CORNER_SLACK
-        ),
+        missiles=make_missiles(units),
         steep=_steep(terrain),
     )
 

@@ -5,12 +5,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import Cells
+from planner.cells import Cells, Missiles
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
-# Reach beside a leg that is looked into for missiles, m: what the arcs that cut its corners may use of it.
+# A corner that a flight takes further from the legs than this (m) is judged in any case.
 CORNER_SLACK = 30.0
 # Numbers of a row of `Rules.spheres`: as long as a line of the processor's cache.
 SPHERE = 8
@@ -37,8 +37,8 @@ class Rules(NamedTuple):
     spare: rad kept inside slope limits.  clearance, reserve: m, required and kept on top.  kill_margin: m.
     pitch: m between terrain samples of the graded judge.
     start_course, destination_course: rad or NaN.  start_slack, destination_slack: m of reserve at the ends.
-    near: the threats that may reach a point.  missiles: those whose missile, the margin added, may reach a stretch of
-    path as long as a cell, and `CORNER_SLACK` m beside it.  steep: how steep the ground is.
+    near: the threats by the points that they may reach.  missiles: the missiles by where they stand.  steep: how steep
+    the ground is.
     """
 
     heights: Heights
@@ -66,7 +66,7 @@ class Rules(NamedTuple):
     start_slack: float
     destination_slack: float
     near: Cells
-    missiles: Cells
+    missiles: Missiles
     steep: Steep
 
 
