@@ -17,8 +17,9 @@ CELL = 0.2
 MOST_CELLS = 300_000
 # Highest whole metre that a cell notes.
 MOST = 2_000_000_000
-# Classes of missiles by radius, at most.
+# Classes of missiles by radius, at most; and missiles a cell, on the mean.
 MOST_CLASSES = 8
+A_CELL = 2.0
 # Ground beyond the map that the grid covers, as a share of the map's sides.
 BEYOND = 0.1
 
@@ -132,7 +133,7 @@ class Missiles(NamedTuple):
 def make_missiles(threats: Floats, side: float | None = None) -> Missiles:
     """Missiles of threats (m, 5 or more): east, north, up, kill radius and scale.
 
-    side: of a cell, m; None for one missile a cell.
+    side: of a cell, m; None for `A_CELL` missiles a cell.
     """
     units = threats[threats[:, 3] > 0.0, :5]
     # Alike: within a factor of two, as long as there are not too many classes.
@@ -144,7 +145,7 @@ def make_missiles(threats: Floats, side: float | None = None) -> Missiles:
         own = units[alike == number]
         low, high = own[:, :2].min(axis=0), own[:, :2].max(axis=0)
         area = float(np.prod(np.maximum(high - low, 1.0)))
-        per_metre = 1.0 / (math.sqrt(area / len(own)) if side is None else side)
+        per_metre = 1.0 / (math.sqrt(A_CELL * area / len(own)) if side is None else side)
         cols, rows = (int(size * per_metre) + 1 for size in high - low)
         place = ((own[:, :2] - low) * per_metre).astype(np.int64)
         cell = np.minimum(place[:, 1], rows - 1) * cols + np.minimum(place[:, 0], cols - 1)

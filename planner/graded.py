@@ -191,8 +191,6 @@ def kill_density(
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
     inverse, slant = 1.0 / length2 if length2 > 0.0 else 0.0, 1.0 / dy if abs(dy) > 1e-9 else 0.0
-    length = math.sqrt(length2)
-    until, since = first / max(length, first), 1.0 - last / max(length, last)
     units, starts = missiles.units, missiles.first
     dose, near_a, near_b = 0.0, math.inf, math.inf
     for kind in range(missiles.classes.shape[0]):
@@ -209,7 +207,8 @@ def kill_density(
             f, g = (f, g) if f < g else (g, f)
             f, g = (f if f > 0.0 else 0.0, g if g < 1.0 else 1.0) if slant != 0.0 else (0.0, 1.0)
             x, x2 = ax + f * dx - west, ax + g * dx - west
-            left, right = _cell((min(x, x2) - reach) * per_metre, cols), _cell((max(x, x2) + reach) * per_metre, cols)
+            x, x2 = (x, x2) if x < x2 else (x2, x)
+            left, right = _cell((x - reach) * per_metre, cols), _cell((x2 + reach) * per_metre, cols)
             if right < 0 or left >= cols:
                 continue
             here = base + row * int(cols)
@@ -220,6 +219,8 @@ def kill_density(
                 along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
                 closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
                 if closest2 < (radius + slack) * (radius + slack):
+                    length = math.sqrt(length2)
+                    until, since = first / max(length, first), 1.0 - last / max(length, last)
                     one = _closest2(-along * inverse, 0.0, until, along, start2, length2)
                     two = _closest2(-along * inverse, since, 1.0, along, start2, length2)
                     near_a, near_b = min(near_a, math.sqrt(one) - radius), min(near_b, math.sqrt(two) - radius)
