@@ -84,7 +84,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
     total = np.zeros(count, dtype=np.int64)
     order, spare = np.arange(count), np.empty(count, dtype=np.int64)
     sorted_ = np.empty((table.shape[0], count))
-    below = np.empty(count, dtype=np.uint8)
+    below = np.empty(count, dtype=np.int64)
     # Ties: groups of rows that are equal so far, as positions in the order where each begins, closed by the count.
     begins, after = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
     begins[0], begins[1], groups = 0, count, 1
@@ -166,7 +166,7 @@ def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # 
 
 @njit(cache=True)
 def _count_any(
-    rows: Floats, width: int, begin: int, end: int, order: Ints, below: NDArray[np.uint8], total: Ints
+    rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
 ) -> None:  # pragma: no cover - compiled
     """Add to total the dominators of each row of a group; rows: (c, n), sorted: only an earlier row can dominate."""
     first, dominators = begin, 0
@@ -176,19 +176,32 @@ def _count_any(
             equal = equal and rows[c, k] == rows[c, k - 1]
         if not equal:
             first, dominators = k, k - begin
-            # In the first column no earlier row is larger.  Loops without branches, over what stands side by side.
-            if width > 1:
-                value = rows[1, k]
-                for j in range(begin, k):
-                    below[j] = rows[1, j] <= value
-                for c in range(2, width):
-                    value = rows[c, k]
-                    for j in range(begin, k):
-                        below[j] &= rows[c, j] <= value
-                dominators = 0
-                for j in range(begin, k):
-                    dominators += below[j]
+            # In the first column no earlier row is larger.
+            if width == 2:
+                dominators = _at_most(rows[1, begin:k], rows[1, k])
+            elif width > 2:
+                less = below[: k - begin]
+                less[:] = 1
+                for c in range(1, width):
+                    _and_at_most(rows[c, begin:k], rows[c, k], less)
+                dominators = less.sum()
         total[order[k]] += dominators
+
+
+@njit(cache=True)
+def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
+    """How many values are not above the limit.  A loop without branches, which becomes vector instructions."""
+    count = 0
+    for k in range(values.size):
+        count += 1 if values[k] <= limit else 0
+    return count
+
+
+@njit(cache=True)
+def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: no cover - compiled
+    """Take the mark from the places of values above the limit."""
+    for k in range(values.size):
+        marks[k] &= 1 if values[k] <= limit else 0
 
 
 @njit(cache=True)
