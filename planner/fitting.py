@@ -23,21 +23,17 @@ SLOPE_COST = 1e6
 
 
 @compiled
-def leg_cost(
-    rules: Rules, gauge: Gauge, seen: Ints, stamp: int, a: Floats, b: Floats
-) -> float:  # pragma: no cover - compiled
-    """Cost of one leg, in m of path: its length and what it violates.  seen, stamp: of `kill_density`."""
+def leg_cost(rules: Rules, gauge: Gauge, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+    """Cost of one leg, in m of path: its length and what it violates."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
     steep = slope_excess(rules, gauge, ux, uy, run, a[2], b[2])
     ends = pixels(rules.to_pixel, a[0], a[1], b[0], b[1])
-    depth, _ = terrain_excess(rules.heights, gauge.clear, ends, a[0], a[1], a[2], b[0], b[1], b[2])
+    depth = terrain_excess(rules.heights, rules.steep, gauge.clear, ends, a[0], a[1], a[2], b[0], b[1], b[2])
     total = length + SLOPE_COST * steep + DEPTH_COST * depth
-    kill, _ = kill_density(
-        rules.threats, rules.missiles, rules.kill_margin, seen, stamp, a[0], a[1], a[2], b[0], b[1], b[2]
-    )
+    kill, _, _ = kill_density(rules.missiles, rules.kill_margin, 0.0, a[0], a[1], a[2], b[0], b[1], b[2], 0.0, 0.0)
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
     return total
@@ -51,8 +47,7 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
     cost = np.full(width, np.inf)
     cost[0] = 0.0
     gauge = make_gauge(rules)
-    seen, stamp = np.zeros(rules.threats.shape[0], dtype=np.int64), 0
-    least = np.empty(width)
+    least, judged = np.empty(width), 0
     for i in range(1, count):
         after = np.full(width, np.inf)
         for k in range(width if i < count - 1 else 1):
@@ -67,8 +62,8 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
                 if least[j] >= after[k]:
                     break
                 least[j] = np.inf
-                stamp += 1
-                total = cost[j] + leg_cost(rules, gauge, seen, stamp, candidates[i - 1, j], b)
+                judged += 1
+                total = cost[j] + leg_cost(rules, gauge, candidates[i - 1, j], b)
                 if total < after[k]:
                     after[k] = total
                     came[i, k] = j
@@ -76,7 +71,7 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
     out = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):
         out[i - 1] = came[i, out[i]]
-    return out, stamp
+    return out, judged
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,26 +70,34 @@ class Umda:
         if self._floor is not None:
             deviation = np.maximum(deviation, self._floor)
         if self._basis is None:
-            return self._redraw_each(self._rng.normal(mean, deviation, (count, mean.size)), mean, deviation)
-        back = self._basis.T
-        return self._redraw(lambda rows: _project(self._rng.normal(mean, deviation, (rows, mean.size)), back), count)
+            return self._redraw_each(mean + deviation * self._rng.standard_normal((count, mean.size)), mean, deviation)
+        back = np.ascontiguousarray(self._basis.T)
+        return self._redraw(
+            lambda rows: _project(mean + deviation * self._rng.standard_normal((rows, mean.size)), back), count
+        )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
         """Rows of `draw`; those outside the box are drawn again, and then clipped."""
         out = draw(count)
+        rows = np.flatnonzero(((out < self.lower) | (out > self.upper)).any(axis=1))
         for _ in range(REDRAWS):
-            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
             if rows.size == 0:
                 return out
-            out[rows] = draw(rows.size)
+            again = draw(rows.size)
+            out[rows] = again
+            rows = rows[((again < self.lower) | (again > self.upper)).any(axis=1)]
         return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
+        """Do the same number by number."""
+        rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
         for _ in range(REDRAWS):
-            rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
             if rows.size == 0:
                 return drawn
-            drawn[rows, columns] = self._rng.normal(mean[columns], deviation[columns])
+            again = mean[columns] + deviation[columns] * self._rng.standard_normal(columns.size)
+            drawn[rows, columns] = again
+            outside = (again < self.lower[columns]) | (again > self.upper[columns])
+            rows, columns = rows[outside], columns[outside]
         return np.clip(drawn, self.lower, self.upper)
 
 

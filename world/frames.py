@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views
 
 if TYPE_CHECKING:
     from pyproj import Proj, Transformer
@@ -179,13 +179,13 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
     return out
 
 
-@compiled
+@compiled_views
 def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Both components of a packed `PolyMap` at one point."""
     return polymap_within(packed, packed.shape[1], x, y)
 
 
-@compiled
+@compiled_views
 def polymap_within(packed: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Do the same with a `PolyMap` of this size in the first columns of a wider table (Horner's scheme)."""
     a = (x - packed[0, 0]) / packed[1, 0]

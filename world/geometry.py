@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled_views, inlined
 
 Floats = NDArray[np.float64]
 
@@ -62,13 +62,13 @@ def path_length(waypoints: ArrayLike) -> Floats:
     return np.asarray(np.sqrt((legs**2).sum(axis=-1)).sum(axis=-1))
 
 
-@compiled
+@inlined
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
     """Bring an angle into [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
-@compiled
+@compiled_views
 def turning_angle(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float
 ) -> float:  # pragma: no cover - compiled
@@ -78,7 +78,7 @@ def turning_angle(
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
 
-@compiled
+@compiled_views
 def sphere_window(
     a: Floats, b: Floats, centre: Floats, radius: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -108,7 +108,7 @@ def sphere_window(
     return math.sqrt(closest2), max(0.0, middle - half), min(1.0, middle + half)
 
 
-@compiled
+@compiled_views
 def segment_exposure(
     a: Floats, b: Floats, centre: Floats, radius: float, scale: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -133,7 +133,7 @@ def segment_exposure(
     return leave - enter, window_exposure(enter, leave, length2, along, start2, scale)
 
 
-@compiled
+@compiled_views
 def window_exposure(
     enter: float, leave: float, length2: float, along: float, start2: float, scale: float
 ) -> float:  # pragma: no cover - compiled
