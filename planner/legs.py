@@ -320,8 +320,8 @@ def required_clearance(clear: Floats, east: float, north: float) -> float:  # pr
 
     clear: of `pack_clearance`.
     """
-    # Without branches, so that a loop over many places becomes vector instructions: an end that leaves the whole reserve
-    # takes nothing from it anywhere.
+    # Without branches, so that a loop over many places becomes vector instructions: an end that leaves the whole
+    # reserve takes nothing from it anywhere.
     dx, dy = east - clear[2], north - clear[3]
     keep = clear[4] + RESERVE_GROWTH * math.sqrt(dx * dx + dy * dy)
     dx, dy = east - clear[5], north - clear[6]
