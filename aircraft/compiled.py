@@ -66,7 +66,8 @@ def compiled(kernel: _Kernel) -> _Kernel:
 def inlined(kernel: _Kernel) -> _Kernel:
     """Do the same with a small function that is to be copied into those that call it in their inner loops.
 
-    A call hands over seven numbers an array: more than many a kernel's own work.  As `compiled_views` in what it may make.
+    A call hands over seven numbers an array: more than many a kernel's own work.  It may make what `compiled_views`
+    may.
     """
     njit: Any = numba.njit  # its types leave this option out
     return cast("_Kernel", njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(kernel))

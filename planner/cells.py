@@ -1,4 +1,4 @@
-"""Which threats may reach a place or a line: by the cells of a grid, so that a judge asks only those nearby."""
+"""Which threats may reach a place: lists by the cells of a grid, so that a judge asks only those nearby."""
 
 import math
 from typing import NamedTuple
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from aircraft.compiled import compiled
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 Short = NDArray[np.int32]
 
 # Side of a cell, as a share of the median reach; and cells of one grid, at most.
@@ -17,9 +16,6 @@ CELL = 0.2
 MOST_CELLS = 300_000
 # Highest whole metre that a cell notes.
 MOST = 2_000_000_000
-# Classes of missiles by radius, at most; and missiles a cell, on the mean.
-MOST_CLASSES = 8
-A_CELL = 2.0
 # Ground beyond the map that the grid covers, as a share of the map's sides.
 BEYOND = 0.1
 
@@ -115,46 +111,3 @@ def _lists(
             units = np.empty(first[count + 1], dtype=np.int32)
             filled = first.copy()
     return first, units
-
-
-class Missiles(NamedTuple):
-    """Missiles in the order of the cells that they stand in, so that those near a line are read in runs.
-
-    units: (m, 5) east, north, up, kill radius and scale, of those with a radius.  classes: (k, 7) of missiles alike in
-    radius, each with a grid of its own: west and south of it, cells a metre, columns, rows, where its cells begin in
-    `first`, and the largest radius.  first: (c,) where the units of each cell begin; a cell's end where the next begins.
-    """
-
-    units: Floats
-    classes: Floats
-    first: Ints
-
-
-def make_missiles(threats: Floats, side: float | None = None) -> Missiles:
-    """Missiles of threats (m, 5 or more): east, north, up, kill radius and scale.
-
-    side: of a cell, m; None for `A_CELL` missiles a cell.
-    """
-    units = threats[threats[:, 3] > 0.0, :5]
-    # Alike: within a factor of two, as long as there are not too many classes.
-    largest = float(units[:, 3].max(initial=1.0))
-    alike = np.minimum(MOST_CLASSES - 1, np.floor(np.log2(largest / units[:, 3]))).astype(np.int64)
-    ordered, classes, first = [units[:0]], [], [np.zeros(0, dtype=np.int64)]
-    cells, before = 0, 0
-    for number in np.unique(alike):
-        own = units[alike == number]
-        low, high = own[:, :2].min(axis=0), own[:, :2].max(axis=0)
-        area = float(np.prod(np.maximum(high - low, 1.0)))
-        per_metre = 1.0 / (math.sqrt(A_CELL * area / len(own)) if side is None else side)
-        cols, rows = (int(size * per_metre) + 1 for size in high - low)
-        place = ((own[:, :2] - low) * per_metre).astype(np.int64)
-        cell = np.minimum(place[:, 1], rows - 1) * cols + np.minimum(place[:, 0], cols - 1)
-        order = np.argsort(cell, kind="stable")
-        ordered.append(own[order])
-        first.append(before + np.searchsorted(cell[order], np.arange(cols * rows + 1)))
-        classes.append([low[0], low[1], per_metre, cols, rows, cells, own[:, 3].max()])
-        cells, before = cells + cols * rows + 1, before + len(own)
-    arrays = np.concatenate(ordered), np.array(classes).reshape(-1, 7), np.concatenate(first)
-    for array in arrays:
-        array.setflags(write=False)
-    return Missiles(*arrays)

@@ -162,18 +162,18 @@ def _add_exposures(spheres: Floats, units: Short, size: int, w: Floats, t: Ints)
     while count > 0:
         left = np.uintp(0)
         for entry in range(count):
-            b = np.uintp(t[asked + np.uintp(entry)])
-            k = np.uintp(units[np.uintp(t[np.uintp(FIRST) + b] + turn)]) * np.uintp(SPHERE)
-            dx, dy = w[east + b] - spheres[k], w[north + b] - spheres[k + one]
-            dz = w[up + b] - spheres[k + np.uintp(2)]
+            lane = np.uintp(t[asked + np.uintp(entry)])
+            k = np.uintp(units[np.uintp(t[np.uintp(FIRST) + lane] + turn)]) * np.uintp(SPHERE)
+            dx, dy = w[east + lane] - spheres[k], w[north + lane] - spheres[k + one]
+            dz = w[up + lane] - spheres[k + np.uintp(2)]
             d2 = dx * dx + dy * dy + dz * dz
             closest2 = d2 if d2 > CLOSEST * CLOSEST else CLOSEST * CLOSEST
             share = 1.0 / (closest2 * closest2)
             # By multiplication: whether a radius is passed cannot be guessed, and a wrong guess costs more.
-            w[kill + b] += spheres[k + kill4] * share * (1.0 if d2 <= spheres[k + r2_kill] else 0.0)
-            w[seen + b] += spheres[k + seen4] * share * (1.0 if d2 <= spheres[k + r2_seen] else 0.0)
-            t[asked + left] = np.int64(b)
-            left += one if t[np.uintp(NUMBER) + b] > turn + 1 else np.uintp(0)
+            w[kill + lane] += spheres[k + kill4] * share * (1.0 if d2 <= spheres[k + r2_kill] else 0.0)
+            w[seen + lane] += spheres[k + seen4] * share * (1.0 if d2 <= spheres[k + r2_seen] else 0.0)
+            t[asked + left] = np.int64(lane)
+            left += one if t[np.uintp(NUMBER) + lane] > turn + 1 else np.uintp(0)
         count = left
         turn += 1
 

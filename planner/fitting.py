@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from aircraft.compiled import compiled
 from planner.encoding import Encoding, Frame, rotated_frame
-from planner.graded import kill_density, pixels, terrain_excess
 from planner.grids import KILL_COST
+from planner.ground import pixels, terrain_excess
 from planner.legs import Gauge, make_gauge, slope_excess
+from planner.missiles import kill_density
 from planner.rules import Rules
 
 Floats = NDArray[np.float64]

@@ -142,9 +142,7 @@ def _sort(
                 continue
             left, right = low, middle
             for k in range(low, high):
-                if right >= high or (
-                    left < middle and not _before(table, column, width, order[right], order[left])
-                ):
+                if right >= high or (left < middle and not _before(table, column, width, order[right], order[left])):
                     spare[k] = order[left]
                     left += 1
                 else:
@@ -169,13 +167,13 @@ def _count_any(
     rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
 ) -> None:  # pragma: no cover - compiled
     """Add to total the dominators of each row of a group; rows: (c, n), sorted: only an earlier row can dominate."""
-    first, dominators = begin, 0
+    dominators = 0
     for k in range(begin + 1, end):
         equal = True
         for c in range(width):
             equal = equal and rows[c, k] == rows[c, k - 1]
         if not equal:
-            first, dominators = k, k - begin
+            dominators = k - begin
             # In the first column no earlier row is larger.
             if width == 2:
                 dominators = _at_most(rows[1, begin:k], rows[1, k])

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import make_cells, make_missiles
+from planner.cells import make_cells
 from planner.encoding import Space
+from planner.missiles import make_missiles
 from planner.rules import Rules, Steep, pack_spheres
 from world.errors import ScenarioError
 from world.limits import Limits

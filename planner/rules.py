@@ -5,7 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import Cells, Missiles
+from planner.cells import Cells
+from planner.missiles import Missiles
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
@@ -17,7 +18,7 @@ SPHERE = 8
 
 
 class Steep(NamedTuple):
-    """How steep the ground is, m per m: nowhere more than `most`; within `reach` m of a tile's pixels than slopes (i, j).
+    """How steep the ground is, m per m: nowhere more than `most`, and within `reach` m of tile i, j than slopes[i, j].
 
     Tiles are of `world.terrain.TILE` pixels a side.
     """

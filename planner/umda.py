@@ -109,20 +109,16 @@ def _project(rows: Floats, basis: Floats) -> Floats:
 def _product(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
     """Rows (n, d) times a basis (d, k) of which most entries are 0."""
     # In a fixed order: BLAS sums as the machine has it, and the result must not depend on the machine.
-    size = basis.shape[1]
-    entries = np.empty((size, basis.shape[0]), dtype=np.int64)
-    filled = np.zeros(size, dtype=np.int64)
-    for k in range(size):
+    turned = rows.T.copy()
+    out = np.zeros((basis.shape[1], rows.shape[0]))
+    for k in range(basis.shape[1]):
         for d in range(basis.shape[0]):
             if basis[d, k] != 0.0:
-                entries[k, filled[k]] = d
-                filled[k] += 1
-    out = np.empty((rows.shape[0], size))
-    for n in range(rows.shape[0]):
-        for k in range(size):
-            total = 0.0
-            for entry in range(filled[k]):
-                d = entries[k, entry]
-                total += rows[n, d] * basis[d, k]
-            out[n, k] = total
-    return out
+                _add_times(turned[d], basis[d, k], out[k])
+    return out.T.copy()
+
+
+@njit(cache=True)
+def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
+    for n in range(out.size):
+        out[n] += values[n] * factor

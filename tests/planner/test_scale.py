@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.cells import make_cells, make_missiles
+from planner.cells import make_cells
 from planner.criteria import paper_scores
 from planner.encoding import rotated
 from planner.graded import graded_scores
+from planner.missiles import make_missiles
 from planner.problem import make_problem
 from planner.search import plan_path
 from world.limits import Limits
