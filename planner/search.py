@@ -170,6 +170,10 @@ def _attempt(run: Run, number: int, previous: Floats | None) -> None:
     grids, growth = ATTEMPTS[number]
     population = table.population * growth
     encoding, algorithm = run.encoding, run.algorithm
+    if algorithm.seeded and number == 0 and _straight(run):
+        run.note()
+        run.report(0)
+        return
     starts = _starts(run, grids, previous)
     if len(run.archive.scores) and (run.safe_already() or run.over()):
         run.note()
@@ -202,6 +206,22 @@ def _attempt(run: Run, number: int, previous: Floats | None) -> None:
             run.tighten(run.archive.vectors[0], LAST_ROUNDS, scale, LAST_POLISH)
         run.note()
         run.report(0)
+
+
+def _straight(run: Run) -> bool:
+    """Whether the straight line is a safe path: no path is shorter, and there is nothing to search for."""
+    encoding, space = run.encoding, run.problem.space
+    if encoding.name != "rotated":
+        return False
+    edges = encoding.lower[0::3], encoding.upper[0::3]
+    share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
+    path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
+    vectors = rotated_vectors(space, encoding, path[None])
+    scores = run.judge(vectors)
+    if scores[0, :4].any() or scores[0, KILL] > 0.0:
+        return False
+    run.evaluate(vectors)
+    return run.finished(run.best_certified()[1])
 
 
 def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
