@@ -1,6 +1,7 @@
 """Texts of the command line as values: each refuses what it cannot take, saying what it expects."""
 
 import argparse
+import math
 
 
 def seed(text: str) -> int:
@@ -104,9 +105,11 @@ def threat(text: str) -> tuple[float, float, float, float]:
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
+        east = math.nan
+    if not (math.isfinite(east) and math.isfinite(north) and kill >= 0.0 and detection >= 0.0):
         raise argparse.ArgumentTypeError(
             f"{text!r}: EAST,NORTH,KILL,DETECTION is expected: four numbers in m, a radius of 0 for none"
-        ) from None
+        )
     return east, north, kill, detection
 
 

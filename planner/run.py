@@ -93,15 +93,19 @@ class Run:
         """Begin with nothing."""
         self.archive = Archive(np.empty((0, self.encoding.lower.size)), np.empty((0, 8)))
 
-    def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive sees them."""
+    def judge(self, vectors: Floats) -> Floats:
+        """Scores (n, 8) of vectors (n, d)."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
         violations: NDArray[np.generic]
         if self.algorithm.graded:
             violations, objectives = graded_scores(self.problem.search, paths)
         else:
             violations, objectives = paper_scores(self.problem.search, paths)
-        scores = np.concatenate([violations.astype(np.float64), objectives], axis=1)
+        return np.concatenate([violations.astype(np.float64), objectives], axis=1)
+
+    def evaluate(self, vectors: Floats) -> Floats:
+        """Scores (n, 8) of vectors (n, d); the archive sees them."""
+        scores = self.judge(vectors)
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
