@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.flown import Flown
-from logs.route_shape import RouteShape, turn_room
+from logs.route_shape import RouteShape, route_shape, turn_room
 from logs.rules_slope import slope_limit, steep_arc
 from logs.rules_turn import turn_limit
 from logs.rules_world import planned_path
@@ -20,7 +20,10 @@ Floats = NDArray[np.float64]
 # A change is asked for with this much to spare, so that rounding does not undo it.
 SPARE_ANGLE = math.radians(0.1)
 SPARE_LENGTH = 1.0
+SPARE_SPEED = 0.03
 SPEED_STEP = 0.5
+# Times that a gentler turn is tried.
+_TRIES = 6
 
 
 def with_suggestions(shape: RouteShape, flown: Flown | None, findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
@@ -98,8 +101,8 @@ def turn_suggestion(shape: RouteShape, i: int) -> str:
     if planned <= limit or limit <= SPARE_ANGLE:
         return ""
     allowed = limit - SPARE_ANGLE
-    degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
-    changes = [(1.0 - allowed / planned, f"turn at most {degrees:.1f}° there")]
+    degrees = _gentler_turn(shape, i, allowed)
+    changes = [(1.0 - allowed / planned, f"turn at most {degrees:.1f}° there")] if degrees > 0.0 else []
     if source == "aircraft" and math.isfinite(shape.before[i]):
         before = shape.before[i] + shape.after[i - 1] + shape.reversal[i - 1] + SPARE_LENGTH
         after = shape.after[i] + shape.before[i + 1] + shape.reversal[i] + SPARE_LENGTH
@@ -116,6 +119,36 @@ def turn_suggestion(shape: RouteShape, i: int) -> str:
             now = float(max(shape.setup.route.airspeed[i - 1 : i + 1]))
             changes.append((1.0 - speed / now, f"fly it at {speed:g} m/s instead of {now:g} m/s"))
     return ", or ".join(text for _, text in sorted(changes))
+
+
+def _gentler_turn(shape: RouteShape, i: int, allowed: float) -> float:
+    """Largest turn in tenths of a degree, up to ``allowed`` (rad), that passes with all that follows turned along.
+
+    In wind the next turns change with their courses, and with them the room for this one.  0 where none was found.
+    """
+    first, last = max(0, i - 2), min(len(shape.points), i + 3)
+    route = shape.setup.route
+    near = replace(
+        route,
+        waypoints=route.waypoints[first:last],
+        airspeed=route.airspeed[first : last - 1],
+        **{name: getattr(route, name)[first:last] for name in ("acceptance", "fly_over", "items", "arcs")},
+    )
+    at = i - first
+    for _ in range(_TRIES):
+        degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
+        if degrees <= 0.0:
+            return 0.0
+        points = np.array(shape.points[first:last])
+        change = math.copysign(math.radians(degrees), shape.turns[i]) - float(shape.turns[i])
+        cos, sin = math.cos(change), math.sin(change)
+        onward = points[at + 1 :, :2] - points[at, :2]
+        points[at + 1 :, :2] = points[at, :2] + onward @ np.array([[cos, -sin], [sin, cos]])
+        limit, _ = turn_limit(route_shape(replace(shape.setup, route=replace(near, waypoints=points))), at)
+        if limit >= math.radians(degrees):
+            return degrees
+        allowed = min(allowed, limit) - SPARE_ANGLE
+    return 0.0
 
 
 def _speeds(shape: RouteShape, amsl: float, now: float) -> list[float]:
@@ -188,4 +221,5 @@ def _speed(shape: RouteShape, item: Finding) -> str:
     low, high = shape.setup.envelope.level_speeds(float(max(shape.points[leg, 2], shape.points[leg + 1, 2])))
     if low <= commanded <= high:
         return ""
+    low, high = math.ceil(10.0 * low * (1.0 + SPARE_SPEED)) / 10.0, math.floor(10.0 * high * (1.0 - SPARE_SPEED)) / 10.0
     return f"command {low:.1f} to {high:.1f} m/s on leg {leg}"
