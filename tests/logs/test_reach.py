@@ -7,7 +7,8 @@ import pytest
 
 from flight.export import plan_mission
 from logs.reader import read_log
-from planfly.pipeline import load_vehicle, make_plan, make_setup
+from planfly.pipeline import make_plan, make_setup
+from planfly.vehicle import load_vehicle
 from tests.bench.chain import in_child, long_flight, recording
 from world.scenario import load_scenario
 
