@@ -63,6 +63,16 @@ def compiled(kernel: _Kernel) -> _Kernel:
     return cast("_Kernel", numba.njit(cache=True, error_model="numpy")(kernel))
 
 
+def inlined(kernel: _Kernel) -> _Kernel:
+    """Do the same with a small function that is to be copied into those that call it in their inner loops.
+
+    A call hands over seven numbers an array: more than many a kernel's own work.  It may make what `compiled_views`
+    may.
+    """
+    njit: Any = numba.njit  # its types leave this option out
+    return cast("_Kernel", njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(kernel))
+
+
 def compiled_views(kernel: _Kernel) -> _Kernel:
     """Do the same with a function that makes no arrays but views of its arguments, and returns none.
 

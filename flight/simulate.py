@@ -22,7 +22,7 @@ from flight.rows import Lateral, M
 from flight.setup import FlightSetup, limits_of
 from flight.state import STATE_SIZE, S
 from flight.tick import ENDS, linked_tick, tick
-from flight.track import COLUMNS, Track
+from flight.track import COLUMNS, Track, settled
 from flight.trim import straight
 from flight.turbulence import GUST_STATES, start_gusts
 from world.errors import FlightError
@@ -34,7 +34,7 @@ from world.wind import W20
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
-Sink = Callable[[Track], None]
+Sink = Callable[[Floats], None]
 
 FDM_HZ = 120.0
 # Of the usual guidance, s; `Flight.dt` is a flight's own.
@@ -68,7 +68,8 @@ def simulate(
 ) -> Flown:
     """Fly a setup from a trimmed start.  The same setup gives the same track, bit for bit.
 
-    sink: is handed each second of the track as it is flown.  progress: is told the distance flown and the whole, m.
+    sink: is handed each second's rows, as `Flight.block` gives them.  progress: is told the distance flown and the
+    whole, m.
     variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
     Raises FlightError for a flight that cannot start.
     """
@@ -79,7 +80,7 @@ def simulate(
         rows, ended = flight.block(round(BLOCK / flight.dt))
         blocks.append(rows)
         if sink is not None and len(rows):
-            sink(as_track(rows))
+            sink(rows)
         if progress is not None:
             progress(min(flight.memory[M.DISTANCE], flight.path.length), flight.path.length)
     return Flown(as_track(np.concatenate(blocks)), ended, flight.path)
@@ -217,7 +218,7 @@ class Flight:
         left = self.most_ticks - int(constants[K.TICK])
         constants[K.ROW] = 0.0
         status = self._fly(min(count, left))
-        rows = self.arena.rows[: int(constants[K.ROW])].copy()
+        rows = settled(self.arena.rows[: int(constants[K.ROW])])
         if status:
             return rows, ENDS[status]
         if left <= count:

@@ -9,6 +9,28 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 Ints = NDArray[np.int32]
 
+# Binary digits after the point that a flown row keeps of each column: finer than any instrument, and a third of the log
+# less than with all that a float32 holds.  Positions are the finest: courses and slopes are taken between rows that are
+# 0.4 m apart, and 0.06 mm turns those by 0.01 degrees.  Time and leg are as they are.
+DIGITS = {
+    "position": 14,  # 0.06 mm
+    "velocity": 10,  # 1 mm/s
+    "attitude": 16,  # 0.0009 degrees
+    "rates": 13,  # 0.007 degrees/s
+    "airspeed": 10,
+    "flow": 16,
+    "controls": 14,  # 0.0035 degrees
+    "commands": 14,
+    "wind": 10,
+    "load_factor": 10,
+    "current": 10,
+    "energy": 14,  # 0.06 mWh, a twentieth of what a tick takes
+    "cross_track": 10,
+    "height_error": 10,
+    "speed_command": 10,
+    "clearance": 10,
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Track:
@@ -85,3 +107,30 @@ def join_tracks(parts: list[Track]) -> Track:
         empty = [np.zeros((0, n)) if n > 1 else np.zeros(0) for n in COLUMNS.values()]
         return Track(*empty)  # type: ignore[arg-type]  # Track gives each array its own type
     return Track(*(np.concatenate([getattr(part, name) for part in parts]) for name in COLUMNS))
+
+
+def _digits() -> Floats:
+    kept = [DIGITS.get(name, 0) for name, columns in COLUMNS.items() if name != "time" for _ in range(columns)]
+    return np.array(kept, dtype=np.float64)
+
+
+_STEPS, _STEP = np.exp2(_digits()), np.exp2(-_digits())
+
+
+def settled(rows: Floats) -> Floats:
+    """Copy of flown rows (t, columns) at the resolution of `DIGITS`, to the nearest, and without a negative zero.
+
+    It is done as a row is flown, so that whoever judges the flight and whoever reads its log see the same numbers.
+    """
+    out = rows.copy()
+    with np.errstate(over="ignore", invalid="ignore"):
+        out[:, 1:] *= _STEPS
+        np.rint(out[:, 1:], out=out[:, 1:])
+        out[:, 1:] *= _STEP
+        out[:, 1:] += 0.0
+    return out
+
+
+def track_rows(track: Track) -> Floats:
+    """(t, columns) of a track, in the order of `COLUMNS`."""
+    return np.column_stack([getattr(track, name) for name in COLUMNS]).astype(np.float64, copy=False)

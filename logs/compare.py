@@ -86,12 +86,12 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     threats = setup.scenario.threats
     if len(threats) and len(position) > 1:
         for name, radii, scales in (
-            ("missiles", threats.kill_radius, threats.kill_scale),
-            ("radars", threats.detection_radius, threats.detection_scale),
+            ("all missiles", threats.kill_radius, threats.kill_scale),
+            ("all radars", threats.detection_radius, threats.detection_scale),
         ):
             met = path_spheres(position, time, threats.position, radii, scales)
-            found[f"time within reach of {name}", "s"] = float(met[:, 0].sum())
-            found[f"exposure to {name}", "s"] = float(met[:, 1].sum())
+            found[f"time within reach, sum over {name}", "s"] = float(met[:, 0].sum())
+            found[f"exposure, sum over {name}", "s"] = float(met[:, 1].sum())
     lasts = np.append(np.diff(track.time), 0.0)
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
         if math.isfinite(limit):
@@ -128,6 +128,8 @@ def _notes(first: FlightLog, second: FlightLog) -> list[str]:
         ("seed", str(a.seed), str(b.seed)),
         ("mission", a.mission_text, b.mission_text),
         ("wind", _wind(a), _wind(b)),
+        ("guidance", a.guidance, b.guidance),
+        ("navigation", a.nav, b.nav),
     ):
         if left != right:
             notes.append(f"{name}: differs" if name == "mission" else f"{name}: {left} and {right}")

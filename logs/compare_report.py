@@ -1,5 +1,6 @@
 """The comparison of two flights as pictures and a page."""
 
+import base64
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,10 @@ Floats = NDArray[np.float64]
 
 _SECOND = "#D55E00"
 _POINTS = 3000
+_WORDS = {
+    "compare-map.png": "Both flights from above, over the first one's map",
+    "compare-profile.png": "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
+}
 
 
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
@@ -32,7 +37,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     if comparison.logs[0].setup.scenario.origin == comparison.logs[1].setup.scenario.origin:
         figures = {"compare-map": draw_both_on_map(comparison), **figures}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
-    page = _page(comparison, [f"{name}.png" for name in figures])
+    page = _page(comparison, files)
     if svg:
         files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     files["compare.html"] = page.encode("utf-8")
@@ -42,12 +47,25 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     return [out_dir / name for name in files]
 
 
-def _page(comparison: Comparison, pictures: list[str]) -> str:
+def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
+    """The page, its pictures inside."""
+    pictures = [
+        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _WORDS[name])
+        for name, data in files.items()
+    ]
+    verdicts = [
+        (name, verdict.flyable, (verdict.summary.splitlines() or [""])[0])
+        for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
+    ]
     environment = Environment(
         loader=PackageLoader("logs"), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
     return environment.get_template("compare.html").render(
-        names=comparison.names, rows=difference_rows(comparison), notes=comparison.notes, pictures=pictures
+        names=comparison.names,
+        verdicts=verdicts,
+        rows=difference_rows(comparison),
+        notes=comparison.notes,
+        pictures=pictures,
     )
 
 

@@ -1,16 +1,15 @@
 """The MCAP container, written front to back in chunks that come ready made.
 
-mcap's own `Writer` takes one message at a time, at some 6 us each; here a chunk's records and the index of its messages
-come as arrays.  The records around them are mcap's own classes.  Every CRC that the format has is written.
+mcap's own `Writer` takes one message at a time, at some 6 us each, and its `Chunk` and `ChunkIndex` copy their fields
+through a record builder for as long as the compression takes; here a chunk's records and the index of its messages come
+as bytes.  Records that are written once are mcap's own classes.  Every CRC that the format has is written.
 """
 
-import contextlib
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import zstandard
@@ -20,8 +19,6 @@ from mcap.records import (
     Attachment,
     AttachmentIndex,
     Channel,
-    Chunk,
-    ChunkIndex,
     DataEnd,
     Footer,
     Header,
@@ -36,35 +33,64 @@ from logs.container import FRAME, MAGIC, records, stream
 
 Index = NDArray[np.uint64]
 _MESSAGE = struct.Struct("<HIQ")
+# Before a chunk's compression: its times, size and CRC.
 _CHUNK = struct.Struct("<QQQI")
+# Times, offset and length of a chunk, and the length of its table of message indexes; a line of that; its sizes.
+_CHUNK_INDEX, _OFFSET, _SIZES = struct.Struct("<QQQQI"), struct.Struct("<HQ"), struct.Struct("<QQ")
+_COMPRESSION = b"\x04\x00\x00\x00zstd"
 _PAIRS_HEAD = 6  # channel and length, before a message index's pairs
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkContent:
-    """Message records one after the other, and where each is.
+    """Message records one after the other, and the message index records to stand behind them.
 
-    index: for each channel (n, 2): log_time in ns and offset into ``records``, in the order of the records.
+    start, end: log time of the oldest and the newest message, ns.  channels: for each with messages here its number,
+    where its record starts in ``index``, and how many messages it has.
     """
 
-    records: bytes
-    index: dict[int, Index]
+    records: bytes | memoryview
+    index: bytes
+    channels: tuple[tuple[int, int, int], ...]
+    start: int
+    end: int
+
+
+class _Written(NamedTuple):
+    """A chunk in the file: what its chunk index says; a frozen dataclass takes six times as long to make."""
+
+    content_start: int
+    content_end: int
+    at: int
+    length: int
+    offsets: tuple[tuple[int, int], ...]
+    index_length: int
+    compressed: int
+    size: int
+
+    def record(self) -> bytes:
+        """Its chunk index record."""
+        offsets = b"".join(_OFFSET.pack(channel, at) for channel, at in self.offsets)
+        times = _CHUNK_INDEX.pack(self.content_start, self.content_end, self.at, self.length, len(offsets))
+        sizes = _SIZES.pack(self.compressed, self.size)
+        content = times + offsets + self.index_length.to_bytes(8, "little") + _COMPRESSION + sizes
+        return FRAME.pack(Opcode.CHUNK_INDEX, len(content)) + content
 
 
 class ContainerWriter:
     """Writes the magic and the header at once, then attachments and chunks, and the summary at `finish`."""
 
-    def __init__(self, file: BinaryIO, profile: str) -> None:
-        """file: empty, open for writing.  profile: goes into the header, as the library's name too."""
+    def __init__(self, file: BinaryIO, profile: str, level: int = 3) -> None:
+        """file: empty, open for writing.  profile: goes into the header, as the library's name too.  level: of zstd."""
         self._file = file
-        self._compressor = zstandard.ZstdCompressor(level=3)
+        self._compressor = zstandard.ZstdCompressor(level=level)
         self._crc = 0
         self._at = 0
         self._schemas: dict[str, Schema] = {}
         self._channels: list[Channel] = []
         self._unwritten: list[McapRecord] = []
         self._attachments: list[AttachmentIndex] = []
-        self._chunks: list[ChunkIndex] = []
+        self._chunks: list[_Written] = []
         self._counts: Counter[int] = Counter()
         self._put(MAGIC + _bytes(Header(profile=profile, library=profile)))
 
@@ -88,15 +114,11 @@ class ContainerWriter:
         self._unwritten.append(channel)
         return channel.id
 
-    def chunk(self, content: ChunkContent) -> None:
-        """Write a chunk of at least one message."""
-        if not self._unwritten:
-            self._chunk(content.records, content.index)
-            return
+    def front(self) -> bytes:
+        """Give the schemas and channels that no chunk holds yet, as the beginning of the next."""
         front = b"".join(_bytes(record) for record in self._unwritten)
         self._unwritten.clear()
-        moved = np.array([0, len(front)], dtype=np.uint64)
-        self._chunk(front + content.records, {channel: pairs + moved for channel, pairs in content.index.items()})
+        return front
 
     def copy(self, data: bytes) -> None:
         """Write a chunk as it stood in another file, from its records.  Raises ValueError and what mcap's classes do.
@@ -115,63 +137,52 @@ class ContainerWriter:
             elif opcode == Opcode.MESSAGE:
                 number, _, log_time = _MESSAGE.unpack_from(content)
                 index.setdefault(number, []).append((log_time, at))
-        self._chunk(data, {number: np.array(pairs, dtype=np.uint64) for number, pairs in index.items()})
+        parts, places, at = [], [], 0
+        for number, pairs in sorted(index.items()):
+            parts.append(_message_index(number, np.array(pairs, dtype=np.uint64)))
+            places.append((number, at, len(pairs)))
+            at += len(parts[-1])
+        times = [log_time for pairs in index.values() for log_time, _ in pairs]
+        start, end = (min(times), max(times)) if times else (0, 0)
+        self.chunk(ChunkContent(data, b"".join(parts), tuple(places), start, end))
 
-    def _chunk(self, data: bytes, index: dict[int, Index]) -> None:
-        times = np.concatenate([np.zeros(0, dtype=np.uint64), *(pairs[:, 0] for pairs in index.values())])
-        chunk = Chunk(
-            compression="zstd",
-            data=self._compressor.compress(data),
-            message_start_time=int(times.min()) if times.size else 0,
-            message_end_time=int(times.max(initial=0)),
-            uncompressed_crc=zlib.crc32(data),
-            uncompressed_size=len(data),
-        )
-        record = _chunk_record(chunk)
-        start = self._at
-        offsets = {}
-        index_start = at = start + len(record)
-        pieces = [record]
-        for channel, pairs in sorted(index.items()):
-            offsets[channel] = at
-            pieces.append(_message_index(channel, pairs))
-            at += len(pieces[-1])
-            self._counts[channel] += len(pairs)
-        self._put(b"".join(pieces))
+    def chunk(self, content: ChunkContent) -> None:
+        """Write a chunk."""
+        data = self._compressor.compress(content.records)
+        size = len(content.records)
+        head = _CHUNK.pack(content.start, content.end, size, zlib.crc32(content.records)) + _COMPRESSION
+        head += len(data).to_bytes(8, "little")
+        length = FRAME.size + len(head) + len(data)
+        behind = self._at + length
+        places = tuple((channel, behind + place) for channel, place, _ in content.channels)
+        for channel, _, count in content.channels:
+            self._counts[channel] += count
         self._chunks.append(
-            ChunkIndex(
-                chunk_length=len(record),
-                chunk_start_offset=start,
-                compression=chunk.compression,
-                compressed_size=len(chunk.data),
-                message_end_time=chunk.message_end_time,
-                message_index_length=self._at - index_start,
-                message_index_offsets=offsets,
-                message_start_time=chunk.message_start_time,
-                uncompressed_size=chunk.uncompressed_size,
-            )
+            _Written(content.start, content.end, self._at, length, places, len(content.index), len(data), size)
         )
+        frame = FRAME.pack(Opcode.CHUNK, length - FRAME.size)
+        self._put(b"".join((frame, head, data, content.index)))
 
     @property
     def last_time(self) -> int:
         """log_time of the newest message, ns; 0 before the first chunk."""
-        return max((index.message_end_time for index in self._chunks), default=0)
+        return max((chunk.content_end for chunk in self._chunks), default=0)
 
     def finish(self) -> None:
         """Write the end of the data and the summary; the file stays open."""
         self._put(_bytes(DataEnd(self._crc)))
         start = self._at
-        groups: list[tuple[Opcode, list[Any]]] = [
-            (Opcode.SCHEMA, list(self._schemas.values())),
-            (Opcode.CHANNEL, list(self._channels)),
-            (Opcode.STATISTICS, [self._statistics()]),
-            (Opcode.CHUNK_INDEX, list(self._chunks)),
-            (Opcode.ATTACHMENT_INDEX, list(self._attachments)),
+        groups = [
+            (Opcode.SCHEMA, [_bytes(schema) for schema in self._schemas.values()]),
+            (Opcode.CHANNEL, [_bytes(channel) for channel in self._channels]),
+            (Opcode.STATISTICS, [_bytes(self._statistics())]),
+            (Opcode.CHUNK_INDEX, [chunk.record() for chunk in self._chunks]),
+            (Opcode.ATTACHMENT_INDEX, [_bytes(index) for index in self._attachments]),
         ]
         summary = b""
         offsets = b""
         for opcode, members in groups:
-            group = b"".join(_bytes(record) for record in members)
+            group = b"".join(members)
             if group:
                 offsets += _bytes(SummaryOffset(opcode, start + len(summary), len(group)))
             summary += group
@@ -187,47 +198,37 @@ class ContainerWriter:
             channel_message_counts=dict(sorted(self._counts.items())),
             chunk_count=len(self._chunks),
             message_count=self._counts.total(),
-            message_end_time=max((index.message_end_time for index in self._chunks), default=0),
-            message_start_time=min((index.message_start_time for index in self._chunks), default=0),
+            message_end_time=max((chunk.content_end for chunk in self._chunks), default=0),
+            message_start_time=min((chunk.content_start for chunk in self._chunks), default=0),
             metadata_count=0,
             schema_count=len(self._schemas),
         )
 
     def flush(self) -> None:
         """Hand what was written to the operating system.  Raises OSError."""
-        with _named(self._file):
+        try:
             self._file.flush()
+        except OSError as error:
+            raise _named(error, self._file) from error
 
     def _put(self, data: bytes) -> None:
-        with _named(self._file):
+        try:
             self._file.write(data)
+        except OSError as error:
+            raise _named(error, self._file) from error
         self._crc = zlib.crc32(data, self._crc)
         self._at += len(data)
 
 
-@contextlib.contextmanager
-def _named(file: BinaryIO) -> Iterator[None]:
+def _named(error: OSError, file: BinaryIO) -> OSError:
     """Give an error while writing (a full disk) the name of the file, which a write does not know."""
-    try:
-        yield
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, getattr(file, "name", None)) from error
+    return OSError(error.errno, error.strerror, getattr(file, "name", None))
 
 
 def _bytes(record: McapRecord) -> bytes:
     builder: Any = RecordBuilder()  # mcap leaves some of its methods without annotations
     record.write(builder)
     return bytes(builder.end())
-
-
-def _chunk_record(chunk: Chunk) -> bytes:
-    """Chunk.write, which copies its data through a record builder, takes as long as the compression."""
-    name = chunk.compression.encode()
-    head = _CHUNK.pack(
-        chunk.message_start_time, chunk.message_end_time, chunk.uncompressed_size, chunk.uncompressed_crc
-    )
-    content = head + len(name).to_bytes(4, "little") + name + len(chunk.data).to_bytes(8, "little")
-    return b"".join([FRAME.pack(Opcode.CHUNK, len(content) + len(chunk.data)), content, chunk.data])
 
 
 def _message_index(channel: int, pairs: Index) -> bytes:

@@ -40,7 +40,10 @@ def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> 
 
 
 def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
-    """Four panels along the flown distance (km): strength and sum of kill and of detection; None without threats."""
+    """Strength and sum of kill and of detection along the flown distance (km), where units have such a reach.
+
+    None without threats.
+    """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:
         return None
@@ -56,11 +59,15 @@ def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
         ("kill", style.MISSILE, threats.kill_radius, threats.kill_scale),
         ("detection", style.RADAR, threats.detection_radius, threats.detection_scale),
     ):
+        if not (radii > 0.0).any():
+            continue
         rate = exposure_rates(position, threats.position, radii, scales)
         total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(rate) * np.diff(time))])
         strength = Line("strength", np.append(rate, rate[-1]), color=colour, filled=True)
         panels.append(Panel(f"{name}\nstrength (1)", [strength]))
         panels.append(Panel(f"{name}\nso far (s)", [Line("sum over time", total, color=colour, width=1.6)]))
+    if not panels:
+        return None
     whole = Track(*(getattr(track, item)[rows] for item in COLUMNS))
     title = f"{style.shorten(setup.scenario.name, 60)}: exposure along the flown track"
     return draw_panels(title, panels, Axis("distance flown over the ground (km)", kilometres), whole)

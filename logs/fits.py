@@ -103,7 +103,7 @@ def leg_slope(shape: RouteShape, flown: Flown, leg: int) -> Fit | None:
     start = min(max(middle - 0.5 * SHORTEST_TIME, float(time[0])), max(float(time[0]), float(time[-1]) - SHORTEST_TIME))
     window = (time >= start) & (time <= start + SHORTEST_TIME)
     run_at = flown.distance_run[rows][window]
-    if np.ptp(run_at) < 1.0:
+    if run_at.size < 2 or np.ptp(run_at) < 1.0:
         return None
     rise, _ = fit_line(run_at, position[window, 2])
     return Fit(math.atan(rise), ROUGH_SLOPE, float(np.ptp(run_at)), False)

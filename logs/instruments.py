@@ -6,12 +6,13 @@ whoever shows them did.
 
 import bisect
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from logs.controls import control_limits
+from logs.legs_flown import with_legs
 from logs.reader import FlightLog
 from logs.replay import TimelineEntry, timeline, waypoint_name
 
@@ -141,7 +142,8 @@ class Instruments:
 
 
 def make_instruments(log: FlightLog) -> Instruments:
-    """Make a log ready for frames."""
+    """Make a log ready for frames; its legs are worked out anew."""
+    log = replace(log, track=with_legs(log.setup, log.track))
     terrain = log.setup.scenario.terrain
     position = log.track.position
     ground = np.full(len(log.track), math.nan)

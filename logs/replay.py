@@ -1,7 +1,7 @@
 """The replay: a flight told again from its log alone, as a timeline of legs, turns, clearances and events.
 
-Everything is recomputed from the track, the terrain and the threats in the log; a recorded clearance or verdict is not
-read.  Nothing is printed here.
+Everything is recomputed from the track, the route, the terrain and the threats in the log; a recorded leg, clearance or
+verdict is not read.  Nothing is printed here.
 """
 
 import itertools
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from flight.route import Route
 from flight.track import Track
 from logs.along_track import Passage, passages, segment_clearances
+from logs.legs_flown import with_legs
 from logs.reader import FlightLog
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
@@ -49,6 +50,7 @@ class _Stretch:
 
 def timeline(log: FlightLog) -> list[TimelineEntry]:
     """Tell the flight as entries in order of time; the same log always gives the same ones."""
+    log = replace(log, track=with_legs(log.setup, log.track))
     stretches = _stretches(log.track, log.setup.route)
     entries = [_start(log)]
     entries += _legs(log, stretches)
@@ -79,7 +81,7 @@ def _printable(text: str) -> str:
 
 
 def _stretches(track: Track, route: Route) -> list[_Stretch]:
-    """Cut the track where the active leg changes."""
+    """Cut the track where the leg changes."""
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]

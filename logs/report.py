@@ -18,6 +18,7 @@ from flight.setup import FlightSetup
 from flight.track import Track
 from logs import report_tables as tables
 from logs.figure_marks import failures
+from logs.legs_flown import with_legs
 from logs.report_pictures import report_pictures
 from logs.report_text import badge_of, count_sentence, finding_rows, rule_rows
 from logs.scene_data import scene_json
@@ -49,6 +50,7 @@ def write_report(
     """
     from logs.figures import FIGURE_FILES, draw_pictures
 
+    track = None if track is None or not len(track) else with_legs(setup, track)
     pictures = draw_pictures(setup, track, verdict, svg=svg)
     page = _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)
@@ -77,6 +79,7 @@ def report_html(
     """
     from logs.figures import draw_pictures
 
+    track = None if track is None or not len(track) else with_legs(setup, track)
     pictures = draw_pictures(setup, track, verdict)
     return _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
 
@@ -92,7 +95,6 @@ def _page(
     command: str,
     events: Sequence["LogEvent"] = (),
 ) -> str:
-    track = track if track is not None and len(track) else None
     failed = failures(verdict, len(setup.route.waypoints))
     rows = finding_rows(verdict.findings)
     environment = Environment(
@@ -106,6 +108,7 @@ def _page(
         flown=track is not None,
         failing=[row for row in rows if row.state == "fail"],
         counts=count_sentence(rows),
+        flight_line=tables.flight_sentence(setup, track),
         rules=rule_rows(verdict.findings),
         findings=rows,
         notes=[note for note in tables.notes_of(setup) if note not in verdict.summary],

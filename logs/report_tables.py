@@ -103,6 +103,18 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
     )
 
 
+def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
+    """The flight in one line; "" where there was none."""
+    if track is None:
+        return ""
+    seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
+    above = ground_clearance(setup, track)
+    low = NOTHING if above is None else number(_least(above), digits=0)
+    height = f", never less than {low} m above ground" if low != NOTHING else ""
+    used, held = number(float(track.energy[-1]), digits=0), number(setup.battery, digits=0)
+    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}, {used} of {held} Wh."
+
+
 def _peak(values: NDArray[np.float32]) -> float:
     finite = np.abs(values[np.isfinite(values)])
     return float(finite.max()) if finite.size else math.nan

@@ -4,20 +4,18 @@ Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is
 """
 
 import math
-import struct
 from collections.abc import Iterable
 
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
-from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import ArrayLike, NDArray
@@ -32,9 +30,23 @@ MAP, AIRCRAFT = "map", "aircraft"
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
 MOST_VERTICES = 80  # a side of the terrain mesh
 
-# Fields of FrameTransform, written by hand: five a second through message objects cost as much as all of the state.
-_FRAMES = FrameTransform(parent_frame_id=MAP, child_frame_id=AIRCRAFT).SerializeToString(deterministic=True)
-_PLACE, _TURN = struct.Struct("<BBBdBdBd"), struct.Struct("<BBBdBdBdBd")
+
+def _of_doubles(names: str) -> np.dtype[np.void]:
+    """A message of doubles as an element of a repeated field: its tag, its length, and a tag before each."""
+    fields = [("tag", "u1"), ("size", "u1")]
+    for name in names:
+        fields += [(f"tag_{name}", "u1"), (name, "<f8")]
+    return np.dtype(fields)
+
+
+# In protobuf's encoding: ten thousand message objects would take as long as some minutes of flight.
+_POINT, _COLOUR = _of_doubles("xyz"), _of_doubles("rgba")
+# Fields of SceneEntity, LinePrimitive and TriangleListPrimitive.
+_ENTITY_LINES = SceneEntity.LINES_FIELD_NUMBER
+_ENTITY_TRIANGLES = SceneEntity.TRIANGLES_FIELD_NUMBER
+_LINE_POINTS = LinePrimitive.POINTS_FIELD_NUMBER
+_MESH_POINTS = TriangleListPrimitive.POINTS_FIELD_NUMBER
+_MESH_COLOURS = TriangleListPrimitive.COLORS_FIELD_NUMBER
 
 _LOW = np.array([0.36, 0.52, 0.30])
 _HIGH = np.array([0.80, 0.74, 0.62])
@@ -69,58 +81,21 @@ def body_rotation(attitude: ArrayLike) -> Floats:
     )
 
 
-def transform_messages(times_ns: NDArray[np.int64], position: Floats, attitude: ArrayLike) -> list[bytes]:
-    """Where the aircraft is and how it points: a serialised FrameTransform for each of n rows.
-
-    position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which no viewer shows and which halves
-    their room in the log; the state's own message is exact.
-    """
-    with np.errstate(over="ignore", invalid="ignore"):
-        places = np.round(position * 1024.0) / 1024.0
-    turns = np.round(body_rotation(attitude) * 2.0**20) / 2.0**20
-    found = []
-    last, head = -1, b""
-    for stamp, place, turn in zip(times_ns.tolist(), places.tolist(), turns.tolist(), strict=True):
-        seconds, nanos = divmod(stamp, 1_000_000_000)
-        if seconds != last:
-            last, head = seconds, b"\x08" + _varint(seconds) + b"\x10"
-        when = head + _varint(nanos)
-        moved = _PLACE.pack(0x22, 27, 0x09, place[0], 0x11, place[1], 0x19, place[2])
-        turned = _TURN.pack(0x2A, 36, 0x09, turn[0], 0x11, turn[1], 0x19, turn[2], 0x21, turn[3])
-        found.append(b"\x0a" + bytes([len(when)]) + when + _FRAMES + moved + turned)
-    return found
-
-
-def _varint(value: int) -> bytes:
-    out = bytearray()
-    while value > 127:
-        out.append(value & 127 | 128)
-        value >>= 7
-    out.append(value)
-    return bytes(out)
-
-
-def fix_message(time_ns: int, lat_deg: float, lon_deg: float, amsl: float) -> LocationFix:
-    """Return the position on the earth; altitude is above mean sea level."""
-    return LocationFix(
-        timestamp=timestamp(time_ns), frame_id=AIRCRAFT, latitude=lat_deg, longitude=lon_deg, altitude=amsl
-    )
-
-
 def log_message(time_ns: int, text: str, level: str) -> Log:
     """One event; level: a key of `LEVELS`."""
     return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name="planfly")
 
 
-def terrain_scene(time_ns: int, scenario: Scenario) -> SceneUpdate:
+def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
     """Draw the ground of the area as a coloured mesh of at most `MOST_VERTICES` a side."""
     entity = _entity(time_ns, "terrain")
-    if scenario.terrain is not None:
-        _add_mesh(entity, scenario.terrain, scenario.bounds)
-    return SceneUpdate(entities=[entity])
+    mesh = b"" if scenario.terrain is None else _mesh(scenario.terrain, scenario.bounds)
+    return _length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
-def _add_mesh(entity: SceneEntity, terrain: Terrain, bounds: Floats) -> None:
+def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
+    """The entity's field of triangles; empty where no ground is known."""
+
     def axis(low: float, high: float) -> Floats:
         return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MOST_VERTICES)))
 
@@ -129,7 +104,7 @@ def _add_mesh(entity: SceneEntity, terrain: Terrain, bounds: Floats) -> None:
     up = terrain.height(ground_e, ground_n)
     known = np.isfinite(up)
     if not known.any():
-        return
+        return b""
     low, high = float(up[known].min()), float(up[known].max())
     share = np.where(known, (up - low) / max(high - low, 1.0), 0.0)
     colours = _LOW + share[..., None] * (_HIGH - _LOW)
@@ -137,14 +112,37 @@ def _add_mesh(entity: SceneEntity, terrain: Terrain, bounds: Floats) -> None:
     sw, se, nw, ne = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
     corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
     whole = known.ravel()[corners].all(axis=1)
-    mesh = entity.triangles.add(pose=_pose((0.0, 0.0, 0.0)), color=Color(r=0.5, g=0.5, b=0.4, a=1.0))
-    points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1).reshape(-1, 3)
-    mesh.points.extend(_points(points))
-    mesh.colors.extend(Color(r=r, g=g, b=b, a=1.0) for r, g, b in colours.reshape(-1, 3).tolist())
+    mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=Color(r=0.5, g=0.5, b=0.4, a=1.0))
     mesh.indices.extend(corners[whole].ravel().tolist())
+    points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1).reshape(-1, 3)
+    # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the room.
+    shown = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
+    body = mesh.SerializeToString(deterministic=True)
+    body += _doubles(_POINT, _MESH_POINTS, np.round(points * 16.0) / 16.0) + _doubles(_COLOUR, _MESH_COLOURS, shown)
+    return _length_delimited(_ENTITY_TRIANGLES, body)
 
 
-def threats_scene(time_ns: int, threats: Threats) -> SceneUpdate:
+def _doubles(kind: np.dtype[np.void], number: int, values: Floats) -> bytes:
+    """Rows (n, m) as a repeated field of messages of m doubles each."""
+    out: NDArray[np.void] = np.zeros(len(values), dtype=kind)
+    names = [name for name in kind.names or () if name not in ("tag", "size") and not name.startswith("tag_")]
+    out["tag"], out["size"] = number << 3 | 2, kind.itemsize - 2
+    for k, name in enumerate(names):
+        out[f"tag_{name}"], out[name] = (k + 1) << 3 | 1, values[:, k]
+    return out.tobytes()
+
+
+def _length_delimited(number: int, data: bytes) -> bytes:
+    """A message as a field of another."""
+    size, head = len(data), bytearray([number << 3 | 2])
+    while size > 127:
+        head.append(size & 127 | 128)
+        size >>= 7
+    head.append(size)
+    return bytes(head) + data
+
+
+def threats_scene(time_ns: int, threats: Threats) -> bytes:
     """Missile spheres in red, radar spheres in orange, and their names."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
@@ -156,36 +154,42 @@ def threats_scene(time_ns: int, threats: Threats) -> SceneUpdate:
         entity.texts.add(
             pose=_pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
         )
-    return SceneUpdate(entities=[entity])
+    return _update(entity)
 
 
-def plan_scene(time_ns: int, waypoints: Floats) -> SceneUpdate:
+def plan_scene(time_ns: int, waypoints: Floats) -> bytes:
     """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots."""
     entity = _entity(time_ns, "plan")
-    _add_line(entity, waypoints, _PLAN)
+    entity.lines.append(_line(_PLAN))
+    entity.lines[0].points.extend(_points(waypoints))
     for point in waypoints:
         entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
-    return SceneUpdate(entities=[entity])
+    return _update(entity)
 
 
-def track_scene(time_ns: int, positions: Floats) -> SceneUpdate:
+def track_scene(time_ns: int, positions: Floats) -> bytes:
     """Draw the flown track so far, (n, 3)."""
-    entity = _entity(time_ns, "track")
-    _add_line(entity, positions, _TRACK)
-    return SceneUpdate(entities=[entity])
+    line = _line(_TRACK).SerializeToString(deterministic=True) + _doubles(_POINT, _LINE_POINTS, positions)
+    entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
+    return _length_delimited(2, entity + _length_delimited(_ENTITY_LINES, line))
+
+
+def _update(entity: SceneEntity) -> bytes:
+    data: bytes = SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
+    return data
 
 
 def _entity(time_ns: int, name: str) -> SceneEntity:
     return SceneEntity(timestamp=timestamp(time_ns), frame_id=MAP, id=name, frame_locked=True)
 
 
-def _add_line(entity: SceneEntity, points: Floats, colour: tuple[float, float, float, float]) -> None:
-    entity.lines.add(
+def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
+    """A line without points yet."""
+    return LinePrimitive(
         type=LinePrimitive.LINE_STRIP,
         pose=_pose((0.0, 0.0, 0.0)),
         thickness=3.0,
         scale_invariant=True,
-        points=_points(points),
         color=_colour(colour),
     )
 

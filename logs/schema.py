@@ -11,6 +11,7 @@ import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from numpy.typing import NDArray
 
+from aircraft.compiled import compiled
 from flight.track import COLUMNS, Track
 
 if TYPE_CHECKING:
@@ -146,9 +147,9 @@ def schema_of(descriptor: "Descriptor") -> bytes:
     return out.SerializeToString(deterministic=True)
 
 
-def times_ns(track: Track) -> NDArray[np.int64]:
-    """log_time of each row: ns since 1970, simulation time 0 being `EPOCH_NS`."""
-    return np.rint(track.time * 1e9).astype(np.int64) + EPOCH_NS
+def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
+    """log_time of each simulation time (s): ns since 1970, time 0 being `EPOCH_NS`."""
+    return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
 def _template() -> Rows:
@@ -163,23 +164,23 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def encode_rows(track: Track, first_row: int, channel: int, kept: slice = slice(None)) -> Rows:
-    """Encode rows as MCAP message records, (t,) of `RECORD`.
+def encode_rows(rows: NDArray[np.float64], first_row: int, channel: int) -> Rows:
+    """Encode flown rows (t, columns), in the order of `flight.track.COLUMNS`, as MCAP message records (t,) of `RECORD`.
 
-    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.  kept: the rows to encode.
+    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
     """
-    stamps = times_ns(track)[kept]
+    stamps = times_ns(rows[:, 0])
     records: Rows = np.repeat(_TEMPLATE, len(stamps))
     numbers = np.arange(first_row, first_row + len(stamps)).astype(np.uint32)
     records["channel"] = channel
     records["sequence"] = numbers
     records["log_time"] = stamps
     records["publish_time"] = stamps
-    rows = records["state"]
-    rows["row"] = numbers
-    for name, _, field, column in FIELDS:
-        values = getattr(track, field)
-        rows[name] = values[kept] if values.ndim == 1 else values[kept, column]
+    state = records["state"]
+    state["row"] = numbers
+    with np.errstate(over="ignore", invalid="ignore"):
+        for column, (name, _, _, _) in enumerate(FIELDS):
+            state[name] = rows[:, column]
     return records
 
 
@@ -211,6 +212,16 @@ def parse_row(data: bytes, parser: "type[Message]") -> Rows:
     return record
 
 
+@compiled
+def _alike(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
+    """How many of the first rows have just the expected bytes in these columns."""
+    for row in range(len(raw)):
+        for k in range(len(columns)):
+            if raw[row, columns[k]] != expected[k]:
+                return row
+    return len(raw)
+
+
 class RowMatcher:
     """Finds runs of state messages of the known layout in a chunk's bytes."""
 
@@ -229,14 +240,5 @@ class RowMatcher:
         """Return the records from ``offset`` on that have the layout and follow each other, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
-        found = 0
-        step = 16
-        while found < count:
-            part = raw[found : found + step]
-            same = (part[:, self._columns] == self._expected).all(axis=1)
-            if not same.all():
-                found += int(np.argmin(same))
-                break
-            found += len(part)
-            step = 1024
+        found = _alike(raw, self._columns, self._expected)
         return raw[:found].reshape(-1).view(RECORD)

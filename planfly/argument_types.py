@@ -1,6 +1,7 @@
 """Texts of the command line as values: each refuses what it cannot take, saying what it expects."""
 
 import argparse
+import math
 
 
 def seed(text: str) -> int:
@@ -104,9 +105,11 @@ def threat(text: str) -> tuple[float, float, float, float]:
     try:
         east, north, kill, detection = (float(part) for part in text.split(","))
     except ValueError:
+        east = math.nan
+    if not (math.isfinite(east) and math.isfinite(north) and kill >= 0.0 and detection >= 0.0):
         raise argparse.ArgumentTypeError(
             f"{text!r}: EAST,NORTH,KILL,DETECTION is expected: four numbers in m, a radius of 0 for none"
-        ) from None
+        )
     return east, north, kill, detection
 
 
@@ -125,4 +128,12 @@ def positive_count(text: str) -> int:
     value = int(text) if text.isdecimal() else 0
     if not 1 <= value <= 1000:
         raise argparse.ArgumentTypeError(f"{text!r}: a whole number from 1 to 1,000 is expected")
+    return value
+
+
+def port(text: str) -> int:
+    """Number of a TCP port, or 0."""
+    value = int(text) if text.isdecimal() else -1
+    if not 0 <= value <= 65535:
+        raise argparse.ArgumentTypeError(f"{text!r}: a port, 0..65535, is expected")
     return value

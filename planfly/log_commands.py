@@ -27,6 +27,8 @@ def replay(args: argparse.Namespace) -> int:
     """``planfly replay``: instruments on a terminal, the timeline elsewhere."""
     from logs.reader import read_log
 
+    if bool(args.foxglove) + bool(args.movie) + isinstance(args.to, str) > 1:
+        raise PlanflyError("--foxglove, --movie, --to IP:PORT: one of them is expected")
     log = read_log(Path(args.log))
     if isinstance(args.to, str):
         from planfly.play import play
@@ -39,7 +41,16 @@ def replay(args: argparse.Namespace) -> int:
         raise LogError(f"{args.log}: --from {start:g}: the log ends at {log.end_time:.1f} s")
     if end < start:
         raise LogError(f"{args.log}: --to {end:g}: at or after --from, {start:g} s, is expected")
-    if sys.stdout.isatty() and not args.at_once:
+    if args.movie:
+        from planfly.movie import write_movie
+
+        for file in write_movie(log, args, start, end)[:3]:
+            print(f"movie     {file}")
+    elif args.foxglove:
+        from planfly.foxglove_server import serve_log
+
+        serve_log(args, start, end)
+    elif sys.stdout.isatty() and not args.at_once:
         from logs.instruments import make_instruments
 
         _show_instruments(make_instruments(log), start, end, args.speed or 1.0)

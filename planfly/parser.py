@@ -11,6 +11,7 @@ from planfly.argument_types import (
     leg,
     moment,
     moment_or_stations,
+    port,
     positive,
     positive_count,
     problems,
@@ -238,8 +239,14 @@ def _add_replay_and_recover(command: _Command) -> None:
     )
     _own_link(replay, bind="127.0.0.1:0")
     replay.add_argument(
-        "--wait", metavar="S", type=positive, default=10.0, help="wait S seconds for a ground station (10)"
+        "--wait", metavar="S", type=positive, help="wait S seconds for a ground station (10) or Foxglove (without end)"
     )
+    replay.add_argument(
+        "--movie", metavar="FILE|DIR", help="draw it: FILE.gif, FILE.mp4 (needs ffmpeg), or DIR for PNG frames"
+    )
+    replay.add_argument("--foxglove", action="store_true", help="play it to Foxglove on this machine over WebSocket")
+    replay.add_argument("--port", metavar="N", type=port, default=8765, help="of --foxglove (8765; 0: a free one)")
+    _overwrite(replay)
     recover = command(
         "recover", "make an unfinished or damaged log whole again, as far as it can be read",
         "planfly recover flight.mcap --out whole.mcap",

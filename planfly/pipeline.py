@@ -21,8 +21,8 @@ from planner.plan import Plan
 from planner.search import plan_path
 from world.scenario import Scenario, load_scenario
 
-# Seconds of flight that are written at a time: some milliseconds of a simulated flight.
-_BATCH = 10
+# Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
+BATCH = 60
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,8 +117,8 @@ def fly(
     if log is None:
         flown = simulate(setup, vehicle.aircraft, progress=tell)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
-    with Recorder(log, setup, every=every, batch=_BATCH) as recorder:
-        flown = simulate(setup, vehicle.aircraft, sink=recorder.write, progress=tell)
+    with Recorder(log, setup, every=every, batch=BATCH) as recorder:
+        flown = simulate(setup, vehicle.aircraft, sink=recorder.write_rows, progress=tell)
         track = thin_track(flown.track, every)
         verdict = judge_flight(setup, track, flown.ended)
         for event in flight_events(track, flown.ended):

@@ -1,6 +1,7 @@
 """Planning at the command line: budgets, Ctrl-C with the best plan so far, and planning again in flight."""
 
 import argparse
+import math
 import signal
 import time
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ from planfly.progress import Advance
 from planfly.vehicle import Vehicle
 from planner.blocked import what_blocks
 from planner.plan import Objective, Plan, read_plan
-from planner.replan import replan
+from planner.replan import replan, same_mission
 from planner.run import Stop
 from planner.search import plan_path
 from world.errors import ScenarioError
@@ -25,7 +26,7 @@ from world.scenario_changes import with_planner, with_threats
 def best_so_far(seconds: float | None) -> Iterator[Stop]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
-    A second Ctrl-C interrupts at once.
+    A second Ctrl-C ends the process.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     pressed = False
@@ -33,7 +34,8 @@ def best_so_far(seconds: float | None) -> Iterator[Stop]:
     def press(_signal: int, _frame: FrameType | None) -> None:
         nonlocal pressed
         pressed = True
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        # Python's own handler would wait again for compiled code to come back.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def stop() -> str:
         if pressed:
@@ -63,6 +65,10 @@ def prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Pla
     if args.at_leg is None:
         raise ScenarioError("--from: --at-leg K is missing: the leg that is about to be flown")
     old = read_plan(Path(args.old))
+    same_mission(scenario, old)
+    for east, north, _, _ in args.add_threat or ():
+        if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
+            raise ScenarioError(f"--add-threat: east {east:g} m, north {north:g} m: outside the terrain that is known")
     kept = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
     return with_threats(scenario, args.add_threat or [], "--add-threat", kept), old
 

@@ -9,21 +9,22 @@ from flight.downlink import INFO
 from flight.link import Link
 from flight.mission import Home
 from flight.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, status_texts, telemetry_message
-from flight.track import COLUMNS
+from flight.track import track_rows
 from flight.watch import Watcher
 from logs.reader import FlightLog
 from planfly.link_options import Stopped, link_access, stop_signals
 from world.errors import FlightError
 
+# Seconds to wait for a ground station unless told otherwise.
+_PATIENCE = 10.0
+
 
 def play(log: FlightLog, args: argparse.Namespace) -> None:
     """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
-    link = Link(link_access(args))
+    link, wait = Link(link_access(args)), _PATIENCE if args.wait is None else args.wait
     watcher = Watcher(log.setup)
     track = log.track
-    rows = np.concatenate(
-        [np.asarray(getattr(track, name), dtype=np.float64).reshape(len(track), -1) for name in COLUMNS], axis=1
-    )
+    rows = track_rows(track)
     start = watcher.before_start(log.setup)
     home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
@@ -32,9 +33,9 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
     player = _Player(link, status)
     try:
         with stop_signals() as stopped:
-            player.wait(args.wait, stopped)
+            player.wait(wait, stopped)
             if not link.peers:
-                raise FlightError(f"--to {args.to}: no ground station has answered within {args.wait:g} s")
+                raise FlightError(f"--to {args.to}: no ground station has answered within {wait:g} s")
             begun, k = time.monotonic(), 0
             player.say(f"replay of {args.log} at {args.speed or 1.0:g}x")
             while k < len(rows) - 1 and not stopped():

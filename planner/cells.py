@@ -14,18 +14,21 @@ Short = NDArray[np.int32]
 # Side of a cell, as a share of the median reach; and cells of one grid, at most.
 CELL = 0.2
 MOST_CELLS = 300_000
+# Highest whole metre that a cell notes.
+MOST = 2_000_000_000
 # Ground beyond the map that the grid covers, as a share of the map's sides.
 BEYOND = 0.1
 
 
 class Cells(NamedTuple):
-    """Lists of units by cell, in the form that the compiled functions take.
+    """Lists of units by the cells that they reach, in the form that the compiled functions take.
 
-    Cell c holds units[first[c] : first[c + 1]], in increasing order.  The last cell stands for all places outside the
-    grid and holds every unit.  west, south, side: m.  cols, rows: cells across and up.
+    table: (c, 4) of each cell: where its units begin in `units`, their number, and the lowest and the highest place (m)
+    that any of them reaches.  Units stand in increasing order.  The last cell stands for all places outside the grid
+    and holds every unit.  west, south, side: m.  cols, rows: cells across and up.
     """
 
-    first: Short
+    table: Short
     units: Short
     west: float
     south: float
@@ -34,10 +37,10 @@ class Cells(NamedTuple):
     rows: int
 
 
-def make_cells(position: Floats, reach: Floats, bounds: Floats, spread: float = 0.0, slack: float = 0.0) -> Cells:
-    """Lists of the units (m, 3) whose horizontal reach (m,), where it is above 0, meets a cell.
+def make_cells(position: Floats, reach: Floats, bounds: Floats) -> Cells:
+    """Lists of the units (m, 3) whose reach (m,), where it is above 0, meets a cell seen from above.
 
-    bounds: (2, 2) map.  spread: cell sides by which each cell is widened for them.  slack: m, the same.
+    bounds: (2, 2) map.
     """
     low, high = bounds[:, 0], bounds[:, 1]
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
@@ -47,27 +50,27 @@ def make_cells(position: Floats, reach: Floats, bounds: Floats, spread: float = 
     if armed.size:
         side = min(max(side, CELL * float(np.median(armed))), float(size.max()))
     cols, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
-    widened = np.where(reach > 0.0, reach + spread * side + slack, 0.0)
-    first, units = _lists(np.ascontiguousarray(position), widened, float(low[0]), float(low[1]), side, cols, rows)
-    return Cells(first, units, float(low[0]), float(low[1]), side, cols, rows)
+    first, units = _lists(np.ascontiguousarray(position), reach, float(low[0]), float(low[1]), side, cols, rows)
+    # Whole metres, a hair wider, for what rounding would leave out.
+    lowest = np.clip(np.floor(position[:, 2] - reach) - 1.0, -MOST, MOST).astype(np.int32)
+    highest = np.clip(np.ceil(position[:, 2] + reach) + 1.0, -MOST, MOST).astype(np.int32)
+    table = _table(first, units, lowest, highest)
+    for array in (table, units):
+        array.setflags(write=False)
+    return Cells(table, units, float(low[0]), float(low[1]), side, cols, rows)
 
 
 @compiled
-def grid_of(cells: Cells) -> tuple[float, float, float, int, int]:  # pragma: no cover - compiled
-    """What `cell_at` takes of a grid."""
-    return cells.west, cells.south, 1.0 / cells.side, cells.cols, cells.rows
-
-
-@compiled
-def cell_at(
-    west: float, south: float, per_metre: float, cols: int, rows: int, east: float, north: float
-) -> int:  # pragma: no cover - compiled
-    """Number of the cell at a place, of a grid as `grid_of` gives it; per_metre: cells a metre."""
-    col, row = (east - west) * per_metre, (north - south) * per_metre
-    # Written so that NaN falls outside.
-    if col >= 0.0 and row >= 0.0 and col < cols and row < rows:
-        return int(row) * cols + int(col)
-    return cols * rows
+def _table(first: Short, units: Short, lowest: Short, highest: Short) -> Short:  # pragma: no cover - compiled
+    out = np.zeros((first.size - 1, 4), dtype=np.int32)
+    for cell in range(first.size - 1):
+        out[cell, 0], out[cell, 1] = first[cell], first[cell + 1] - first[cell]
+        for entry in range(first[cell], first[cell + 1]):
+            k = units[entry]
+            fresh = entry == first[cell]
+            out[cell, 2] = lowest[k] if fresh else min(out[cell, 2], lowest[k])
+            out[cell, 3] = highest[k] if fresh else max(out[cell, 3], highest[k])
+    return out
 
 
 @compiled

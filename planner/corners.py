@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, inlined
 from planner.rules import Rules
 from world.geometry import turning_angle
 from world.limits import BLEND_ACCELERATION, turn_tangents, wind_speed_at
@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 ARC_STEP = math.radians(15.0)
 
 
-@compiled
+@inlined
 def blend_reach(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
     """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
     speed = packed[0, 0] + wind_speed_at(packed, amsl)
@@ -26,6 +26,12 @@ def blend_reach(packed: Floats, amsl: float) -> float:  # pragma: no cover - com
 
 @compiled
 def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:  # pragma: no cover
+    """Vertices (k, 3) of the way that a flight takes past a waypoint: see `corner_past`."""
+    return corner_past(rules.aircraft, before, at, after, radius)
+
+
+@compiled
+def corner_past(packed: Floats, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:  # pragma: no cover
     """Vertices (k, 3) of the way that a flight takes past a waypoint, at least as low as the flight.
 
     They are: a point on the leg where the blend of heights begins, the fly-by arc of this radius from tangent point to
@@ -51,7 +57,7 @@ def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: floa
     room_in, room_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
     beside = 0.5 * arc if chords > 0 else min(room_in, room_out)
     room_in, room_out = min(room_in, beside), min(room_out, beside)
-    reach = blend_reach(rules.aircraft, at[2])
+    reach = blend_reach(packed, at[2])
     half_in = min(abs(slope_in - slope) * reach, room_in)
     half_out = min(abs(slope - slope_out) * reach, room_out) if chords > 0 else half_in
     cut_in = 0.25 * max(0.0, slope_in - slope) * half_in
@@ -69,7 +75,7 @@ def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: floa
     return out
 
 
-@compiled
+@inlined
 def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  # pragma: no cover - compiled
     out[row, 0] = east
     out[row, 1] = north

@@ -41,9 +41,11 @@ class Frame:
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
         c, s = self.direction
-        return np.stack(
-            [self.origin[0] + c * along - s * across, self.origin[1] + s * along + c * across, points[..., 2]], axis=-1
-        )
+        out = np.empty(points.shape)
+        out[..., 0] = self.origin[0] + c * along - s * across
+        out[..., 1] = self.origin[1] + s * along + c * across
+        out[..., 2] = points[..., 2]
+        return out
 
 
 def rotated_frame(start: Floats, destination: Floats) -> Frame:
@@ -92,9 +94,9 @@ class Space:
 
 
 def _with_ends(space: Space, inner: Floats) -> Floats:
-    count = len(inner)
-    ends = [np.broadcast_to(point, (count, 1, 3)) for point in (space.start, space.destination)]
-    return np.concatenate([ends[0], inner, ends[1]], axis=1)
+    out = np.empty((len(inner), inner.shape[1] + 2, 3))
+    out[:, 0], out[:, 1:-1], out[:, -1] = space.start, inner, space.destination
+    return out
 
 
 def rotated(space: Space, waypoints: int) -> Encoding:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views, inlined
 from planner.reserve import pack_clearance
 from planner.rules import Rules
 from world.limits import arc_slope, corner_tangent, downwind, fly_over_run, reversal_room, slopes_along, wind_speed_at
@@ -63,7 +63,7 @@ def make_gauge(rules: Rules) -> Gauge:  # pragma: no cover - compiled
     )
 
 
-@compiled
+@compiled_views
 def _least_slope(rules: Rules, row: int) -> float:  # pragma: no cover - compiled
     """Slope (rad) that the aircraft can do on any course between floor and ceiling; -1 for none.
 
@@ -79,7 +79,7 @@ def _least_slope(rules: Rules, row: int) -> float:  # pragma: no cover - compile
     return math.atan2(packed[0, 0] * math.sin(angle), packed[0, 0] * math.cos(angle) + wind)
 
 
-@compiled
+@compiled_views
 def _leg_limits(
     rules: Rules, ux: float, uy: float, low: float, high: float, wx: float, wy: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -97,7 +97,7 @@ def _leg_limits(
     return climb - rules.spare, dive - rules.spare
 
 
-@compiled
+@compiled_views
 def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, spare taken off."""
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -107,7 +107,7 @@ def slope_limits(rules: Rules, a: Floats, b: Floats) -> tuple[float, float]:  # 
     return _leg_limits(rules, ux, uy, a[2], b[2], wx, wy)
 
 
-@compiled
+@compiled_views
 def slope_excess(
     rules: Rules, gauge: Gauge, ux: float, uy: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
@@ -123,13 +123,13 @@ def slope_excess(
     return over / max(run, 1.0)
 
 
-@compiled
+@inlined
 def settling_room(need: float, run: float) -> float:  # pragma: no cover - compiled
     """Length of a leg (m) that stays straight between its turns, so that the first has settled; need: what they use."""
     return ROOM_SHARE * run + min(ROOM_LENGTH, need)
 
 
-@compiled
+@compiled_views
 def measure_legs(paths: Floats, n: int, legs: Floats) -> None:  # pragma: no cover - compiled
     """Fill legs (w - 1, 4) of path n: unit course (east, north; 0 for none), run and length, m."""
     for i in range(legs.shape[0]):
@@ -142,7 +142,7 @@ def measure_legs(paths: Floats, n: int, legs: Floats) -> None:  # pragma: no cov
         legs[i, 3] = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@compiled
+@compiled_views
 def measure_corners(
     rules: Rules, gauge: Gauge, paths: Floats, n: int, legs: Floats, corners: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -161,7 +161,7 @@ def measure_corners(
             corners[i, 0], corners[i, 1] = corner_tangent(packed, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
 
 
-@compiled
+@compiled_views
 def _courses(rules: Rules, legs: Floats, i: int) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
     """Unit courses before and after waypoint i; at the ends those asked for, else the leg's own."""
     last = legs.shape[0]
@@ -174,7 +174,7 @@ def _courses(rules: Rules, legs: Floats, i: int) -> tuple[float, float, float, f
     return ux, uy, vx, vy
 
 
-@compiled
+@inlined
 def _over_turn(
     cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float
 ) -> float:  # pragma: no cover - compiled
@@ -186,7 +186,7 @@ def _over_turn(
     return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
 
 
-@compiled
+@compiled_views
 def constraints(
     rules: Rules, gauge: Gauge, paths: Floats, n: int, legs: Floats, corners: Floats, graded: bool, missed: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -228,7 +228,7 @@ def constraints(
         _steep_arcs(rules, gauge, paths, n, legs, corners, graded, missed)
 
 
-@compiled
+@compiled_views
 def _steep_arcs(
     rules: Rules, gauge: Gauge, paths: Floats, n: int, legs: Floats, corners: Floats, graded: bool, missed: Floats
 ) -> None:  # pragma: no cover - compiled
@@ -237,7 +237,7 @@ def _steep_arcs(
         missed[n, 1] += _weight(_arc_excess(rules, gauge, paths, n, i, legs, corners), graded)
 
 
-@compiled
+@compiled_views
 def turn_need(rules: Rules, legs: Floats, corners: Floats, i: int) -> float:  # pragma: no cover - compiled
     """Length of leg i that its two turns use, m: of a fly-over only the one at its beginning, on the way back to it."""
     if not rules.fly_over:
@@ -269,7 +269,7 @@ def roll_need(
     return room
 
 
-@compiled
+@compiled_views
 def _arc_excess(
     rules: Rules, gauge: Gauge, paths: Floats, n: int, i: int, legs: Floats, corners: Floats
 ) -> float:  # pragma: no cover - compiled
@@ -288,7 +288,7 @@ def _arc_excess(
     return over
 
 
-@compiled
+@inlined
 def _weight(over: float, graded: bool) -> float:  # pragma: no cover - compiled
     """What a constraint missed by `over` adds: that, or one."""
     if graded:

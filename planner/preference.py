@@ -18,6 +18,9 @@ Ints = NDArray[np.int64]
 
 NO_GOAL = -np.inf
 
+# Rows that are sorted by insertion; and rows of two columns from which on a tree counts faster than a scan.
+RUN, MANY = 8, 4000
+
 
 @dataclass(frozen=True, slots=True)
 class Level:
@@ -65,99 +68,158 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     Pareto dominance on the level, and only rows equal on it go on to the next: a component outside U is at its
     goal, which no other row is below.  So each level is one dominance count inside groups of ties.
     """
-    group = np.zeros(len(scores), dtype=np.int64)
-    total = np.zeros(len(scores), dtype=np.int64)
-    for level in levels:
-        raised = np.ascontiguousarray(np.maximum(scores[:, list(level.columns)], np.array(level.goals)))
-        group = _count_level(raised, group, total)
-        if group.size and int(group.max()) == group.size - 1:
+    columns = [column for level in levels for column in level.columns]
+    goals = [goal for level in levels for goal in level.goals]
+    lowest = list(levels[-1].columns)
+    # The lowest level comes once more as it is, for rows that are equal on all.
+    table = np.concatenate([np.maximum(scores[:, columns], goals), scores[:, lowest]], axis=1)
+    widths = np.array([*(len(level.columns) for level in levels), len(lowest)])
+    return np.asarray(_rank_rows(np.ascontiguousarray(table.T), widths))
+
+
+@njit(cache=True)
+def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compiled
+    """Ranks (n,) of a table (c, n) whose levels have these widths."""
+    count = table.shape[1]
+    total = np.zeros(count, dtype=np.int64)
+    order, spare = np.arange(count), np.empty(count, dtype=np.int64)
+    sorted_ = np.empty((table.shape[0], count))
+    below = np.empty(count, dtype=np.int64)
+    # Ties: groups of rows that are equal so far, as positions in the order where each begins, closed by the count.
+    begins, after = np.empty(count + 1, dtype=np.int64), np.empty(count + 1, dtype=np.int64)
+    begins[0], begins[1], groups = 0, count, 1
+    column = 0
+    for width in widths:
+        distinct = 0
+        for g in range(groups):
+            begin, end = begins[g], begins[g + 1]
+            after[distinct] = begin
+            distinct += 1
+            if end - begin == 1:
+                continue
+            _sort(table, column, width, order, spare, begin, end)
+            for c in range(width):
+                for k in range(begin, end):
+                    sorted_[c, k] = table[column + c, order[k]]
+            if width == 2 and end - begin > MANY:
+                _count_pairs(sorted_, begin, end, order, total)
+            else:
+                _count_any(sorted_, width, begin, end, order, below, total)
+            for k in range(begin + 1, end):
+                for c in range(width):
+                    if sorted_[c, k] != sorted_[c, k - 1]:
+                        after[distinct] = k
+                        distinct += 1
+                        break
+        after[distinct] = count
+        groups = distinct
+        begins, after = after, begins
+        column += width
+        if groups == count:
             # No two rows are equal: lower levels have nothing to decide.
-            return total
-    lowest = np.ascontiguousarray(scores[:, list(levels[-1].columns)])
-    _count_level(lowest, group, total)
+            break
     return total
 
 
 @njit(cache=True)
-def _count_level(values: Floats, group: Ints, total: Ints) -> Ints:  # pragma: no cover - compiled
-    """Add to total the dominators of each row within its group; return groups split by equal rows."""
-    count, width = values.shape
-    if count == 0:
-        return group
-    order = np.arange(count)
-    for column in range(width - 1, -1, -1):
-        order = order[np.argsort(values[order, column], kind="mergesort")]
-    if group.max() > 0:
-        order = order[np.argsort(group[order], kind="mergesort")]
-    split = np.empty(count, dtype=np.int64)
-    # Distinct rows in sorted order: the position of their first member, closed by count.
-    firsts = np.empty(count + 1, dtype=np.int64)
-    distinct = 0
-    for k in range(count):
-        fresh = k == 0 or group[order[k]] != group[order[k - 1]]
-        for column in range(width):
-            if not fresh and values[order[k], column] != values[order[k - 1], column]:
-                fresh = True
-        if fresh:
-            firsts[distinct] = k
-            distinct += 1
-        split[order[k]] = distinct - 1
-    firsts[distinct] = count
-    begin = 0
-    while begin < distinct:
-        end = begin + 1
-        while end < distinct and group[order[firsts[end]]] == group[order[firsts[begin]]]:
-            end += 1
-        if width == 2:
-            _count_pairs(values, order, firsts, begin, end, total)
-        else:
-            _count_any(values, order, firsts, begin, end, total)
-        begin = end
-    return split
+def _sort(
+    table: Floats, column: int, width: int, order: Ints, spare: Ints, begin: int, end: int
+) -> None:  # pragma: no cover - compiled
+    """Sort order[begin:end] by the rows' numbers in some columns, the first column first: a stable merge sort."""
+    for k in range(begin + 1, end):
+        # Short runs by insertion.
+        low = begin + (k - begin) // RUN * RUN
+        row, at = order[k], k
+        while at > low and _before(table, column, width, row, order[at - 1]):
+            order[at] = order[at - 1]
+            at -= 1
+        order[at] = row
+    size = RUN
+    while size < end - begin:
+        for low in range(begin, end - size, 2 * size):
+            middle, high = low + size, min(low + 2 * size, end)
+            if not _before(table, column, width, order[middle], order[middle - 1]):
+                continue
+            left, right = low, middle
+            for k in range(low, high):
+                if right >= high or (left < middle and not _before(table, column, width, order[right], order[left])):
+                    spare[k] = order[left]
+                    left += 1
+                else:
+                    spare[k] = order[right]
+                    right += 1
+            for k in range(low, high):
+                order[k] = spare[k]
+        size *= 2
+
+
+@njit(cache=True)
+def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # pragma: no cover - compiled
+    """Whether row a comes before row b, column by column."""
+    for c in range(column, column + width):
+        if table[c, a] != table[c, b]:
+            return bool(table[c, a] < table[c, b])
+    return False
 
 
 @njit(cache=True)
 def _count_any(
-    values: Floats, order: Ints, firsts: Ints, begin: int, end: int, total: Ints
+    rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
 ) -> None:  # pragma: no cover - compiled
-    """Dominators among distinct rows begin..end, in lexicographic order: only an earlier row can dominate."""
-    width = values.shape[1]
+    """Add to total the dominators of each row of a group; rows: (c, n), sorted: only an earlier row can dominate."""
+    dominators = 0
     for k in range(begin + 1, end):
-        dominators = 0
-        for j in range(begin, k):
-            below = True
-            for column in range(width):
-                if values[order[firsts[j]], column] > values[order[firsts[k]], column]:
-                    below = False
-                    break
-            if below:
-                dominators += firsts[j + 1] - firsts[j]
-        for member in range(firsts[k], firsts[k + 1]):
-            total[order[member]] += dominators
+        equal = True
+        for c in range(width):
+            equal = equal and rows[c, k] == rows[c, k - 1]
+        if not equal:
+            dominators = k - begin
+            # In the first column no earlier row is larger.
+            if width == 2:
+                dominators = _at_most(rows[1, begin:k], rows[1, k])
+            elif width > 2:
+                less = below[: k - begin]
+                less[:] = 1
+                for c in range(1, width):
+                    _and_at_most(rows[c, begin:k], rows[c, k], less)
+                dominators = less.sum()
+        total[order[k]] += dominators
 
 
 @njit(cache=True)
-def _count_pairs(
-    values: Floats, order: Ints, firsts: Ints, begin: int, end: int, total: Ints
-) -> None:  # pragma: no cover - compiled
-    """Do the same for two columns with a Fenwick tree over the second, O(n log n)."""
-    size = end - begin
-    second = np.empty(size)
-    for k in range(size):
-        second[k] = values[order[firsts[begin + k]], 1]
-    steps = np.unique(second)
+def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
+    """How many values are not above the limit.  A loop without branches, which becomes vector instructions."""
+    count = 0
+    for k in range(values.size):
+        count += 1 if values[k] <= limit else 0
+    return count
+
+
+@njit(cache=True)
+def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: no cover - compiled
+    """Take the mark from the places of values above the limit."""
+    for k in range(values.size):
+        marks[k] &= 1 if values[k] <= limit else 0
+
+
+@njit(cache=True)
+def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:  # pragma: no cover - compiled
+    """Do the same for two columns and many rows with a Fenwick tree over the second, O(n log n)."""
+    steps = np.unique(rows[1, begin:end])
     tree = np.zeros(steps.size + 1, dtype=np.int64)
-    for k in range(size):
-        place = np.searchsorted(steps, second[k]) + 1
+    k = begin
+    while k < end:
+        first = k
+        place = np.searchsorted(steps, rows[1, k]) + 1
         dominators = 0
         at = place
         while at > 0:
             dominators += tree[at]
             at -= at & -at
-        members = firsts[begin + k + 1] - firsts[begin + k]
-        for member in range(firsts[begin + k], firsts[begin + k + 1]):
-            total[order[member]] += dominators
+        while k < end and rows[0, k] == rows[0, first] and rows[1, k] == rows[1, first]:
+            total[order[k]] += dominators
+            k += 1
         at = place
         while at <= steps.size:
-            tree[at] += members
+            tree[at] += k - first
             at += at & -at

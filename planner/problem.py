@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.cells import Cells, make_cells
+from planner.cells import make_cells
 from planner.encoding import Space
-from planner.rules import CORNER_SLACK, Rules
+from planner.missiles import make_missiles
+from planner.rules import Rules, Steep, pack_spheres
 from world.errors import ScenarioError
 from world.limits import Limits
 from world.scenario import Scenario
-from world.terrain import steepest_slope
+from world.terrain import TILE, Terrain, steepest_slopes
 
 Floats = NDArray[np.float64]
 
@@ -91,6 +92,7 @@ def _rules(scenario: Scenario, limits: Limits) -> Rules:
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.packed,
         threats=units,
+        spheres=pack_spheres(units),
         aircraft=_with_share(limits, scenario.wind.turbulence),
         bounds=scenario.bounds,
         start=scenario.start,
@@ -112,8 +114,8 @@ def _rules(scenario: Scenario, limits: Limits) -> Rules:
         start_slack=_slack(scenario, limits, scenario.start, CERTIFIED_RESERVE, CERTIFIED_SLACK),
         destination_slack=_slack(scenario, limits, scenario.destination, CERTIFIED_RESERVE, CERTIFIED_SLACK),
         near=make_cells(threats.position, reach, scenario.bounds),
-        missiles=_missiles(scenario, CERTIFIED_KILL_MARGIN),
-        steepest=float(steepest_slope(terrain.heights, terrain.spacing)),
+        missiles=make_missiles(units),
+        steep=_steep(terrain),
     )
 
 
@@ -124,7 +126,6 @@ def _with_margins(rules: Rules, scenario: Scenario, limits: Limits, reserve: flo
         kill_margin=kill_margin,
         start_slack=_slack(scenario, limits, scenario.start, reserve),
         destination_slack=_slack(scenario, limits, scenario.destination, reserve),
-        missiles=_missiles(scenario, kill_margin),
     )
 
 
@@ -137,12 +138,15 @@ def _slack(scenario: Scenario, limits: Limits, point: Floats, reserve: float, sh
     return reserve if left >= reserve else share * max(0.0, left)
 
 
-def _missiles(scenario: Scenario, kill_margin: float) -> Cells:
-    """Missiles by the stretches of path that they may reach."""
-    threats = scenario.threats
-    armed = np.where(threats.kill_radius > 0.0, threats.kill_radius + kill_margin, 0.0)
-    # Half a cell's side on either side of points that stand a side apart.
-    return make_cells(threats.position, armed, scenario.bounds, 0.5, CORNER_SLACK)
+def _steep(terrain: Terrain) -> Steep:
+    slopes = steepest_slopes(terrain.heights, terrain.spacing)
+    most = float(slopes.max())
+    # Each tile with its neighbours, so that a tile's side from any place of it is known.
+    padded = np.pad(slopes, 1)
+    shape = slopes.shape
+    around = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
+    around.setflags(write=False)
+    return Steep(most, around, TILE * terrain.spacing)
 
 
 def _with_share(limits: Limits, turbulence: str) -> Floats:

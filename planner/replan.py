@@ -38,12 +38,14 @@ def replan(
     scenario: with the threats known now (`world.scenario.with_threats`).  The turn at that waypoint counts from the
     course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
     The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
-    Raises MissionError for a leg that the old plan has not, ScenarioError as `plan_path`.
+    Raises MissionError for a leg that the old plan has not or that begins in a missile's reach, and for a plan of
+    another mission; ScenarioError as `plan_path`.
     """
     count = len(old.waypoints)
     if not 0 <= leg < count - 1:
         raise MissionError(f"{scenario.name}: leg {leg}: the plan has legs 0..{count - 2}")
-    _same_mission(scenario, old)
+    same_mission(scenario, old)
+    _outside(scenario, old, leg)
     rest = with_waypoints(old.waypoints[leg:], max(FEWEST, count - leg))
     course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
     table = scenario.planner.model_copy(update={"waypoints": len(rest)})
@@ -56,7 +58,8 @@ def replan(
     )
 
 
-def _same_mission(scenario: Scenario, old: Plan) -> None:
+def same_mission(scenario: Scenario, old: Plan) -> None:
+    """Raise MissionError if a plan has not the scenario's ends."""
     for name, planned, asked in (
         ("start", old.waypoints[0], scenario.start),
         ("destination", old.waypoints[-1], scenario.destination),
@@ -64,6 +67,18 @@ def _same_mission(scenario: Scenario, old: Plan) -> None:
         away = math.dist(planned, asked)
         if away > 1.0:
             raise MissionError(f"{scenario.name}: {name}: {away:.0f} m from that of the plan; it is another mission's")
+
+
+def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
+    """Raise MissionError if a missile reaches the place that the new plan is to begin at."""
+    threats = scenario.threats
+    inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
+    unit = int(np.argmax(np.where(threats.kill_radius > 0.0, inside, -math.inf))) if len(inside) else -1
+    if unit >= 0 and threats.kill_radius[unit] > 0.0 and inside[unit] >= 0.0:
+        raise MissionError(
+            f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {inside[unit]:.0f} m inside the kill "
+            f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe"
+        )
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:

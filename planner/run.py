@@ -11,6 +11,7 @@ from planner.algorithms import Algorithm
 from planner.certify import certify
 from planner.criteria import paper_scores
 from planner.encoding import Encoding
+from planner.fitting import tighten
 from planner.graded import graded_scores
 from planner.plan import Certificate
 from planner.polish import polish
@@ -39,19 +40,24 @@ class Archive:
     scores: Floats
 
     def take(self, vectors: Floats, scores: Floats) -> None:
-        """Let new rows in; equal ranks keep their order, older first."""
-        fit = len(self.scores) == ARCHIVE_SIZE and not self.scores[:, :4].any()
-        if fit:
-            # Among rows that meet the constraints the order is by exposure, then by length.
-            last = self.scores[-1]
-            shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
-            rows = np.flatnonzero((shorter | (scores[:, KILL] < last[KILL])) & ~scores[:, :4].any(axis=1))
-            if not rows.size:
+        """Let new rows in; equal ranks keep their order, older first.
+
+        Once a row meets the constraints, those that do not are let go: there can be thousands of them to rank.
+        """
+        fit = ~scores[:, :4].any(axis=1)
+        if len(self.scores) and not self.scores[0, :4].any():
+            if len(self.scores) == ARCHIVE_SIZE:
+                last = self.scores[-1]
+                shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
+                fit &= shorter | (scores[:, KILL] < last[KILL])
+            if not fit.any():
                 return
-            vectors, scores = vectors[rows], scores[rows]
-        every = np.concatenate([self.scores, scores])
-        joined = np.concatenate([self.vectors, vectors])
-        if fit:
+        elif fit.any():
+            self.vectors, self.scores = self.vectors[:0], self.scores[:0]
+        every = np.concatenate([self.scores, scores[fit] if fit.any() else scores])
+        joined = np.concatenate([self.vectors, vectors[fit] if fit.any() else vectors])
+        if fit.any():
+            # Among rows that meet the constraints the order is by exposure, then by length.
             order = np.lexsort((every[:, LENGTH], every[:, KILL]))[:ARCHIVE_SIZE]
         else:
             order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
@@ -87,15 +93,19 @@ class Run:
         """Begin with nothing."""
         self.archive = Archive(np.empty((0, self.encoding.lower.size)), np.empty((0, 8)))
 
-    def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive sees them."""
+    def judge(self, vectors: Floats) -> Floats:
+        """Scores (n, 8) of vectors (n, d)."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
         violations: NDArray[np.generic]
         if self.algorithm.graded:
             violations, objectives = graded_scores(self.problem.search, paths)
         else:
             violations, objectives = paper_scores(self.problem.search, paths)
-        scores = np.concatenate([violations.astype(np.float64), objectives], axis=1)
+        return np.concatenate([violations.astype(np.float64), objectives], axis=1)
+
+    def evaluate(self, vectors: Floats) -> Floats:
+        """Scores (n, 8) of vectors (n, d); the archive sees them."""
+        scores = self.judge(vectors)
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
@@ -115,6 +125,12 @@ class Run:
         self.evaluations += made - len(found)
         return np.asarray(scores[0])
 
+    def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
+        """Move all waypoints of a vector (d,) at once, then polish it.  Gives the best scores (8,)."""
+        moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
+        self.evaluations += made
+        return self.polish(moved, most)
+
     def over(self) -> bool:
         """Whether the search is to end now."""
         if self.evaluations >= self._budget():
@@ -122,6 +138,10 @@ class Run:
         elif self.stop is not None:
             self.ended = self.stop() or "completed"
         return self.ended != "completed"
+
+    def missed(self) -> bool:
+        """Whether the best path yet violates something or is in a missile's reach."""
+        return bool(self.archive.scores[0, :4].any() or self.archive.scores[0, KILL] > 0.0)
 
     def safe_already(self) -> bool:
         """Whether the first safe path was asked for, and is there."""

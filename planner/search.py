@@ -49,10 +49,13 @@ ATTEMPTS = (
 # A seeded search ends when this many generations have shortened its best path by less than this share of the straight
 # line: the polish at the end is faster at the rest.
 PATIENCE, GAIN = 10, 2e-4
-# Of the evaluations that the paper's planner makes, the share that a seeded search spends before its last polish.
-SHARE = 0.3
+# Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
+# safe path, and once it has.
+SHARE, SAFE_SHARE = 0.3, 0.1
 # Evaluations that a quick path, each seed, and the best path at the end are polished with, at most.
-QUICK_POLISH, SEED_POLISH, LAST_POLISH = 50, 500, 2500
+QUICK_POLISH, SEED_POLISH, LAST_POLISH = 50, 300, 200
+# Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
+LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
 
@@ -167,22 +170,26 @@ def _attempt(run: Run, number: int, previous: Floats | None) -> None:
     grids, growth = ATTEMPTS[number]
     population = table.population * growth
     encoding, algorithm = run.encoding, run.algorithm
-    before = run.evaluations
+    if algorithm.seeded and number == 0 and _straight(run):
+        run.note()
+        run.report(0)
+        return
     starts = _starts(run, grids, previous)
     if len(run.archive.scores) and (run.safe_already() or run.over()):
         run.note()
         return
-    levels = _levels(run)
+    levels, before = _levels(run), run.evaluations
     initial = first_samples(run.problem.space, encoding, population, starts, run.rng) if algorithm.smooth else None
     search = _optimiser(run, lambda scores: ranks(scores, levels), population, initial)
     search.tell(run.evaluate(search.ask()))
     run.note()
     bests = [_first(search.scores)]
-    most = before + SHARE * (population + table.generations * (population // 2))
+    whole = population + table.generations * (population // 2)
     for generation in range(table.generations):
         if run.over() or run.safe_already():
             break
-        if algorithm.seeded and (_settled(bests) or run.evaluations >= most):
+        share = SHARE if run.missed() else SAFE_SHARE
+        if algorithm.seeded and (_settled(bests) or run.evaluations >= before + share * whole):
             break
         search.tell(run.evaluate(search.ask()))
         run.note()
@@ -190,11 +197,31 @@ def _attempt(run: Run, number: int, previous: Floats | None) -> None:
         run.done += 1
         run.report(table.generations - generation - 1)
     if algorithm.seeded and run.ended == "completed":
-        # What the generations came to, polished, may be another way than the polished seed's.
+        # What the generations came to, tightened, may be another way than the polished seed's.
         order = np.argsort(ranks(_known(search.scores), ARCHIVE_LEVELS), kind="stable")
-        run.polish(search.samples[order[0]], LAST_POLISH)
-        run.polish(run.archive.vectors[0], LAST_POLISH)
+        run.tighten(search.samples[order[0]], LAST_ROUNDS, 0.5, LAST_POLISH)
+        for scale in LAST_MOVES:
+            if run.over():
+                break
+            run.tighten(run.archive.vectors[0], LAST_ROUNDS, scale, LAST_POLISH)
         run.note()
+        run.report(0)
+
+
+def _straight(run: Run) -> bool:
+    """Whether the straight line is a safe path: no path is shorter, and there is nothing to search for."""
+    encoding, space = run.encoding, run.problem.space
+    if encoding.name != "rotated":
+        return False
+    edges = encoding.lower[0::3], encoding.upper[0::3]
+    share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
+    path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
+    vectors = rotated_vectors(space, encoding, path[None])
+    scores = run.judge(vectors)
+    if scores[0, :4].any() or scores[0, KILL] > 0.0:
+        return False
+    run.evaluate(vectors)
+    return run.finished(run.best_certified()[1])
 
 
 def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:

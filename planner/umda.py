@@ -70,26 +70,34 @@ class Umda:
         if self._floor is not None:
             deviation = np.maximum(deviation, self._floor)
         if self._basis is None:
-            return self._redraw_each(self._rng.normal(mean, deviation, (count, mean.size)), mean, deviation)
-        back = self._basis.T
-        return self._redraw(lambda rows: _project(self._rng.normal(mean, deviation, (rows, mean.size)), back), count)
+            return self._redraw_each(mean + deviation * self._rng.standard_normal((count, mean.size)), mean, deviation)
+        back = np.ascontiguousarray(self._basis.T)
+        return self._redraw(
+            lambda rows: _project(mean + deviation * self._rng.standard_normal((rows, mean.size)), back), count
+        )
 
     def _redraw(self, draw: Callable[[int], Floats], count: int) -> Floats:
         """Rows of `draw`; those outside the box are drawn again, and then clipped."""
         out = draw(count)
+        rows = np.flatnonzero(((out < self.lower) | (out > self.upper)).any(axis=1))
         for _ in range(REDRAWS):
-            rows = np.nonzero(((out < self.lower) | (out > self.upper)).any(axis=1))[0]
             if rows.size == 0:
                 return out
-            out[rows] = draw(rows.size)
+            again = draw(rows.size)
+            out[rows] = again
+            rows = rows[((again < self.lower) | (again > self.upper)).any(axis=1)]
         return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
+        """Do the same number by number."""
+        rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
         for _ in range(REDRAWS):
-            rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
             if rows.size == 0:
                 return drawn
-            drawn[rows, columns] = self._rng.normal(mean[columns], deviation[columns])
+            again = mean[columns] + deviation[columns] * self._rng.standard_normal(columns.size)
+            drawn[rows, columns] = again
+            outside = (again < self.lower[columns]) | (again > self.upper[columns])
+            rows, columns = rows[outside], columns[outside]
         return np.clip(drawn, self.lower, self.upper)
 
 
@@ -101,20 +109,16 @@ def _project(rows: Floats, basis: Floats) -> Floats:
 def _product(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
     """Rows (n, d) times a basis (d, k) of which most entries are 0."""
     # In a fixed order: BLAS sums as the machine has it, and the result must not depend on the machine.
-    size = basis.shape[1]
-    entries = np.empty((size, basis.shape[0]), dtype=np.int64)
-    filled = np.zeros(size, dtype=np.int64)
-    for k in range(size):
+    turned = rows.T.copy()
+    out = np.zeros((basis.shape[1], rows.shape[0]))
+    for k in range(basis.shape[1]):
         for d in range(basis.shape[0]):
             if basis[d, k] != 0.0:
-                entries[k, filled[k]] = d
-                filled[k] += 1
-    out = np.empty((rows.shape[0], size))
-    for n in range(rows.shape[0]):
-        for k in range(size):
-            total = 0.0
-            for entry in range(filled[k]):
-                d = entries[k, entry]
-                total += rows[n, d] * basis[d, k]
-            out[n, k] = total
-    return out
+                _add_times(turned[d], basis[d, k], out[k])
+    return out.T.copy()
+
+
+@njit(cache=True)
+def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
+    for n in range(out.size):
+        out[n] += values[n] * factor

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views
 
 if TYPE_CHECKING:
     from pyproj import Proj, Transformer
@@ -62,6 +62,23 @@ def crs_transformer(crs: str) -> "Transformer":
         return Transformer.from_crs(CRS.from_epsg(4326), CRS.from_user_input(crs), always_xy=True)
     except ProjError as error:
         raise ValueError(str(error)) from error
+
+
+def height_unit(crs: str) -> tuple[str, float]:
+    """Name of a CRS' unit of height and its length in m; ("metre", 1) where it has none.
+
+    Raises ValueError for a CRS that PROJ does not know.
+    """
+    from pyproj import CRS
+    from pyproj.exceptions import ProjError
+
+    try:
+        axes = CRS.from_user_input(crs).axis_info
+    except ProjError as error:
+        raise ValueError(str(error)) from error
+    return next(
+        ((a.unit_name, a.unit_conversion_factor) for a in axes if a.direction in ("up", "down")), ("metre", 1.0)
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,13 +179,13 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
     return out
 
 
-@compiled
+@compiled_views
 def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Both components of a packed `PolyMap` at one point."""
     return polymap_within(packed, packed.shape[1], x, y)
 
 
-@compiled
+@compiled_views
 def polymap_within(packed: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Do the same with a `PolyMap` of this size in the first columns of a wider table (Horner's scheme)."""
     a = (x - packed[0, 0]) / packed[1, 0]

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled_views, inlined
 
 Floats = NDArray[np.float64]
 
@@ -72,13 +72,13 @@ def arc_cut(turn: float, radius: float) -> float:
     return radius * (1.0 / math.cos(0.5 * turn) - 1.0)
 
 
-@compiled
+@inlined
 def wrap(angle: float) -> float:  # pragma: no cover - compiled
     """Bring an angle into [-pi, pi), rad."""
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
-@compiled
+@compiled_views
 def turning_angle(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float
 ) -> float:  # pragma: no cover - compiled
@@ -88,7 +88,7 @@ def turning_angle(
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
 
-@compiled
+@compiled_views
 def sphere_window(
     a: Floats, b: Floats, centre: Floats, radius: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -118,7 +118,7 @@ def sphere_window(
     return math.sqrt(closest2), max(0.0, middle - half), min(1.0, middle + half)
 
 
-@compiled
+@compiled_views
 def segment_exposure(
     a: Floats, b: Floats, centre: Floats, radius: float, scale: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -143,7 +143,7 @@ def segment_exposure(
     return leave - enter, window_exposure(enter, leave, length2, along, start2, scale)
 
 
-@compiled
+@compiled_views
 def window_exposure(
     enter: float, leave: float, length2: float, along: float, start2: float, scale: float
 ) -> float:  # pragma: no cover - compiled

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views, inlined
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from world.geometry import wrap
 from world.wind import W20, Wind
@@ -80,14 +80,14 @@ class Limits:
         return packed
 
 
-@compiled
+@inlined
 def wind_speed_at(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
     """Mean wind speed at a height, m/s."""
     speed: float = max(0.0, packed[0, 2] + packed[0, 4] * (amsl - packed[0, 5]))
     return speed
 
 
-@compiled
+@inlined
 def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pragma: no cover - compiled
     """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
     wind = wind_speed_at(packed, amsl)
@@ -95,13 +95,13 @@ def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pra
     return ground_speed(packed[0, 0], wind * math.cos(angle), wind * math.sin(angle))
 
 
-@compiled
+@inlined
 def downwind(packed: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """East and north of the unit vector that the wind blows towards."""
     return math.sin(packed[0, 3]), math.cos(packed[0, 3])
 
 
-@compiled
+@compiled_views
 def slopes_along(
     packed: Floats, tail_share: float, cross_share: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -122,14 +122,14 @@ def slopes_along(
     return up, down
 
 
-@compiled
+@compiled_views
 def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
     angle = packed[0, 3] - course
     return slopes_along(packed, math.cos(angle), math.sin(angle), amsl)
 
 
-@compiled
+@compiled_views
 def _turn_radius(
     packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
@@ -152,7 +152,7 @@ def _turn_radius(
     return radius
 
 
-@compiled
+@compiled_views
 def turn_radius_between(
     packed: Floats, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
@@ -169,7 +169,7 @@ def turn_radius_between(
     return _turn_radius(packed, ux, uy, vx, vy, amsl, side, wx, wy)
 
 
-@compiled
+@compiled_views
 def corner_tangent(
     packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -186,7 +186,7 @@ def corner_tangent(
     return radius * abs(cross) / (1.0 + dot), radius
 
 
-@compiled
+@compiled_views
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
     """Tangent of the slope along a fly-by arc: the heights of its tangent points over the arc's own length.
 
@@ -199,7 +199,7 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
     return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
 
 
-@compiled
+@compiled_views
 def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
     """Run after a fly-over turn (rad), in radii; its greatest up to this angle, so that it never falls with the angle.
 

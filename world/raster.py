@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.errors import TerrainError
-from world.frames import GeoOrigin, crs_transformer, fit_polymap, to_geo, to_map
+from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map
 from world.raster_file import (
     MOST_PIXELS,
     RasterFile,
@@ -37,6 +37,11 @@ UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
 LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
 # Worst error allowed for the polynomial from map to pixels, in pixels.
 PIXEL_TOLERANCE = 1e-3
+METRES = ("m", "metre", "metres", "meter", "meters")
+# A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
+MOST_BLOCK = 32 * 2**20
+# Pixels without data that are looked at before the next ones: one inside the area is enough.
+_HOLES_AT_ONCE = 2**16
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
@@ -122,21 +127,23 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
     rows, cols = np.nonzero(np.isnan(terrain.heights))
     if not rows.size:
         return
-    # Newton's method with one slope: the map is affine but for a few metres over the box.
-    wanted = np.stack([cols, rows]).astype(np.float64)
     to_map_metres = np.linalg.inv(per_metre)
-    place = np.repeat(box.mean(axis=1)[:, None], rows.size, axis=1)
-    for _ in range(8):
-        place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
     # A height is made of the four pixels around it.
     reach = np.abs(to_map_metres).sum(axis=1)[:, None]
-    inside = ((place > box[:, :1] - reach) & (place < box[:, 1:] + reach)).all(axis=0)
-    if inside.any():
-        east, north = place[:, int(np.argmax(inside))]
-        raise TerrainError(
-            f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m "
-            f"({int(inside.sum())} of {terrain.heights.size} pixels of the area have none); choose an area with data"
-        )
+    for first in range(0, rows.size, _HOLES_AT_ONCE):
+        part = slice(first, first + _HOLES_AT_ONCE)
+        wanted = np.stack([cols[part], rows[part]]).astype(np.float64)
+        # Newton's method with one slope: the map is affine but for a few metres over the box.
+        place = np.repeat(box.mean(axis=1)[:, None], wanted.shape[1], axis=1)
+        for _ in range(8):
+            place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
+        inside = ((place > box[:, :1] - reach) & (place < box[:, 1:] + reach)).all(axis=0)
+        if inside.any():
+            east, north = place[:, int(np.argmax(inside))]
+            raise TerrainError(
+                f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m ({rows.size:,} of "
+                f"{terrain.heights.size:,} pixels in and about the area have none); choose an area with data"
+            )
 
 
 def _outline_window(
@@ -200,6 +207,8 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         "GDAL_PAM_ENABLED": "NO",
         "GDAL_DISABLE_READDIR_ON_OPEN": "EMPTY_DIR",
         "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
+        # The vertical part of the reference system too, for its unit.
+        "GTIFF_REPORT_COMPD_CS": "YES",
     }
     try:
         with warnings.catch_warnings(), rasterio.Env(**guard):
@@ -209,13 +218,19 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
                 crs, forward, kind = source.crs, source.transform, np.dtype(source.dtypes[0]).kind
                 rows, cols, bands = source.height, source.width, source.count
                 scale, offset = float(source.scales[0]), float(source.offsets[0])
+                block, unit = math.prod(source.block_shapes[0]), source.units[0]
         transformer = None if crs is None else crs_transformer(crs.to_wkt())
+        stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
     except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
         raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}") from error
     if bands != 1 or kind not in "iuf":
         raise TerrainError(f"{file}: bands: {bands} of kind {kind!r}; an elevation file has 1 band of numbers")
     if transformer is None or forward.determinant == 0.0:
         raise TerrainError(f"{file}: no coordinate reference system and position are stated")
+    if (unit or "m").lower() not in METRES or metres != 1.0:
+        raise TerrainError(f"{file}: heights in {stated if metres != 1.0 else unit}: metres are expected")
+    if block > MOST_BLOCK:
+        raise TerrainError(f"{file}: blocks of {block:,} pixels, read whole: at most {MOST_BLOCK:,} are; tile the file")
     if min(rows, cols) < 2:
         raise TerrainError(f"{file}: size {cols} x {rows}: at least 2 x 2 pixels are expected")
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled
+from aircraft.compiled import compiled, compiled_views, inlined
 from world.frames import PolyMap, fit_polymap, polymap
 
 Floats = NDArray[np.float64]
@@ -21,6 +21,8 @@ Heights = NDArray[np.float32]
 STRAIGHT_PIECE = 500.0
 # What the map of positions to pixels may be out by: a place on the edge is not outside for it (pixels).
 EDGE = 2e-3
+# Pixels along a side of the tiles whose steepest slope is noted.
+TILE = 16
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ class Terrain:
         return float(low), float(at)
 
 
-@compiled
+@inlined
 def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: no cover - compiled
     """Bilinear height at fractional pixel coordinates; NaN further than `EDGE` outside the outermost pixel centres."""
     rows, cols = heights.shape
@@ -82,22 +84,29 @@ def pixel_height(heights: Heights, col: float, row: float) -> float:  # pragma: 
 
 
 @compiled
-def steepest_slope(heights: Heights, pitch: float) -> float:  # pragma: no cover - compiled
-    """Steepest slope that the bilinear ground can have, m per m, from the steps between pixels and their pitch (m)."""
+def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no cover - compiled
+    """Steepest slope that the bilinear ground can have in each tile of `TILE` x `TILE` cells between pixels, m per m.
+
+    From the steps between pixels and their pitch (m).  NaN adds nothing.
+    """
     rows, cols = heights.shape
-    worst = 0.0
+    out = np.zeros(((rows - 2) // TILE + 1, (cols - 2) // TILE + 1), dtype=np.float32)
     for i in range(rows - 1):
         for j in range(cols - 1):
             across = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
             down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
             steep = across * across + down * down
             # NaN compares as less.
-            if steep > worst:
-                worst = steep
-    return math.sqrt(worst) / pitch
+            if steep > out[i // TILE, j // TILE]:
+                out[i // TILE, j // TILE] = steep
+    for i in range(out.shape[0]):
+        for j in range(out.shape[1]):
+            # A hair more, for what single precision rounds.
+            out[i, j] = math.sqrt(out[i, j]) / pitch * (1.0 + 1e-6)
+    return out
 
 
-@compiled
+@compiled_views
 def ground_height(heights: Heights, packed: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
     """Ground height at one map position; NaN outside the raster."""
     col, row = polymap(packed, east, north)
@@ -112,7 +121,7 @@ def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats)
     return out
 
 
-@compiled
+@compiled_views
 def segment_clearance(
     heights: Heights, packed: Floats, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -137,7 +146,7 @@ def segment_clearance(
     return best, best_at
 
 
-@compiled
+@compiled_views
 def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
     """Next fraction after t at which start + t * step is a whole number; inf if it never is."""
     if step == 0.0:
@@ -147,7 +156,7 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
     return (line - start) / step
 
 
-@compiled
+@compiled_views
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

@@ -1,5 +1,10 @@
-"""The chain: flight, log, verdict and a whole run, as ratios measured side by side."""
+"""What the stages cost against each other: bare JSBSim, the closed loop, recording, judging, reading, reporting.
 
+Seconds are CPU seconds, the least of a few rounds, so that other work on the machine counts little.  Flights with and
+without a log are flown in turn, so that a machine that slows down slows them all.
+"""
+
+import resource
 import subprocess
 import sys
 import tempfile
@@ -12,28 +17,17 @@ import numpy as np
 
 from flight.export import plan_mission
 from flight.fdm import Fdm
+from flight.setup import FlightSetup
 from flight.simulate import FDM_HZ, simulate
 from logs.check import judge_flight
 from logs.reader import read_log
 from logs.recorder import Recorder
-from planfly.pipeline import make_plan, make_setup
-from planfly.vehicle import load_vehicle
+from planfly.pipeline import BATCH, make_plan, make_setup
+from planfly.vehicle import Vehicle, load_vehicle
+from tests.bench.timing import best_cpu
 from world.scenario import load_scenario
 
 ROUNDS = 5
-
-
-def best(work: Callable[[], object], rounds: int = ROUNDS, clock: Callable[[], float] = time.perf_counter) -> float:
-    """The shortest of a few runs, s: the one that the machine disturbed least.
-
-    clock: `time.process_time` for what is compared with a share of something else, on a machine that others use.
-    """
-    spent = []
-    for _ in range(rounds):
-        started = clock()
-        work()
-        spent.append(clock() - started)
-    return min(spent)
 
 
 def run() -> dict[str, Any]:
@@ -53,67 +47,84 @@ def run() -> dict[str, Any]:
         fdm.write(np.array(trim.commands()))
         fdm.step(steps)
 
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "flight.mcap"
-
-        # As the flight hands them on: a second at a time.
-        rows = len(flown.track)
-        blocks = [flown.track.rows(start, min(rows, start + 60)) for start in range(0, rows, 60)]
-
-        def record(every: int = 1) -> None:
-            with Recorder(log, setup, every=every, batch=10) as recorder:
-                for block in blocks:
-                    recorder.write(block)
-                recorder.finish("completed", None)
-
-        times = {
-            "bare JSBSim": best(bare),
-            "flight": best(lambda: simulate(setup, vehicle.aircraft), clock=time.process_time),
-            "recording, 20 Hz": best(lambda: record(3), clock=time.process_time),
-            "recording": best(record, clock=time.process_time),
-            "reading the log": best(lambda: read_log(log)),
-            "judging": best(lambda: judge_flight(setup, flown.track, "completed")),
-            "planning": best(lambda: make_plan(scenario, vehicle, 1)),
-            "whole `planfly run`, new process": best(lambda: _run(Path(folder)), 2),
-            "`planfly --help`, new process": best(_help, 3),
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        times = recording(setup, vehicle, folder)
+        hour, hours = long_flight(folder)
+        size = hour.stat().st_size / hours / 1e6
+        out = ("--out", str(folder / "report"), "--overwrite")
+        times |= {
+            "bare JSBSim": best_cpu(bare, ROUNDS),
+            "judging": best_cpu(lambda: judge_flight(setup, flown.track, "completed"), ROUNDS),
+            "planning": best_cpu(lambda: make_plan(scenario, vehicle, 1), ROUNDS),
+            "whole `planfly run`, new process": in_child("run", "--out", str(folder / "run"), "--overwrite"),
+            "`planfly --help`, new process": in_child("--help"),
+            "reading the long log": best_cpu(lambda: read_log(hour), 3),
+            "`planfly check` of the long log": in_child("check", str(hour)),
+            "`planfly report` of the long log": in_child("report", str(hour), *out),
         }
-        size = log.stat().st_size
-        hour, hours = _long_flight(Path(folder))
-        times["`planfly check` of a long log"] = best(lambda: _planfly("check", str(hour)), 2)
-        out = str(Path(folder) / "report")
-        times["`planfly report` of a long log"] = best(
-            lambda: _planfly("report", str(hour), "--out", out, "--overwrite"), 2
-        )
+        page = (folder / "report" / "report.html").stat().st_size / 1e6
 
+    flight = times["flight"]
     ratios = {
-        "closed loop at 60 Hz / bare JSBSim at 120 Hz": times["flight"] / times["bare JSBSim"],
-        "recording at 20 Hz / flight": times["recording, 20 Hz"] / times["flight"],
-        "recording at 60 Hz / flight": times["recording"] / times["flight"],
-        "judging / flight": times["judging"] / times["flight"],
-        "flight time / time to fly it": seconds / times["flight"],
+        "closed loop at 60 Hz / bare JSBSim at 120 Hz": flight / times["bare JSBSim"],
+        "recording at 20 Hz / flight": times["flight, recorded at 20 Hz"] / flight - 1.0,
+        "recording at 60 Hz / flight": times["flight, recorded at 60 Hz"] / flight - 1.0,
+        "judging / flight": times["judging"] / flight,
+        "flight time / time to fly it": seconds / flight,
         "flight time / whole run": seconds / times["whole `planfly run`, new process"],
     }
-    print(f"jacksboro, seed 1: {seconds:.0f} s of flight, {len(flown.track)} rows; best of {ROUNDS}")
-    for name, value in times.items():
-        print(f"  {name:<48}{value:9.3f} s")
-    for name, value in ratios.items():
-        print(f"  {name:<48}{value:9.2f}")
-    hourly = size * 3600 / seconds / 1e6
-    print(f"  {'log size per flight hour, 60 Hz':<48}{hourly:9.1f} MB")
+    print(f"jacksboro, seed 1: {seconds:.0f} s of flight, {len(flown.track)} rows; CPU, best of {ROUNDS}")
+    for label, value in times.items():
+        print(f"  {label:<48}{value:9.3f} s")
+    for label, value in ratios.items():
+        print(f"  {label:<48}{value:9.2f}")
     print(f"  {'the long log, hours of flight':<48}{hours:9.2f}")
-    return {"seconds": times, "ratios": ratios, "log_mb_per_hour": hourly, "long_log_hours": hours}
+    print(f"  {'its size per flight hour, 60 Hz':<48}{size:9.1f} MB")
+    print(f"  {'its report.html':<48}{page:9.1f} MB")
+    return {"seconds": times, "ratios": ratios, "log_mb_per_hour": size, "long_log_hours": hours, "report_mb": page}
 
 
-def _run(folder: Path) -> None:
-    command = [sys.executable, "-m", "planfly", "run", "--out", str(folder / "run"), "--overwrite"]
-    subprocess.run(command, check=True, capture_output=True)
+def recording(setup: FlightSetup, vehicle: Vehicle, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
+    """The flight without a log, with one at 20 Hz and with one at 60 Hz, flown in turn: CPU s, the least of each."""
+    log = folder / "flight.mcap"
+
+    def fly(every: int) -> None:
+        with Recorder(log, setup, every=every, batch=BATCH) as recorder:
+            flown = simulate(setup, vehicle.aircraft, sink=recorder.write_rows)
+            recorder.finish(flown.ended, None)
+
+    work: dict[str, Callable[[], object]] = {
+        "flight": lambda: simulate(setup, vehicle.aircraft),
+        "flight, recorded at 20 Hz": lambda: fly(3),
+        "flight, recorded at 60 Hz": lambda: fly(1),
+    }
+    spent: dict[str, list[float]] = {label: [] for label in work}
+    for _ in range(rounds):
+        for label, part in work.items():
+            started = time.process_time()
+            part()
+            spent[label].append(time.process_time() - started)
+    return {label: min(found) for label, found in spent.items()}
 
 
-def _planfly(*argv: str) -> None:
+def planfly(*argv: str) -> None:
+    """Run a command in a process of its own."""
     subprocess.run([sys.executable, "-m", "planfly", *argv], check=True, capture_output=True)
 
 
-def _long_flight(folder: Path) -> tuple[Path, float]:
+def in_child(*argv: str, rounds: int = 2) -> float:
+    """CPU seconds of a command, its start included."""
+    spent = []
+    for _ in range(rounds):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        planfly(*argv)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return min(spent)
+
+
+def long_flight(folder: Path) -> tuple[Path, float]:
     """Fly five laps above the demo's ridges, in wind and turbulence: the log, and the hours in it."""
     corners = [(36.56, -84.28), (36.56, -84.22), (36.60, -84.22), (36.60, -84.28)] * 5
     lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.58\t-84.25\t1150\t1"]
@@ -121,9 +132,5 @@ def _long_flight(folder: Path) -> tuple[Path, float]:
     mission, log = folder / "laps.waypoints", folder / "laps.mcap"
     mission.write_text("\n".join(lines) + "\n", encoding="utf-8")
     weather = ("--wind", "5,250", "--turbulence", "light")
-    _planfly("fly", str(mission), "--terrain", "jacksboro", *weather, "--log", str(log))
+    planfly("fly", str(mission), "--terrain", "jacksboro", *weather, "--log", str(log))
     return log, read_log(log).end_time / 3600.0
-
-
-def _help() -> None:
-    subprocess.run([sys.executable, "-m", "planfly", "--help"], check=True, capture_output=True)

@@ -108,8 +108,9 @@ def steady(seeds: Sequence[int]) -> list[Errors]:
     return [errors_of(simulate(windy(seed, turbulence="none"), aerosonde())) for seed in seeds]
 
 
-def moderate(seeds: Sequence[int]) -> list[Errors]:
-    return [errors_of(simulate(windy(seed), aerosonde())) for seed in seeds]
+def moderate(seeds: Sequence[int], guidance_hz: int = 60) -> list[Errors]:
+    setups = [replace(windy(seed), guidance_hz=cast("Any", guidance_hz)) for seed in seeds]
+    return [errors_of(simulate(setup, aerosonde())) for setup in setups]
 
 
 def anywhere(seeds: Sequence[int]) -> list[Errors]:
@@ -246,6 +247,7 @@ def rows(seeds: int = 20) -> dict[str, float]:
     tracking("calm", [calm()])
     tracking("10 m/s, no turbulence", steady(range(seeds)))
     tracking("10 m/s and moderate", moderate(range(seeds)))
+    tracking("the same at 30 Hz", moderate(range(seeds), guidance_hz=30))
     tracking("0..10 m/s, none to moderate", anywhere(range(5 * seeds)))
     for name, flights in mismatched(range(max(1, seeds // 4))).items():
         found[f"{name}: largest error"] = max(item.worst for item in flights)

@@ -36,6 +36,15 @@ def test_wind_and_moderate_turbulence() -> None:
     assert float(np.percentile([item.height_max for item in found], 95)) <= 0.8
 
 
+def test_thirty_hertz_in_turbulence() -> None:
+    found = bench.moderate(range(20 if SOAK else 2), guidance_hz=30)
+    assert all(item.completed for item in found)
+    assert float(np.percentile([item.cross_max for item in found], 95)) <= 1.0
+    assert float(np.percentile([item.height_max for item in found], 95)) <= 1.0
+    # A loop near the edge of stability shows here first.
+    assert max(item.peak_bank for item in found) <= 36.0
+
+
 def test_any_wind() -> None:
     found = bench.anywhere(range(100 if SOAK else 4))
     assert all(item.completed for item in found)

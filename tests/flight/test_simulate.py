@@ -19,7 +19,7 @@ from aircraft.catalog import Aircraft
 from flight.chart import Chart
 from flight.fdm import Variation
 from flight.setup import FlightSetup
-from flight.simulate import BANK_RESERVE, Flight, simulate
+from flight.simulate import BANK_RESERVE, Flight, as_track, simulate
 from flight.track import COLUMNS, Track, join_tracks
 from tests.flight.conftest import standard
 from world.errors import FlightError
@@ -55,8 +55,8 @@ def test_calm(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
     assert track.leg.tolist() == sorted(track.leg.tolist())
     assert set(track.leg.tolist()) == set(range(9))
     assert np.abs(track.airspeed - 25.0).max() < 1.0
-    # Guidance may go beyond the planned bank by its reserve, and the roll loop over its command by a little.
-    assert math.degrees(np.abs(track.attitude[:, 0]).max()) < 30.0 + math.degrees(BANK_RESERVE) + 2.0
+    # Guidance may go beyond the planned bank by its reserve, and the roll loop over its command by next to nothing.
+    assert math.degrees(np.abs(track.attitude[:, 0]).max()) < 30.0 + math.degrees(BANK_RESERVE) + 0.5
     assert track.position[-1] == pytest.approx(standard()[-1], abs=1.0)
     assert track.position[0] == pytest.approx(standard()[0], abs=1e-3)
 
@@ -72,10 +72,11 @@ def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraf
     velocity = np.gradient(track.position, track.time, axis=0)[5:-5]
     assert velocity == pytest.approx(track.velocity[5:-5], abs=0.02)
     east, north = setup.scenario.wind.at(500.0)
-    assert track.wind == pytest.approx(np.tile([east, north, 0.0], (len(track), 1)), abs=1e-4)
+    assert track.wind == pytest.approx(np.tile([east, north, 0.0], (len(track), 1)), abs=5e-4)
     # Ground velocity less wind is what the air sees: its size the airspeed, its direction the nose's but for sideslip.
+    # Each axis is kept to 1 mm/s.
     air = track.velocity.astype(np.float64) - track.wind
-    assert np.linalg.norm(air, axis=1) == pytest.approx(track.airspeed, abs=1e-3)
+    assert np.linalg.norm(air, axis=1) == pytest.approx(track.airspeed, abs=3e-3)
     heading = np.arctan2(air[:, 0], air[:, 1])
     level = np.abs(track.attitude[:, 0]) < 0.02
     assert np.abs(np.remainder(heading - track.attitude[:, 2] + math.pi, math.tau) - math.pi)[level].max() < 0.01
@@ -128,12 +129,12 @@ def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: A
         return _digest(simulate(setup(seed), aerosonde, **more).track)
 
     first = fly(5)
-    parts: list[Track] = []
+    parts: list[Floats] = []
     told: list[tuple[float, float]] = []
     # Listening changes nothing.
     assert fly(5, sink=parts.append, progress=lambda done, whole: told.append((done, whole))) == first
     assert fly(6) != first
-    assert _digest(join_tracks(parts)) == first
+    assert _digest(join_tracks([as_track(part) for part in parts])) == first
     assert [done for done, _ in told] == sorted(done for done, _ in told)
     assert told[-1][0] == told[-1][1]
     # Nor does another process, with another order of hashes.

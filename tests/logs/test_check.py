@@ -138,6 +138,14 @@ def test_very_short_tracks(setup: FlightSetup, track: Track, rows: int) -> None:
     assert not verdict.flyable
 
 
+def test_two_rows_far_apart_say_nothing_of_a_slope() -> None:
+    setup = make_setup(ROUTE)
+    columns = copied(fly_path(setup, rate=5.0))
+    columns["time"][:211] = 0.0
+    # One row at 0 s is left of the first leg, and one at 42 s.
+    judge(setup, Track(**columns).rows(0, 212))
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.data())
 def test_random_cuts_and_holes_never_raise(data: st.DataObject) -> None:

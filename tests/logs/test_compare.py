@@ -1,5 +1,8 @@
 """Comparing flights: the same measures for both, and nothing where nothing differs."""
 
+import importlib.util
+import inspect
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +20,7 @@ from logs.layout import layout_text
 from logs.reader import FlightLog, read_log
 from logs.recorder import _CHANNELS
 from logs.schema import FIELDS, STATE_TOPIC
+from tests.clients import need
 from tests.logs.conftest import make_setup, record
 
 
@@ -67,12 +71,15 @@ def test_pictures_and_page(log_file: Path, other: FlightLog, tmp_path: Path) -> 
     assert all(data.startswith(b"\x89PNG") for data in first[:2])
     assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first[2:4])
     assert b"energy used" in first[4]
+    # Both verdicts in a sentence first, and the pictures inside: the page can be sent alone.
+    page = first[4].decode("utf-8")
+    assert 0 < page.index("a.mcap:</strong>") < page.index("b.mcap:</strong>") < page.index("<table")
+    assert page.count("data:image/png;base64,") == 2
+    assert 'src="compare' not in page
     assert [file.read_bytes() for file in write_comparison(tmp_path / "out", found, svg=True)] == first
 
 
 def test_the_layout_speaks_of_topics_and_fields_that_are_there() -> None:
-    import json
-
     layout = json.loads(layout_text())
     fields = {name for name, *_ in FIELDS}
     topics = {*_CHANNELS, STATE_TOPIC}
@@ -84,7 +91,40 @@ def test_the_layout_speaks_of_topics_and_fields_that_are_there() -> None:
         named = [panel.get(key) for key in ("followTopic", "topicToRender", "topicPath") if key in panel]
         assert set(named) | set(panel.get("topics", ())) <= topics
 
+    # A layout file as Foxglove exports one: these parts, and panels of these kinds.
+    assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+    assert {name.split("!")[0] for name in layout["configById"]} == {"3D", "map", "Plot", "RosOut", "RawMessages"}
+
     def leaves(node: Any) -> list[str]:
         return [node] if isinstance(node, str) else [*leaves(node["first"]), *leaves(node["second"])]
 
     assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
+
+
+def test_the_layouts_settings_are_those_that_foxglove_knows() -> None:
+    """By the classes that Foxglove publishes for making layouts."""
+    need(
+        None if importlib.util.find_spec("foxglove") is None else Path("/"), "foxglove-sdk", "pip package foxglove-sdk"
+    )
+    from foxglove import layouts as known
+
+    def names(kind: Any) -> set[str]:
+        """Its settings as JSON spells them."""
+        words = [name.split("_") for name in inspect.signature(kind).parameters]
+        return {first + "".join(word.capitalize() for word in rest) for first, *rest in words}
+
+    kinds = {
+        "3D": known.ThreeDeeConfig,
+        "map": known.MapConfig,
+        "Plot": known.PlotConfig,
+        "RosOut": known.LogConfig,
+        "RawMessages": known.RawMessagesConfig,
+    }
+    for name, panel in json.loads(layout_text())["configById"].items():
+        # A panel's title stands beside its settings there.
+        assert set(panel) - {"title"} <= names(kinds[name.split("!")[0]]), name
+        for path in panel.get("paths", ()):
+            assert set(path) <= names(known.PlotSeries)
+        assert set(panel.get("cameraState", ())) <= names(known.ThreeDeeCameraState)
+        assert set(panel.get("scene", ())) <= names(known.BaseRendererSceneSettings)
+        assert set(panel.get("scene", {}).get("transforms", ())) <= names(known.BaseRendererTransforms)

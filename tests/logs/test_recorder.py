@@ -103,7 +103,8 @@ def test_the_viewer_topics(log_file: Path, setup: FlightSetup, track: Track) -> 
     terrain = setup.scenario.terrain
     assert terrain is not None
     for point in list(mesh.points)[::501]:
-        assert point.z == float(terrain.height(point.x, point.y))
+        # Points are rounded to 1/16 m, along the ground too; the steepest of this one rises 0.3 m a metre.
+        assert point.z == pytest.approx(float(terrain.height(point.x, point.y)), abs=0.05)
     threats = found["/scene/threats"][0][1].entities[0]
     assert [sphere.size.x for sphere in threats.spheres] == [800.0, 1600.0]
     line = found["/scene/track"][-1][1].entities[0].lines[0]

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 
 from flight.track import Track
 from logs.along_track import passages, segment_clearances
+from logs.instruments import make_instruments
+from logs.legs_flown import with_legs
 from logs.reader import FlightLog, LogEvent, read_log
 from logs.replay import TimelineEntry, entry_lines, timeline
 from tests.logs.conftest import make_setup, make_track
@@ -49,7 +51,8 @@ def test_the_lowest_clearance_of_each_leg(log: FlightLog) -> None:
     fine = np.linspace(0.0, log.end_time, 40_001)
     place = np.stack([np.interp(fine, log.track.time, log.track.position[:, k]) for k in range(3)], axis=1)
     height = place[:, 2] - terrain.height(place[:, 0], place[:, 1])
-    leg = log.track.leg[np.searchsorted(log.track.time, fine, side="right") - 1]
+    legs = with_legs(log.setup, log.track).leg
+    leg = legs[np.searchsorted(log.track.time, fine, side="right") - 1]
     for k, entry in enumerate(sorted(entries, key=lambda item: item.text)):
         lowest = float(height[leg == k].min())
         assert entry.text.startswith(f"lowest of leg {k}: {lowest:.1f} m above ground")
@@ -144,10 +147,32 @@ def test_lines_fit_a_terminal_and_cannot_steer_it(log: FlightLog) -> None:
 def test_one_row_and_unknown_numbers_are_told_too(log: FlightLog) -> None:
     single = dataclasses.replace(log, track=log.track.rows(0, 1), events=(), end_time=0.0)
     assert {entry.kind for entry in timeline(single)} >= {"start", "leg", "end"}
-    gone = np.array(log.track.position)
-    gone[300:] = math.nan
+    terrain = log.setup.scenario.terrain
+    assert terrain is not None
+    # No ground is known north of 690 m, so under the last leg.
+    heights = np.array(terrain.heights)
+    heights[int(terrain.to_pixel(0.0, 690.0)[1]) :] = math.nan
+    scenario = dataclasses.replace(log.setup.scenario, terrain=dataclasses.replace(terrain, heights=heights))
+    setup = dataclasses.replace(log.setup, scenario=scenario)
     attitude = np.full((len(log.track), 3), math.nan, dtype=np.float32)
-    lost: Track = dataclasses.replace(make_track(), position=gone, attitude=attitude)
-    entries = timeline(dataclasses.replace(log, track=lost))
+    lost: Track = dataclasses.replace(make_track(), attitude=attitude)
+    entries = timeline(dataclasses.replace(log, setup=setup, track=lost))
     assert any("no terrain data under it" in text for text in texts(entries, "ground"))
     assert any("peak bank nan" in text for text in texts(entries, "turn"))
+
+
+def test_legs_are_those_of_the_track_whatever_was_recorded(log: FlightLog) -> None:
+    found = with_legs(log.setup, log.track).leg
+    # The flight goes through each waypoint, 5.7 m a row; a leg ends within a few rows of it, at the fly-by's apex.
+    for index, waypoint in enumerate(log.setup.route.waypoints[1:-1], 1):
+        nearest = int(np.argmin(np.linalg.norm(log.track.position - waypoint, axis=1)))
+        assert abs(int(np.searchsorted(found, index)) - nearest) < 12
+    lying = dataclasses.replace(log.track, leg=np.zeros(len(log.track), dtype=np.int32))
+    assert timeline(dataclasses.replace(log, track=lying)) == timeline(log)
+    assert make_instruments(dataclasses.replace(log, track=lying)).frame(6.0) == make_instruments(log).frame(6.0)
+    # What was never reached begins no leg, and a track of nothing is on the first.
+    half = log.track.rows(0, len(log.track) // 2)
+    assert with_legs(log.setup, half).leg.max() == found[: len(half)].max()
+    assert not with_legs(log.setup, log.track.rows(0, 1)).leg.any()
+    gone = dataclasses.replace(log.track, position=np.full((len(log.track), 3), math.nan))
+    assert not with_legs(log.setup, gone).leg.any()

@@ -8,6 +8,7 @@ import sys
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import rasterio
@@ -102,11 +103,12 @@ def test_an_attachment_with_a_climbing_name_in_a_whole_log(tmp_path: Path) -> No
     assert "incomplete" in said
 
 
-def sparse_tiff(path: Path, side: int) -> None:
+def sparse_tiff(path: Path, side: int, **blocks: Any) -> None:
     """A GeoTIFF without a single block of data, of this many pixels a side."""
     profile = {"driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}
     transform = Affine(1e-4, 0, 8.0, 0, -1e-4, 46.1)
-    with rasterio.open(path, "w", transform=transform, tiled=True, sparse_ok=True, bigtiff="YES", **profile):
+    profile |= blocks or {"tiled": True}
+    with rasterio.open(path, "w", transform=transform, sparse_ok=True, bigtiff="YES", **profile):
         pass
 
 
@@ -127,6 +129,7 @@ MISSION = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.05\t8.05\t500\t1\n" + "".joi
     ("name", "make"),
     [
         ("bomb.tif", lambda path: sparse_tiff(path, 200_000)),
+        ("block.tif", lambda path: sparse_tiff(path, 30_000, blockysize=30_000, compress="deflate")),
         ("other.tif", vrt),
         ("other.vrt", vrt),
         ("http://127.0.0.1:9/x.tif", None),

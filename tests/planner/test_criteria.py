@@ -61,7 +61,7 @@ def by_the_book(problem: Problem, path: np.ndarray) -> tuple[list[int], list[flo
     return counts, [float(ratio), *sums, float(np.where(above > 0, above, 0.0).sum() / 6)]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(0, 10_000), st.sampled_from([4, 8, 12]))
 def test_paper_criteria(numbers: Problem, seed: int, waypoints: int) -> None:
     rng = np.random.default_rng(seed)
@@ -126,7 +126,7 @@ def test_first_and_last_turn_count_from_the_given_courses(
     assert paper_scores(rules._replace(destination_course=math.radians(260)), path[None])[0][0, Violation.TURN] == 2
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(5, 140), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.booleans())
 def test_corner_arc(problem: Problem, degrees: float, slope_in: float, slope_out: float, left: bool) -> None:
     """Tangent to both legs, on one circle, R(1/cos(theta/2) - 1) inside the corner, never above the path's crest."""

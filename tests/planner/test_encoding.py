@@ -19,7 +19,7 @@ def space(across: float | None = None) -> Space:
     return Space(np.array([0.0, 0.0, 200.0]), np.array([8000.0, 6000.0, 300.0]), bounds, (100.0, 900.0), across)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(points, points, st.lists(points, min_size=3, max_size=6).map(np.array))
 def test_frame_round_trip_and_criteria_survive(start: np.ndarray, end: np.ndarray, path: np.ndarray) -> None:
     if math.dist(start[:2], end[:2]) < 1.0:

@@ -65,7 +65,7 @@ tables = st.integers(1, 40).flatmap(
 )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(tables, st.sampled_from([PAPER, GOALS, SINGLE]))
 def test_fast_ranks_are_the_generic_ones(table: list[list[int]], levels: tuple[Level, ...]) -> None:
     scores = np.array(table, dtype=np.float64)
@@ -81,7 +81,7 @@ def test_fast_ranks_on_many_rows(levels: tuple[Level, ...], few: int) -> None:
     np.testing.assert_array_equal(ranks(scores, levels), generic_ranks(scores, levels))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.lists(st.integers(0, 2), min_size=8, max_size=8), min_size=3, max_size=3),
     st.sampled_from([PAPER, GOALS]),

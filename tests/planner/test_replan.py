@@ -55,6 +55,16 @@ def test_turn_counts_from_the_present_course(
     assert turning_angles(plan.waypoints[2:5])[0] <= math.radians(45.0)
 
 
+def test_a_leg_that_begins_in_reach_is_refused_by_its_own_name(old: Plan, limits: Limits) -> None:
+    east, north = old.waypoints[3, :2]
+    now = with_threats(old.scenario, [(float(east), float(north), 2000.0, 2500.0)], "test")
+    with pytest.raises(
+        MissionError, match=r"leg 3: waypoint 3, where it begins, is \d+ m inside .* pop-up 1"
+    ) as caught:
+        replan(now, limits, old, 3, seed=1)
+    assert "\n" not in str(caught.value)
+
+
 def test_same_seed_same_replan(old: Plan, limits: Limits) -> None:
     now = with_threats(old.scenario, [in_the_way(old, 4)], "test")
     one, two = (plan_json(replan(now, limits, old, 2, seed=3)) for _ in range(2))

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from planner.cells import cell_at, grid_of, make_cells
+from planner.cells import make_cells
 from planner.criteria import paper_scores
 from planner.encoding import rotated
 from planner.graded import graded_scores
+from planner.missiles import make_missiles
 from planner.problem import make_problem
 from planner.search import plan_path
 from world.limits import Limits
@@ -80,10 +81,12 @@ def test_cells_hold_every_threat_that_reaches_them() -> None:
     position = np.column_stack([rng.uniform(-7000, 7000, (300, 2)), np.zeros(300)])
     reach = rng.uniform(0, 600, 300) * (rng.random(300) < 0.9)
     cells = make_cells(position, reach, bounds)
-    grid = grid_of(cells)
     for place in rng.uniform(-8000, 8000, (2000, 2)):
-        cell = cell_at(*grid, *place)
-        listed = set(cells.units[cells.first[cell] : cells.first[cell + 1]].tolist())
+        col, row = np.floor((place - [cells.west, cells.south]) / cells.side).astype(int)
+        inside = 0 <= col < cells.cols and 0 <= row < cells.rows
+        cell = row * cells.cols + col if inside else cells.cols * cells.rows
+        first, number = cells.table[cell, :2]
+        listed = set(cells.units[first : first + number].tolist())
         away = np.hypot(*(position[:, :2] - place).T)
         assert set(np.flatnonzero((away <= reach) & (reach > 0)).tolist()) <= listed
 
@@ -116,7 +119,7 @@ def test_cells_change_no_score(
     units = scenario.threats
     everything = rules._replace(
         near=make_cells(units.position, units.detection_radius, far),
-        missiles=make_cells(units.position, units.kill_radius, far),
+        missiles=make_missiles(rules.threats, side=1e9),
     )
     encoding = rotated(space, 12)
     paths = encoding.decode(rng.uniform(encoding.lower, encoding.upper, (60, encoding.lower.size)))

@@ -65,7 +65,7 @@ def test_transformer_keeps_the_axis_order_and_names_what_it_does_not_know() -> N
         crs_transformer("EPSG:999999")
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(st.floats(-80.0, 80.0), st.floats(10.0, 60_000.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_polynomial_copy_of_a_frame_change(lat_deg: float, half: float, u: float, v: float) -> None:
     origin = GeoOrigin(lat_deg, 8.0)

@@ -73,13 +73,17 @@ def _geo_tiff(path: Path, heights: NDArray[Any] | None = None, **more: Any) -> P
     )
 
 
-def _utm_tiff(path: Path) -> Path:
-    """The same hills on a grid of 20 m in UTM zone 32, tilted to the meridians."""
-    transform = from_origin(422_000.0, 5_106_000.0, 20.0, 20.0)
-    col, row = np.meshgrid(np.arange(500) + 0.5, np.arange(560) + 0.5)
-    x, y = transform.a * col + transform.b * row + transform.c, transform.d * col + transform.e * row + transform.f
-    lon, lat = Transformer.from_crs(32632, 4326, always_xy=True).transform(x, y)
-    return _geotiff(path, _ground(np.asarray(lon), np.asarray(lat)).astype(np.float32), "EPSG:32632", transform)
+def _crs_tiff(path: Path, crs: str = "EPSG:32632", pitch: float = 20.0) -> Path:
+    """The same hills on a grid of ``pitch`` in a CRS, tilted to the meridians."""
+    back = Transformer.from_crs(crs, 4326, always_xy=True)
+    lat, lon = MIDDLE.lat_deg, MIDDLE.lon_deg
+    x, y = back.transform(
+        lon + 0.05 * np.array([-1, -1, 1, 1]), lat + 0.04 * np.array([-1, 1, -1, 1]), direction="INVERSE"
+    )
+    transform = from_origin(x.min(), y.max(), pitch, pitch)
+    col, row = np.meshgrid(np.arange(int(np.ptp(x) / pitch)) + 0.5, np.arange(int(np.ptp(y) / pitch)) + 0.5)
+    lon, lat = back.transform(transform.a * col + transform.c, transform.e * row + transform.f)
+    return _geotiff(path, _ground(np.asarray(lon), np.asarray(lat)).astype(np.float32), crs, transform)
 
 
 def _hgt(folder: Path) -> Path:
@@ -102,7 +106,7 @@ WRITERS: dict[str, tuple[Callable[[Path], Path], float]] = {
     "geographic": (lambda folder: _geo_tiff(folder / "t.tif"), 0.05),
     "big-tiff": (lambda folder: _geo_tiff(folder / "t.tif", BIGTIFF="YES"), 0.05),
     "tiled-compressed": (lambda folder: _geo_tiff(folder / "a.dat", tiled=True, compress="deflate"), 0.05),
-    "utm": (lambda folder: _utm_tiff(folder / "t.tif"), 0.05),
+    "utm": (lambda folder: _crs_tiff(folder / "t.tif"), 0.05),
     "hgt": (_hgt, 1.0),  # whole metres, and a coarser pitch
 }
 
@@ -118,6 +122,39 @@ def test_every_format_reads_the_same_ground(kind: str, tmp_path: Path) -> None:
     assert len(terrain.sha256) == 64
     low, _ = terrain.clearance(np.array([-2400.0, 0.0, 2000.0]), np.array([2400.0, 100.0, 2000.0]))
     assert 500.0 < low < 1500.0
+
+
+# Conformal, equal-area, azimuthal about a pole, oblique, in feet on the ground, with heights, and made up for a place.
+SYSTEMS: dict[str, float] = {
+    "EPSG:3857": 30.0,
+    "EPSG:3035": 20.0,
+    "EPSG:3413": 25.0,
+    "EPSG:2056": 20.0,
+    "EPSG:2222": 60.0,
+    "EPSG:32632+5773": 20.0,
+    "EPSG:4979": 1.0 / 3600.0,
+    "+proj=laea +lat_0=46 +lon_0=8 +ellps=bessel +units=m": 20.0,
+}
+
+
+@pytest.mark.parametrize("crs", SYSTEMS)
+def test_any_reference_system(crs: str, tmp_path: Path) -> None:
+    terrain = _read(_crs_tiff(tmp_path / "t.tif", crs, SYSTEMS[crs]), margin=100.0)
+    east, north = np.random.default_rng(3).uniform(-2400.0, 2400.0, (2, 500))
+    lat, lon = to_geo(MIDDLE, east, north)
+    assert terrain.height(east, north) == pytest.approx(_ground(lon, lat), abs=0.1)
+
+
+def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
+    _refused(_crs_tiff(tmp_path / "datum.tif", "EPSG:32632+6360"), "heights in US survey foot: metres are expected")
+    path = _geo_tiff(tmp_path / "unit.tif")
+    for unit, taken in (("ft", False), ("Meters", True), ("m", True)):
+        with rasterio.open(path, "r+") as out:
+            out.units = (unit,)
+        if taken:
+            assert _read(path).heights.size
+        else:
+            _refused(path, "heights in ft: metres are expected")
 
 
 # The tile that matplotlib ships.

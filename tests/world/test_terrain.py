@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
@@ -49,7 +49,6 @@ def test_a_raster_of_the_caller_stays_the_callers() -> None:
     assert terrain.heights[0, 0] == 1.0
 
 
-@settings(deadline=None)
 @given(INSIDE, INSIDE)
 def test_clearance_against_dense_sampling(a: tuple[float, float, float], b: tuple[float, float, float]) -> None:
     start, end = np.array(a), np.array(b)
