@@ -9,7 +9,7 @@ from logs.fits import CLEAR_OF_TURN, straight_span
 from logs.flown import Flown, along_across, approaches
 from logs.measure_slope import SATURATED, measure_ability, steady_rows
 from logs.route_shape import RouteShape
-from logs.rules_slope import GUST_SHARE
+from logs.rules_slope import GUST_SHARE, LEVEL
 from logs.verdict import Finding, make_finding
 from world.wind import W20
 
@@ -21,6 +21,8 @@ PASS = 10.0
 PASS_HEIGHT = 15.0
 # The mean airspeed of a leg may differ from the command by this, m/s.
 OFF_MEAN = 1.0
+# Taking up another slope may put the aircraft this far ahead or behind, m: a short leg is mostly that.
+TAKE_UP = 10.0
 # The time over which a gust lasts, s.
 _GUST_TIME = 10.0
 # A departure: bank beyond this (rad), or airspeed below this; for another aircraft below this share of its slowest
@@ -160,7 +162,7 @@ def _commanded(shape: RouteShape, leg: int, commanded: float) -> tuple[float, fl
 
 
 def _measured(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float, float] | None:
-    """Mean airspeed of a leg, what gusts may add to it, and the least mean over a second, m/s."""
+    """Mean airspeed of a leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
     if not flown.flew(leg):
         return None
     rows = steady_rows(shape, flown, leg)
@@ -173,7 +175,9 @@ def _measured(shape: RouteShape, flown: Flown, leg: int) -> tuple[float, float, 
     width = max(1, min(speed.size, round(1.0 / flown.tick())))
     total = np.concatenate([[0.0], np.cumsum(speed)])
     least = float(((total[width:] - total[:-width]) / width).min())
-    return float(speed.mean()), 2.0 * gust * math.sqrt(min(1.0, 2.0 * _GUST_TIME / max(lasts, 1e-3))), least
+    spread = 2.0 * gust * math.sqrt(min(1.0, 2.0 * _GUST_TIME / max(lasts, 1e-3)))
+    steepened = leg > 0 and abs(float(shape.slopes[leg] - shape.slopes[leg - 1])) > LEVEL
+    return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least
 
 
 def departure_findings(shape: RouteShape, flown: Flown | None) -> list[Finding]:
