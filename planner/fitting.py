@@ -50,7 +50,7 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
     came = np.zeros((count, width), dtype=np.int64)
     cost = np.full(width, np.inf)
     cost[0] = 0.0
-    gauge = make_gauge(rules)
+    gauge, judged = make_gauge(rules), 0
     seen, stamp = np.zeros(rules.threats.shape[0], dtype=np.int64), 0
     least = np.empty(width)
     for i in range(1, count):
@@ -67,6 +67,7 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
                 if least[j] >= after[k]:
                     break
                 least[j] = np.inf
+                judged += 1
                 stamp += 1
                 total = cost[j] + leg_cost(rules, gauge, seen, stamp, candidates[i - 1, j], b)
                 if total < after[k]:
@@ -76,7 +77,7 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
     out = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):
         out[i - 1] = came[i, out[i]]
-    return out, stamp
+    return out, judged
 
 
 @dataclass(frozen=True, slots=True)
