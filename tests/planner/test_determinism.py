@@ -51,9 +51,18 @@ CASES = {
     "NumPy without AVX-512": {"NPY_DISABLE_CPU_FEATURES": FEATURES},
     "NumPy without AVX2": {"NPY_DISABLE_CPU_FEATURES": FEATURES + " AVX2 FMA3"},
     "an older OpenBLAS core": {"OPENBLAS_CORETYPE": "Nehalem"},
+    "a C library without AVX2 and FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"},
 }
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_plan_is_the_same(plain: str, case: str) -> None:
     assert hashes(**CASES[case]) == plain
+
+
+@pytest.mark.skipif(not SOAK, reason="compiles everything for another processor; set PLANFLY_SOAK=1")
+def test_plan_is_the_same_with_kernels_for_any_processor(plain: str, tmp_path: Path) -> None:
+    """Without vectors wider than two numbers, and without fused multiplications."""
+    for features in ({}, {"NUMBA_CPU_FEATURES": ""}):
+        cache = {"NUMBA_CACHE_DIR": str(tmp_path / f"kernels{len(features)}")}
+        assert hashes(NUMBA_CPU_NAME="generic", **features, **cache) == plain
