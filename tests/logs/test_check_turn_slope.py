@@ -268,6 +268,6 @@ def test_a_big_corner_in_a_steep_descent_is_steeper_than_its_legs() -> None:
 
     sharp = of(judge_geometry(make_setup(corner(120.0, -7.0))), "slope", "leg 0")
     assert sharp.ok is False
-    assert "the fly-by arc at waypoint 1" in sharp.reason
+    assert "the arc at waypoint 1" in sharp.reason
     assert judge_geometry(make_setup(corner(30.0, -7.0))).flyable
     assert judge_geometry(make_setup(corner(120.0, -4.0))).flyable
