@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 ROOM_SHARE = 0.05
 ROOM_LENGTH = 20.0
 # No roll from one turn into the next takes more, m: at 60 degrees of bank and 90 m/s over the ground.
-MOST_ROLL = 25.0
+MOST_ROLL = 50.0
 # Shortest leg that a graded judge and the certificate let pass, m.
 LEAST_LEG, CERTIFIED_LEG = 10.0, 5.0
 
