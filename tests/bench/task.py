@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 PROBLEMS = (7, 15, 30, 60)
 # Grids that seed a peer: stages of each, and routes from each.
-GRIDS, ROUTES = (52, 80), 2
+GRIDS, ROUTES = (36, 66, 130), 2
 BEST_KNOWN = Path(__file__).parents[1] / "authorities" / "best_known.json"
 
 
