@@ -170,7 +170,7 @@ def cases(aircraft: Aircraft, make: MakeSetup, seed: int, numbers: Iterable[int]
 
 
 def fly(aircraft: Aircraft, gains: Gains, flown: Iterable[Case]) -> list[Flown]:
-    """Fly each case with these gains, and with a little less bank than flights have: gains shall not lean on the last."""
+    """Fly each case with these gains, and a little less bank than flights have, not to lean on the last of it."""
     module: Any = simulation
     usual = module.BANK_RESERVE
     module.BANK_RESERVE = RESERVE
