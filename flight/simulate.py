@@ -42,7 +42,7 @@ TICK = 1.0 / 60.0
 # Rows that are handed on at a time, s of flight.
 BLOCK = 1.0
 # Bank that guidance may add to the planned turns' to correct an error, rad.
-BANK_RESERVE = math.radians(2.7)
+BANK_RESERVE = math.radians(3.0)
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
 PATIENCE = 1.5
 PATIENCE_SECONDS = 60.0
