@@ -322,7 +322,8 @@ def test_badge(flyable: bool, complete: bool, level: str, findings: tuple[Findin
 def test_numbers_keep_their_value(value: float) -> None:
     text = number(value)
     back = float(text.replace("\u2009", "").replace("−", "-"))
-    assert back == pytest.approx(value, rel=0.006, abs=5.1e-5 if abs(value) < 0.1 else 5.1e-3)
+    half_a_last_digit = 5.1e-5 if abs(value) < 0.01 else 5.1e-4 if abs(value) < 0.1 else 5.1e-3
+    assert back == pytest.approx(value, rel=0.006, abs=half_a_last_digit)
     assert number(value, signed=True).lstrip("+−") == text.lstrip("−")
     assert not text.startswith(("−0.0000", "-"))
     assert text.lstrip("−0.").strip() or not text.startswith("−")
