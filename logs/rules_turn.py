@@ -17,10 +17,10 @@ OVERSHOOT = 5.0
 SETTLED = 1.0
 # What gusts may add to the settled cross-track, m.
 GUST_OFFSET = {"none": 0.0, "light": 0.5, "moderate": 1.0}
-# A flown arc may pass its waypoint closer than the arc at the bank limit by this share, and by this, m; arcs that pass
-# it within that are not measured.
+# A flown arc may pass its waypoint closer than the arc at the bank limit by this share, and by this, m, which is as far
+# as an aircraft may be from its path with good guidance; arcs that pass it within that are not measured.
 CLOSER_SHARE = 0.01
-CLOSER = {"none": 0.2, "light": 0.3, "moderate": 1.0}
+CLOSER = {"none": 0.6, "light": 0.8, "moderate": 1.0}
 # Navigation may be off by this many of its standard deviations.
 _NAV_SIGMAS = 3.0
 # A planned angle is known to this, rad: 1e-7 degrees of latitude on a 130 m leg, and rounding.
