@@ -111,9 +111,13 @@ def _along_path(
     # Flying away from the course counts as flying square to it: the sine would fall again.
     away = abs(off_course) > 0.5 * math.pi
     rate = math.copysign(speed, off_course) if away else speed * math.sin(off_course)
-    push = home + rate_gain * (wanted_rate - (rate - memory[M.ASIDE_RATE]))
+    push = rate_gain * (wanted_rate - (rate - memory[M.ASIDE_RATE]))
     push -= gains[G.CROSS_TRACK_INTEGRAL] * memory[M.CROSS_TRACK_SUM]
     push -= gains[G.SIDE_GAIN] * _unexplained(state, place, gains, memory, speed, crab, dt)
+    # Bank comes late: the correction is asked for ahead of its time.
+    change = (push - memory[M.PUSH]) / gains[G.PUSH_SMOOTHING]
+    memory[M.PUSH] += change * min(dt, gains[G.PUSH_SMOOTHING])
+    push += home + gains[G.PUSH_LEAD] * change
     lift = GRAVITY + memory[M.BEND]
     wanted = math.atan((turn + push) / (lift * crab))
     bank: float = min(memory[M.MAX_BANK], max(-memory[M.MAX_BANK], wanted))
