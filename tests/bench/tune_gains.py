@@ -26,24 +26,26 @@ from flight.trim import linearise, straight
 from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
 from tests.flight.conftest import MakeSetup, setup_maker, standard
 
-# Where the search starts: where those before it, with less of the law, ended.
+# Where the search starts: where those before it ended.  The Aerosonde's turn lead, sideslip gain, side lag and push
+# smoothing were then set by hand, as the search gave up corners in wind for straight legs; its gains stand there,
+# without a round of search since (--rounds 0).
 STARTS = {
     "aerosonde": {
         "cross_track_frequency": 2.2,
         "cross_track_damping": 0.803,
         "cross_track_integral": 0.14,
-        "turn_lead": 0.18,
+        "turn_lead": 0.205,
         "turn_smoothing": 0.2,
         "aside_frequency": 2.54,
         "side_gain": 0.95,
-        "side_lag": 0.071,
+        "side_lag": 0.06,
         "push_lead": 0.092,
-        "push_smoothing": 0.087,
+        "push_smoothing": 0.07,
         "roll_frequency": 9.23,
         "roll_gain": 2.04,
-        "roll_rate_gain": 0.104,
+        "roll_rate_gain": 0.08,
         "roll_disturbance_lag": 0.0269,
-        "aileron_lead": 0.05,
+        "aileron_lead": 0.0385,
         "yaw_rate_gain": 0.325,
         "sideslip_gain": 0.85,
         "height_frequency": 2.3,
@@ -51,9 +53,9 @@ STARTS = {
         "height_integral": 1.11,
         "slope_lead": 0.2,
         "load_lead": 0.13,
-        "pitch_rate_gain": 0.287,
+        "pitch_rate_gain": 0.373,
         "speed_gain": 0.092,
-        "speed_integral": 0.00769,
+        "speed_integral": 0.01,
         "throttle_per_slope": 1.3,
     },
     "c172x": {
