@@ -34,7 +34,8 @@ class Gains:
     aileron_per_roll_acceleration, rudder_per_yaw_rate (without sideslip); side_per_sideslip, side_per_aileron: sideways
     acceleration, m/s^2 a rad.
     side_gain, side_lag: how much of the sideways acceleration that bank and ailerons do not explain is answered, and
-    its lag.  sideslip_max: skid where the bank ends.
+    its lag.  push_lead, push_smoothing: how far ahead a correction is asked for, as the bank comes late, by its rate of
+    change, and over how long that is smoothed.  sideslip_max: skid where the bank ends.
 
     The rivals' have defaults.  l1_*: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
     field_approach: course to the path far from it.  field_path, field_orbit: how the vector field closes in on a line
@@ -90,6 +91,8 @@ class Gains:
     arc_slowing_time: float = 4.0
     arc_slowing_max: float = 0.0
     aside_frequency: float = 1.0
+    push_lead: float = 0.0
+    push_smoothing: float = 0.1
 
     def packed(self) -> Floats:
         """(g,) the fields in order."""

@@ -54,6 +54,8 @@ class G(IntEnum):
     ARC_SLOWING_TIME = 45
     ARC_SLOWING_MAX = 46
     ASIDE_FREQUENCY = 47
+    PUSH_LEAD = 48
+    PUSH_SMOOTHING = 49
 
 
 class Lateral(IntEnum):
@@ -103,6 +105,7 @@ class M(IntEnum):
     PATH_BANK_RATE = 34
     ASIDE = 35  # m right of the path and m/s, where that roll takes it
     ASIDE_RATE = 36
+    PUSH = 37  # m/s^2 to the right that corrects errors, smoothed
     ARC_SPEED = 32  # m/s over the ground, of the sharpest arc near ahead; 0 for no limit
 
 

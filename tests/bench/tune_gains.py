@@ -23,61 +23,67 @@ from flight.gains import Gains, load_gains
 from flight.setup import FlightSetup
 from flight.simulate import Flown, simulate
 from flight.trim import linearise, straight
-from tests.bench.flight import Errors, errors_of, flown_with
+from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
 from tests.flight.conftest import MakeSetup, setup_maker, standard
 
-# Where the search starts, set by hand: the Aerosonde's, and of an aircraft whose modes are a third as fast.
+# Where the search starts: where those before it ended.  The Aerosonde's turn lead, sideslip gain, side lag and push
+# smoothing were then set by hand, as the search gave up corners in wind for straight legs; its gains stand there,
+# without a round of search since (--rounds 0).
 STARTS = {
     "aerosonde": {
         "cross_track_frequency": 2.2,
-        "cross_track_damping": 1.2,
-        "cross_track_integral": 0.4,
-        "turn_lead": 0.2,
-        "turn_smoothing": 0.3,
-        "aside_frequency": 1.5,
+        "cross_track_damping": 0.803,
+        "cross_track_integral": 0.14,
+        "turn_lead": 0.205,
+        "turn_smoothing": 0.2,
+        "aside_frequency": 2.54,
         "side_gain": 0.95,
-        "side_lag": 0.12,
-        "roll_frequency": 12.0,
-        "roll_gain": 1.77,
+        "side_lag": 0.06,
+        "push_lead": 0.092,
+        "push_smoothing": 0.07,
+        "roll_frequency": 9.23,
+        "roll_gain": 2.04,
         "roll_rate_gain": 0.08,
-        "roll_disturbance_lag": 0.1,
-        "aileron_lead": 0.05,
-        "yaw_rate_gain": 0.25,
-        "sideslip_gain": 1.2,
-        "height_frequency": 2.0,
-        "height_damping": 1.3,
-        "height_integral": 0.3,
+        "roll_disturbance_lag": 0.0269,
+        "aileron_lead": 0.0385,
+        "yaw_rate_gain": 0.325,
+        "sideslip_gain": 0.85,
+        "height_frequency": 2.3,
+        "height_damping": 1.49,
+        "height_integral": 1.11,
         "slope_lead": 0.2,
-        "load_lead": 0.15,
-        "pitch_rate_gain": 0.17,
-        "speed_gain": 0.08,
+        "load_lead": 0.13,
+        "pitch_rate_gain": 0.373,
+        "speed_gain": 0.092,
         "speed_integral": 0.01,
-        "throttle_per_slope": 1.5,
+        "throttle_per_slope": 1.3,
     },
     "c172x": {
         "cross_track_frequency": 0.9,
-        "cross_track_damping": 1.2,
-        "cross_track_integral": 0.05,
+        "cross_track_damping": 0.923,
+        "cross_track_integral": 0.065,
         "turn_lead": 0.35,
-        "turn_smoothing": 0.5,
-        "aside_frequency": 0.8,
-        "side_gain": 0.6,
-        "side_lag": 0.3,
+        "turn_smoothing": 0.65,
+        "aside_frequency": 0.615,
+        "side_gain": 0.601,
+        "side_lag": 0.178,
+        "push_lead": 0.1,
+        "push_smoothing": 0.15,
         "roll_frequency": 6.0,
-        "roll_gain": 1.2,
-        "roll_rate_gain": 0.15,
-        "roll_disturbance_lag": 0.3,
+        "roll_gain": 2.03,
+        "roll_rate_gain": 0.172,
+        "roll_disturbance_lag": 0.178,
         "aileron_lead": 0.02,
-        "yaw_rate_gain": 0.3,
-        "sideslip_gain": 0.3,
-        "height_frequency": 1.4,
-        "height_damping": 1.2,
-        "height_integral": 0.12,
-        "slope_lead": 0.4,
-        "load_lead": 0.1,
-        "pitch_rate_gain": 0.35,
-        "speed_gain": 0.06,
-        "speed_integral": 0.006,
+        "yaw_rate_gain": 0.507,
+        "sideslip_gain": 0.507,
+        "height_frequency": 1.82,
+        "height_damping": 2.03,
+        "height_integral": 0.104,
+        "slope_lead": 0.308,
+        "load_lead": 0.115,
+        "pitch_rate_gain": 0.455,
+        "speed_gain": 0.101,
+        "speed_integral": 0.0069,
         "throttle_per_slope": 2.4,
     },
 }
@@ -87,8 +93,11 @@ TRAINED, REPORTED = {"aerosonde": range(8), "c172x": range(4)}, range(1000, 1020
 FIRST_STEP = 1.3
 # Steepest climb and dive in calm air, in those that the aircraft can.
 SLOPES = (0.5, 0.6)
-# What a figure counts as one: the issue's aims in wind, of the cross-track's RMS in calm air.
-SCALES = (0.05, 0.6, 0.2, 0.8)
+# What a figure counts as one: the issue's aims in wind, of the cross-track's RMS in calm air; and, of the aircraft that
+# the aims are for, of its largest too.
+SCALES = {"aerosonde": (0.05, 0.4, 0.2, 0.8), "c172x": (0.05, 0.6, 0.2, 0.8)}
+# What the cross-track's RMS on straight legs counts as one, m, and how far from corners, m, at 25 m/s.
+STRAIGHT, CLEAR = 0.02, 250.0
 # Weights of the surfaces' mean rate as a share of what they can, and of each degree of bank beyond the command's limit.
 EFFORT, BEYOND = 0.5, 0.2
 FAILED = 1000.0
@@ -181,18 +190,21 @@ def fly(aircraft: Aircraft, gains: Gains, flown: Iterable[Case]) -> list[Flown]:
         module.BANK_RESERVE = usual
 
 
-def cost(aircraft: Aircraft, found: Iterable[Flown]) -> float:
+def cost(aircraft: Aircraft, found: Iterable[tuple[Case, Flown]]) -> float:
     """Mean of what the flights cost and what the worst of them does; `FAILED` for one that fails.
 
-    A flight costs its errors in units of their aims, its surfaces' rates, and its bank beyond the command's limit.
+    A flight costs its errors in units of their aims, those on straight legs once more, its surfaces' rates, and its
+    bank beyond the command's limit.
     """
     costs = []
-    for flown in found:
+    clear = CLEAR * (aircraft.airspeed / 25.0) ** 2
+    for case, flown in found:
         errors = errors_of(flown)
         if not errors.completed:
             return FAILED
         values = (errors.cross_rms, errors.cross_max, errors.height_rms, errors.height_max)
-        one = sum(value / scale for value, scale in zip(values, SCALES, strict=True))
+        one = sum(value / scale for value, scale in zip(values, SCALES[aircraft.name], strict=True))
+        one += straight_rms(case.setup, flown, clear) / STRAIGHT
         track = flown.track
         rates = np.diff(track.commands[:, :3].astype(np.float64), axis=0) / float(track.time[1] - track.time[0])
         one += EFFORT * math.sqrt(float((rates**2).mean())) / aircraft.surface_rate
@@ -209,7 +221,7 @@ def rounded(gains: Gains) -> Gains:
 def search(aircraft: Aircraft, gains: Gains, trained: Sequence[Case], rounds: int, seed: int) -> Gains:
     """Change one gain at a time, in a seeded order, by a factor that shrinks where neither way helps."""
     best = rounded(gains)
-    lowest = cost(aircraft, fly(aircraft, best, trained))
+    lowest = cost(aircraft, zip(trained, fly(aircraft, best, trained), strict=True))
     print(f"start: {lowest:.4f}", flush=True)
     steps = dict.fromkeys(SEARCHED, FIRST_STEP)
     random = np.random.default_rng([seed, 1])
@@ -217,7 +229,7 @@ def search(aircraft: Aircraft, gains: Gains, trained: Sequence[Case], rounds: in
         for name in random.permutation(SEARCHED).tolist():
             for factor in (steps[name], 1.0 / steps[name]):
                 tried = rounded(replace(best, **{name: getattr(best, name) * factor}))
-                found = cost(aircraft, fly(aircraft, tried, trained))
+                found = cost(aircraft, zip(trained, fly(aircraft, tried, trained), strict=True))
                 if found < 0.999 * lowest:
                     best, lowest = tried, found
                     # The way that helped comes first the next time.
