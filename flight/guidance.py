@@ -116,7 +116,7 @@ def _along_path(
     push = rate_gain * (wanted_rate - (rate - memory[M.ASIDE_RATE]))
     push -= gains[G.CROSS_TRACK_INTEGRAL] * memory[M.CROSS_TRACK_SUM]
     push -= gains[G.SIDE_GAIN] * _unexplained(state, place, gains, memory, speed, crab, dt)
-    # Bank comes late: the correction is asked for ahead of its time.  A longer tick itself comes late, and with the whole
+    # Bank comes late: the correction is asked for ahead of its time.  A longer tick itself comes late: with the whole
     # lead the aircraft would roll to and fro (45 degrees of bank at 30 Hz in moderate turbulence).
     change = (push - memory[M.PUSH]) / gains[G.PUSH_SMOOTHING]
     memory[M.PUSH] += change * min(dt, gains[G.PUSH_SMOOTHING])
