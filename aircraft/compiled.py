@@ -43,7 +43,9 @@ def _load_array_functions() -> None:
     one answer: SciPy is a dependency.  Kernels that do call linear algebra ask again.
     """
     linalg: Any = importlib.import_module("numba.np.linalg")
-    ask = linalg.ensure_blas
+    ask = getattr(linalg, "ensure_blas", None)
+    if ask is None:  # another numba, which loads them in its own way
+        return
     linalg.ensure_blas = lambda: None
     try:
         arraymath: Any = importlib.import_module("numba.np.arraymath")

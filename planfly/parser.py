@@ -227,7 +227,10 @@ def _add_replay_and_recover(command: _Command) -> None:
     )
     replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
     replay.add_argument(
-        "--speed", metavar="X", type=positive, help="at X times real time (default: 1 on a terminal, else at once)"
+        "--speed",
+        metavar="X",
+        type=positive,
+        help="at X times real time (default: 1 on a terminal and into Foxglove; a film of 20 s; else at once)",
     )
     replay.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
     replay.add_argument("--from", dest="start", metavar="S", type=moment, help="from this time of the flight, s")
