@@ -26,9 +26,9 @@ from flight.trim import linearise, straight
 from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
 from tests.flight.conftest import MakeSetup, setup_maker, standard
 
-# Where the search starts: where those before it ended, but for the Aerosonde's turn lead, sideslip gain, side lag and
-# push smoothing, which were set by hand with the standard mission and some of the bench's winds in view.  The last
-# search (--rounds 1) then moved three of those four, and seven others.
+# Where the search starts: where those before it ended.  The Aerosonde's turn lead, sideslip gain, side lag and push
+# smoothing were then set by hand, as the search gave up corners in wind for straight legs; its gains stand there,
+# without a round of search since (--rounds 0).
 STARTS = {
     "aerosonde": {
         "cross_track_frequency": 2.2,

@@ -15,7 +15,7 @@ def test_calm() -> None:
     assert found.completed
     assert found.cross_rms <= 0.05
     assert found.height_rms <= 0.03
-    assert found.cross_max <= 0.6
+    assert found.cross_max <= 0.4
     assert found.height_max <= 0.2
 
 
@@ -24,7 +24,7 @@ def test_bank_stays_clear_of_the_verdicts_limit() -> None:
     found = [bench.calm(), *bench.steady(range(20 if SOAK else 2))]
     assert all(item.completed for item in found)
     assert max(item.peak_bank for item in found) <= 34.0
-    assert float(np.percentile([item.cross_max for item in found], 95)) <= 0.6
+    assert float(np.percentile([item.cross_max for item in found], 95)) <= 0.4
 
 
 def test_wind_and_moderate_turbulence() -> None:
@@ -32,7 +32,7 @@ def test_wind_and_moderate_turbulence() -> None:
     assert all(item.completed for item in found)
     assert float(np.median([item.cross_rms for item in found])) <= 0.10
     assert float(np.median([item.height_rms for item in found])) <= 0.20
-    assert float(np.percentile([item.cross_max for item in found], 95)) <= 0.8
+    assert float(np.percentile([item.cross_max for item in found], 95)) <= 0.6
     assert float(np.percentile([item.height_max for item in found], 95)) <= 0.8
 
 
@@ -48,7 +48,7 @@ def test_thirty_hertz_in_turbulence() -> None:
 def test_any_wind() -> None:
     found = bench.anywhere(range(100 if SOAK else 4))
     assert all(item.completed for item in found)
-    assert float(np.percentile([item.worst for item in found], 95)) <= 1.0
+    assert float(np.percentile([item.worst for item in found], 95)) <= 0.8
 
 
 def test_an_aircraft_that_differs_from_its_model() -> None:
