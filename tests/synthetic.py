@@ -185,17 +185,17 @@ def fly_path(
     return Track(
         time=ticks,
         position=position,
-        velocity=velocity,  # type: ignore[arg-type]
+        velocity=velocity,  # type: ignore[arg-type]  # Track gives each array its own type
         attitude=np.stack([at(bank), at(slopes), heading], axis=1),
         rates=np.zeros((count, 3), dtype=np.float32),
-        airspeed=at(speed),  # type: ignore[arg-type]
+        airspeed=at(speed),  # type: ignore[arg-type]  # Track gives each array its own type
         flow=np.zeros((count, 2), dtype=np.float32),
-        controls=controls,  # type: ignore[arg-type]
-        commands=controls,  # type: ignore[arg-type]
+        controls=controls,  # type: ignore[arg-type]  # Track gives each array its own type
+        commands=controls,  # type: ignore[arg-type]  # Track gives each array its own type
         wind=np.stack([at(wind[:, 0]), at(wind[:, 1]), np.zeros(count)], axis=1),
         load_factor=np.ones(count, dtype=np.float32),
         current=np.full(count, power / 44.4, dtype=np.float32),
-        energy=ticks * power / 3600.0,  # type: ignore[arg-type]
+        energy=ticks * power / 3600.0,  # type: ignore[arg-type]  # Track gives each array its own type
         leg=np.zeros(count, dtype=np.int32),
         cross_track=np.zeros(count, dtype=np.float32),
         height_error=np.zeros(count, dtype=np.float32),

@@ -34,7 +34,7 @@ def test_aerosonde_comes_in_si_and_radians() -> None:
 
 def test_aircraft_is_frozen() -> None:
     with pytest.raises(FrozenInstanceError):
-        load_aircraft("aerosonde").mass = 1.0  # type: ignore[misc]
+        load_aircraft("aerosonde").mass = 1.0  # type: ignore[misc]  # frozen: that is the test
 
 
 def test_limits_of_the_metadata_are_those_of_the_model() -> None:

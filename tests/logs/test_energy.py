@@ -24,7 +24,7 @@ ROUTE = [[0, 0, 500], [0, 3000, 500], [2000, 5000, 800], [2000, 8000, 500]]
 
 
 def real_setup(**changes: object) -> FlightSetup:
-    return replace(make_setup(ROUTE, table=load_envelope(AEROSONDE)), **changes)  # type: ignore[arg-type]
+    return replace(make_setup(ROUTE, table=load_envelope(AEROSONDE)), **changes)  # type: ignore[arg-type]  # fields by name
 
 
 @pytest.mark.parametrize("airspeed", [20.0, 25.0, 29.0])
