@@ -17,8 +17,12 @@ from world.errors import MissionError
 
 # Most items that an upload may announce: bounds what a station can make the vehicle hold (some 2 MB a list).
 MOST_UPLOADED = 5_000
-# A lost request is sent again after this long, s.
-RETRY = 0.05
+# A lost request is sent again after the first of these, then after twice as long each time, up to the second, s.
+# A station that is only slow counts every request for one item and may give up: MAVSDK does at the sixth.
+RETRY, SLOWEST_RETRY = 0.05, 0.2
+# A station whose last ACK was lost may be silent and wait for it: its last item is asked for again so often, so long
+# apart (s), until it says something else.  One that has the ACK ignores the request.
+CONFIRMATIONS, CONFIRM = 6, 0.3
 # After this silence another station may take over; after the longer one the upload is given up, s.
 LOCK, PATIENCE = 1.0, 8.0
 
@@ -56,7 +60,18 @@ class _Upload:
     count: int
     heard: float
     asked: float
+    wait: float = RETRY
     items: list[MissionItem] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Finished:
+    """An upload that was accepted; ``left``: how often its last item may still be asked for."""
+
+    station: Station
+    count: int
+    asked: float
+    left: int = CONFIRMATIONS
 
 
 @dataclass(slots=True)
@@ -71,8 +86,8 @@ class MissionServer:
     changed: set[MissionType] = field(default_factory=set)
     locked: str = ""
     _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
-    # Who finished which list last, and with how many items: its final ACK is repeated if it asks.
-    _finished: dict[MissionType, tuple[Station, int]] = field(default_factory=dict)
+    # Who finished which list last: its final ACK is repeated if its last item comes again.
+    _finished: dict[MissionType, _Finished] = field(default_factory=dict)
 
     def handle(self, message: Any, station: Station, now: float) -> list[Reply]:
         """Answer a message of the protocol; any other gets nothing.  ``now``: s, any clock that never goes back."""
@@ -85,10 +100,14 @@ class MissionServer:
                 return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, int(message.mission_type))]
             return []
         handler = _HANDLERS.get(message.get_type())
-        return handler(self, message, station, kind, now) if handler else []
+        if handler is None:
+            return []
+        if message.get_type() != "MISSION_ITEM_INT":
+            self._moved_on(station)
+        return handler(self, message, station, kind, now)
 
     def tick(self, now: float) -> list[Reply]:
-        """Ask again for what did not come; give up uploads that have gone silent."""
+        """Ask again for what did not come, or may not have arrived; give up uploads that have gone silent."""
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.heard > PATIENCE:
@@ -97,8 +116,14 @@ class MissionServer:
                     f"{_NAMES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
                 )
                 replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, words))
-            elif now - upload.asked >= RETRY:
+            elif now - upload.asked >= upload.wait:
+                upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
                 replies.append(self._request(upload, kind, now))
+        for kind, done in self._finished.items():
+            if done.left > 0 and now - done.asked >= CONFIRM:
+                done.left -= 1
+                done.asked = now
+                replies.append(_request(done.station, done.count - 1, kind))
         return replies
 
     @property
@@ -126,7 +151,7 @@ class MissionServer:
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
-            if done == (station, message.seq + 1):
+            if done is not None and (done.station, done.count) == (station, message.seq + 1):
                 # Its last item again: the ACK was lost.
                 return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
             return []
@@ -142,12 +167,13 @@ class MissionServer:
         if wrong:
             return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
         upload.items.append(item)
+        upload.wait = RETRY
         if len(upload.items) < upload.count:
             return [self._request(upload, kind, now)]
         del self._uploads[kind]
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
-        self._finished[kind] = (station, upload.count)
+        self._finished[kind] = _Finished(station, upload.count, now)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
 
     def _float_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
@@ -199,6 +225,12 @@ class MissionServer:
             del self._uploads[kind]
         return []
 
+    def _moved_on(self, station: Station) -> None:
+        """Ask a station that speaks of something else for nothing that is finished."""
+        for done in self._finished.values():
+            if done.station == station:
+                done.left = 0
+
     def _refusal(self, station: Station, kind: MissionType, now: float) -> str:
         if self.locked and kind == MissionType.MISSION:
             return self.locked
@@ -213,10 +245,7 @@ class MissionServer:
 
     def _request(self, upload: _Upload, kind: MissionType, now: float) -> Reply:
         upload.asked = now
-        who = upload.station
-        return Reply(
-            who, mavlink.MAVLink_mission_request_int_message(who.system, who.component, len(upload.items), int(kind))
-        )
+        return _request(upload.station, len(upload.items), kind)
 
     def _fail(self, upload: _Upload, kind: MissionType, result: int, words: str) -> Reply:
         del self._uploads[kind]
@@ -225,6 +254,11 @@ class MissionServer:
     def _ack(self, station: Station, result: int, kind: int, words: str = "") -> Reply:
         message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(kind))
         return Reply(station, message, words)
+
+
+def _request(station: Station, seq: int, kind: MissionType) -> Reply:
+    message = mavlink.MAVLink_mission_request_int_message(station.system, station.component, seq, int(kind))
+    return Reply(station, message)
 
 
 def _misplaced(item: MissionItem, kind: MissionType) -> str:

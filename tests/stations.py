@@ -32,18 +32,23 @@ def many_items(count: int, mark: int = 0) -> list[Any]:
 
 @dataclass
 class Uploader:
-    """The station's side of an upload: sends again what is not answered within ``patience`` s."""
+    """The station's side of an upload: sends again what is not answered within ``patience`` s.
+
+    ``waits``: sends only its MISSION_COUNT again, and waits to be asked for the rest, as MAVSDK does.
+    """
 
     station: Station
     items: list[Any]
     kind: int = 0
     patience: float = 0.05
+    waits: bool = False
     result: int | None = None
     _last: Any = None
     _sent: float = -math.inf
+    _asked: bool = False
 
     def tick(self, now: float) -> list[Any]:
-        if self.result is not None or now - self._sent < self.patience:
+        if self.result is not None or now - self._sent < self.patience or (self.waits and self._asked):
             return []
         self._sent = now
         if self._last is None:
@@ -56,7 +61,7 @@ class Uploader:
         if message.get_type() == "MISSION_ACK":
             self.result = message.type
         elif message.get_type() == "MISSION_REQUEST_INT":
-            self._last, self._sent = self.items[message.seq], now
+            self._last, self._sent, self._asked = self.items[message.seq], now, True
             return [self._last]
         return []
 

@@ -6,6 +6,7 @@ this process, hence a process of its own.
 
 import json
 import os
+import random
 import socket
 import sys
 import threading
@@ -29,8 +30,9 @@ def beat(port: int, stop: threading.Event) -> None:
 
 def main() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
+        # Below the ports that systems hand out, one of which another test could be given in between.
+        port = random.SystemRandom().randrange(10_000, 30_000)
+        free.bind(("127.0.0.1", port))
     sdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     print(sdk.add_any_connection(f"udpin://127.0.0.1:{port}"), file=sys.stderr)
     stop = threading.Event()

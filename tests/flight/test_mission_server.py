@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.mavlink_items import MissionType
-from flight.mission_server import LOCK, MOST_UPLOADED, PATIENCE, MissionServer, Station
+from flight.mission_server import CONFIRMATIONS, LOCK, MOST_UPLOADED, PATIENCE, MissionServer, Station
 from tests.stations import Medium, Uploader, decode, item, many_items
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
@@ -105,6 +105,35 @@ def test_the_final_ack_is_repeated() -> None:
     assert [reply.message.type for reply in again] == [mavlink.MAV_MISSION_ACCEPTED]
     assert send(server, items[-1], TWO, 6.0) == []
     assert send(server, items[0], ONE, 6.0) == []
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_station_that_only_waits_hears_of_the_end(seed: int) -> None:
+    """MAVSDK sends no item twice unasked: with its ACK lost it would wait, and give up after 2.5 s."""
+    server, items = MissionServer(), many_items(10)
+    one = Uploader(ONE, items, patience=0.5, waits=True)
+    Medium(server, [one], 0.1, 0.0, (0.001, 0.02), seed).run(20.0)
+    assert one.result == mavlink.MAV_MISSION_ACCEPTED
+    assert held(server) == wanted(items)
+
+
+def test_a_station_that_moved_on_is_asked_for_nothing() -> None:
+    server = MissionServer()
+    Medium(server, [Uploader(ONE, many_items(3))]).run(5.0)
+    assert [(reply.message.get_type(), reply.message.seq) for reply in server.tick(6.0)] == [("MISSION_REQUEST_INT", 2)]
+    assert server.tick(6.1) == []
+    send(server, mavlink.MAVLink_mission_request_list_message(1, 1, 0), ONE, 6.2)
+    assert server.tick(9.0) == []
+    Medium(server, [Uploader(ONE, many_items(3))], now=10.0).run(15.0)
+    asked = [len(server.tick(20.0 + k)) for k in range(9)]
+    assert asked == [1] * CONFIRMATIONS + [0] * (9 - CONFIRMATIONS)
+
+
+def test_a_slow_station_is_not_pressed() -> None:
+    """A stall of half a second brings fewer requests than MAVSDK counts before it gives up."""
+    server = MissionServer()
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 3, 0), ONE, 0.0)
+    assert 2 <= sum(len(server.tick(0.005 * k)) for k in range(101)) <= 4
 
 
 @pytest.mark.parametrize(
