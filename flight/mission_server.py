@@ -17,12 +17,15 @@ from world.errors import MissionError
 
 # Most items that an upload may announce: bounds what a station can make the vehicle hold (some 2 MB a list).
 MOST_UPLOADED = 5_000
-# A lost request is sent again after the first of these, then after twice as long each time, up to the second, s.
-# A station that is only slow counts every request for one item and may give up: MAVSDK does at the sixth.
-RETRY, SLOWEST_RETRY = 0.05, 0.2
-# A station whose last ACK was lost may be silent and wait for it: its last item is asked for again so often, so long
-# apart (s), until it says something else.  One that has the ACK ignores the request.
-CONFIRMATIONS, CONFIRM = 6, 0.3
+# A request is sent again after `RETRY` s, or half as long again as the item before took, then after twice as long each
+# time, up to `SLOWEST_RETRY`.  A station that is only slow counts them: MAVSDK gives up at the sixth for an item.
+RETRY, SLOWEST_RETRY = 0.05, 0.4
+# An upload's last ACK may be lost, and the station wait for it in silence, as MAVSDK does for five times 0.5 s.  Where
+# other messages of the upload were lost, its last item is asked for again so often, this long apart (s), until it says
+# something else.  Not on a good link: who has the ACK has no use for it, and MAVSDK takes it for its next upload's.
+CONFIRMATIONS, CONFIRM = 4, 0.4
+# A last item that comes twice within this time is a duplicate and gets no ACK again: that would end the next upload, s.
+ACK_AGAIN = 0.3
 # After this silence another station may take over; after the longer one the upload is given up, s.
 LOCK, PATIENCE = 1.0, 8.0
 
@@ -54,24 +57,35 @@ class Reply:
 
 @dataclass(slots=True)
 class _Upload:
-    """An upload in progress."""
+    """An upload in progress.
+
+    heard: when it last sent something; first_asked, asked: when the item that is due was first and last asked for, s of
+    the caller's clock.  wait: how long to wait for it, s.  repeated: whether any request had to be sent again.
+    """
 
     station: Station
     count: int
     heard: float
     asked: float
+    first_asked: float
     wait: float = RETRY
+    repeated: bool = False
     items: list[MissionItem] = field(default_factory=list)
 
 
 @dataclass(slots=True)
 class _Finished:
-    """An upload that was accepted; ``left``: how often its last item may still be asked for."""
+    """An upload that was accepted.
+
+    asked, acknowledged: when its last item was last asked for, and its ACK last sent, s.  left: how often the item may
+    still be asked for.
+    """
 
     station: Station
     count: int
     asked: float
-    left: int = CONFIRMATIONS
+    acknowledged: float
+    left: int
 
 
 @dataclass(slots=True)
@@ -91,6 +105,8 @@ class MissionServer:
 
     def handle(self, message: Any, station: Station, now: float) -> list[Reply]:
         """Answer a message of the protocol; any other gets nothing.  ``now``: s, any clock that never goes back."""
+        if message.get_type() in _HANDLERS and message.get_type() != "MISSION_ITEM_INT":
+            self._moved_on(station)
         try:
             kind = MissionType(getattr(message, "mission_type", 0))
         except ValueError:
@@ -100,11 +116,7 @@ class MissionServer:
                 return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, int(message.mission_type))]
             return []
         handler = _HANDLERS.get(message.get_type())
-        if handler is None:
-            return []
-        if message.get_type() != "MISSION_ITEM_INT":
-            self._moved_on(station)
-        return handler(self, message, station, kind, now)
+        return handler(self, message, station, kind, now) if handler else []
 
     def tick(self, now: float) -> list[Reply]:
         """Ask again for what did not come, or may not have arrived; give up uploads that have gone silent."""
@@ -118,6 +130,7 @@ class MissionServer:
                 replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, words))
             elif now - upload.asked >= upload.wait:
                 upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
+                upload.repeated = True
                 replies.append(self._request(upload, kind, now))
         for kind, done in self._finished.items():
             if done.left > 0 and now - done.asked >= CONFIRM:
@@ -143,7 +156,7 @@ class MissionServer:
         if count == 0:
             return self._clear(station, (kind,), kind, now)
         # A count always starts anew: a station that starts over with as many items must not have them mixed.
-        upload = self._uploads[kind] = _Upload(station, count, now, now)
+        upload = self._uploads[kind] = _Upload(station, count, now, now, now)
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]
 
@@ -151,8 +164,10 @@ class MissionServer:
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
-            if done is not None and (done.station, done.count) == (station, message.seq + 1):
+            known = done is not None and (done.station, done.count) == (station, message.seq + 1)
+            if done is not None and known and now - done.acknowledged >= ACK_AGAIN:
                 # Its last item again: the ACK was lost.
+                done.acknowledged = now
                 return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
             return []
         upload.heard = now
@@ -167,13 +182,14 @@ class MissionServer:
         if wrong:
             return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
         upload.items.append(item)
-        upload.wait = RETRY
+        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
+        upload.first_asked = now
         if len(upload.items) < upload.count:
             return [self._request(upload, kind, now)]
         del self._uploads[kind]
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
-        self._finished[kind] = _Finished(station, upload.count, now)
+        self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
 
     def _float_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:

@@ -34,26 +34,37 @@ def many_items(count: int, mark: int = 0) -> list[Any]:
 class Uploader:
     """The station's side of an upload: sends again what is not answered within ``patience`` s.
 
-    ``waits``: sends only its MISSION_COUNT again, and waits to be asked for the rest, as MAVSDK does.
+    ``mavsdk``: sends only its MISSION_COUNT again, and waits to be asked for the rest, as MAVSDK does: when it has sent
+    an item, or waited for 0.5 s, five times, it gives up (result -1).
     """
 
     station: Station
     items: list[Any]
     kind: int = 0
     patience: float = 0.05
-    waits: bool = False
+    mavsdk: bool = False
     result: int | None = None
     _last: Any = None
     _sent: float = -math.inf
     _asked: bool = False
+    _next: int = 0
+    _tries: int = 0
 
     def tick(self, now: float) -> list[Any]:
-        if self.result is not None or now - self._sent < self.patience or (self.waits and self._asked):
+        if self.result is not None or now - self._sent < self.patience:
             return []
         self._sent = now
+        if self.mavsdk and self._asked:
+            self._try_again()
+            return []
         if self._last is None:
             self._last = mavlink.MAVLink_mission_count_message(1, 1, len(self.items), self.kind)
         return [self._last]
+
+    def _try_again(self) -> bool:
+        self._tries += 1
+        self.result = -1 if self._tries > 5 else None
+        return self.result is None
 
     def hear(self, message: Any, now: float) -> list[Any]:
         if self.result is not None or message.mission_type != self.kind:
@@ -61,7 +72,15 @@ class Uploader:
         if message.get_type() == "MISSION_ACK":
             self.result = message.type
         elif message.get_type() == "MISSION_REQUEST_INT":
-            self._last, self._sent, self._asked = self.items[message.seq], now, True
+            if self.mavsdk:
+                if message.seq > self._next:
+                    return []
+                if message.seq == self._next:
+                    self._tries = 1
+                elif not self._try_again():
+                    return []
+                self._next, self._asked = message.seq + 1, True
+            self._last, self._sent = self.items[message.seq], now
             return [self._last]
         return []
 

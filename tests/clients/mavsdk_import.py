@@ -31,8 +31,13 @@ def beat(port: int, stop: threading.Event) -> None:
 def main() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         # Below the ports that systems hand out, one of which another test could be given in between.
-        port = random.SystemRandom().randrange(10_000, 30_000)
-        free.bind(("127.0.0.1", port))
+        while True:
+            port = random.SystemRandom().randrange(10_000, 30_000)
+            try:
+                free.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            break
     sdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
     print(sdk.add_any_connection(f"udpin://127.0.0.1:{port}"), file=sys.stderr)
     stop = threading.Event()

@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.mavlink_items import MissionType
-from flight.mission_server import CONFIRMATIONS, LOCK, MOST_UPLOADED, PATIENCE, MissionServer, Station
+from flight.mission_server import CONFIRM, CONFIRMATIONS, LOCK, MOST_UPLOADED, PATIENCE, MissionServer, Station
 from tests.stations import Medium, Uploader, decode, item, many_items
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
@@ -109,31 +109,74 @@ def test_the_final_ack_is_repeated() -> None:
 
 @pytest.mark.parametrize("seed", range(200))
 def test_a_station_that_only_waits_hears_of_the_end(seed: int) -> None:
-    """MAVSDK sends no item twice unasked: with its ACK lost it would wait, and give up after 2.5 s."""
-    server, items = MissionServer(), many_items(10)
-    one = Uploader(ONE, items, patience=0.5, waits=True)
-    Medium(server, [one], 0.1, 0.0, (0.001, 0.02), seed).run(20.0)
+    """MAVSDK sends no item twice unasked: with its ACK lost it waits, and gives up after 2.5 s."""
+    server, items = MissionServer(), many_items(40)
+    one = Uploader(ONE, items, patience=0.5, mavsdk=True)
+    Medium(server, [one], 0.1, 0.0, (0.001, 0.02), seed).run(60.0)
     assert one.result == mavlink.MAV_MISSION_ACCEPTED
     assert held(server) == wanted(items)
 
 
-def test_a_station_that_moved_on_is_asked_for_nothing() -> None:
-    server = MissionServer()
-    Medium(server, [Uploader(ONE, many_items(3))]).run(5.0)
-    assert [(reply.message.get_type(), reply.message.seq) for reply in server.tick(6.0)] == [("MISSION_REQUEST_INT", 2)]
-    assert server.tick(6.1) == []
-    send(server, mavlink.MAVLink_mission_request_list_message(1, 1, 0), ONE, 6.2)
-    assert server.tick(9.0) == []
-    Medium(server, [Uploader(ONE, many_items(3))], now=10.0).run(15.0)
-    asked = [len(server.tick(20.0 + k)) for k in range(9)]
-    assert asked == [1] * CONFIRMATIONS + [0] * (9 - CONFIRMATIONS)
+def upload(server: MissionServer, items: list, now: float, *, late: float = 0.0) -> None:
+    """Send a whole upload, each item so long after it was asked for."""
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, len(items), 0), ONE, now)
+    for one in items:
+        asked = now
+        while now < asked + late:
+            now += 0.005
+            server.tick(now)
+        send(server, one, ONE, now)
+
+
+def confirmations(server: MissionServer, now: float) -> int:
+    return sum(len(server.tick(now + 0.005 * k)) for k in range(1, 1000))
+
+
+def test_only_a_station_on_a_bad_link_that_is_silent_is_asked_again() -> None:
+    server, items = MissionServer(), many_items(3)
+    upload(server, items, 0.0)
+    assert confirmations(server, 0.0) == 0
+    upload(server, items, 10.0, late=0.06)
+    assert [reply.message.seq for reply in server.tick(11.0)] == [2]
+    assert server.tick(11.1) == []
+    send(server, mavlink.MAVLink_mission_request_list_message(1, 1, 0), ONE, 11.2)
+    assert confirmations(server, 11.2) == 0
+    upload(server, items, 20.0, late=0.06)
+    # Within the 2.5 s that MAVSDK waits.
+    assert confirmations(server, 20.2) == CONFIRMATIONS
+    assert CONFIRMATIONS * CONFIRM < 2.5
+
+
+def test_a_duplicate_of_the_last_item_gets_no_second_ack() -> None:
+    """MAVSDK would take it for its next upload's, and fail."""
+    server, items = MissionServer(), many_items(3)
+    upload(server, items, 0.0)
+    assert send(server, items[-1], ONE, 0.2) == []
+    assert len(send(server, items[-1], ONE, 0.4)) == 1
+    assert send(server, items[-1], ONE, 0.5) == []
 
 
 def test_a_slow_station_is_not_pressed() -> None:
-    """A stall of half a second brings fewer requests than MAVSDK counts before it gives up."""
+    """A stall of a second brings fewer requests than MAVSDK counts before it gives up; a slow link soon brings none."""
     server = MissionServer()
-    send(server, mavlink.MAVLink_mission_count_message(1, 1, 3, 0), ONE, 0.0)
-    assert 2 <= sum(len(server.tick(0.005 * k)) for k in range(101)) <= 4
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 9, 0), ONE, 0.0)
+    assert 2 <= sum(len(server.tick(0.005 * k)) for k in range(201)) <= 4
+    now, asked = 1.0, []
+    for one in many_items(8):
+        send(server, one, ONE, now)
+        asked.append(sum(len(server.tick(now + 0.005 * k)) for k in range(1, 50)))
+        now += 0.25
+    assert asked[1:] == [0] * 7
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.1, 0.2])
+def test_fence_and_mission_one_after_the_other_on_a_slow_link(delay: float) -> None:
+    server = MissionServer()
+    for kind, command in ((MissionType.FENCE, 5004), (MissionType.MISSION, 16), (MissionType.MISSION, 16)):
+        items = [item(k, 460_000_000 + k, 80_000_000, 50.0, command=command, kind=kind, p1=50.0) for k in range(5)]
+        one = Uploader(ONE, items, kind=kind, patience=0.5, mavsdk=True)
+        Medium(server, [one], delay=(delay, delay)).run(60.0)
+        assert one.result == mavlink.MAV_MISSION_ACCEPTED
 
 
 @pytest.mark.parametrize(

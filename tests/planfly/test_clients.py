@@ -83,6 +83,7 @@ def test_mavsdk_uploads_arms_starts_and_sees_the_end(serve: Callable[..., Served
     vehicle = serve("--scenario", "field.toml", "--speed", str(speed), to=port)
     found = mavsdk(tmp_path, port, ITEMS, "fly")
     assert found["back"] == ITEMS, "identical integers"
+    assert found["downloads"] == 1
     assert (found["healthy"], found["armed"], found["early"], found["finished"]) == (True, True, False, True)
     if speed == 1:
         assert 15.0 < found["flown_s"] < 30.0
