@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 
 # Places nearer to each other than this (m) are one place.
 SAME_PLACE = 1.0
-# Leg that stands for a climb on the spot, m: ten metres of height on it are 89 degrees.
-STEP = 0.1
+# Leg that stands for a climb on the spot, m: a metre of height on it is 89.4 degrees.
+STEP = 0.01
 # Heights (m AMSL) that a flight may be asked to keep.
 LOWEST, HIGHEST = -500.0, 9000.0
 # Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.

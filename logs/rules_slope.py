@@ -144,7 +144,7 @@ def _too_steep(shape: RouteShape, leg: int, limit: float, source: str) -> str:
     says = f"leg {leg} {verb} {math.degrees(abs(planned)):.1f}° for {_distance(float(shape.runs[leg]))}"
     if shape.runs[leg] < ON_THE_SPOT:
         rise = abs(float(shape.points[leg + 1, 2] - shape.points[leg, 2]))
-        says = f"leg {leg} {verb} {rise:.0f} m on the spot, {math.degrees(abs(planned)):.1f}°"
+        says = f"leg {leg} {verb} {f'{rise:.1f}'.removesuffix('.0')} m on the spot, {math.degrees(abs(planned)):.1f}°"
     if source == "scenario":
         return f"{says}; the scenario allows {math.degrees(limit):.1f}°"
     speed = float(shape.setup.route.airspeed[leg])

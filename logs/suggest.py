@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.flown import Flown
-from logs.route_shape import RouteShape, route_shape, turn_room
+from logs.route_shape import ON_THE_SPOT, RouteShape, route_shape, turn_room
 from logs.rules_slope import slope_limit, steep_arc
 from logs.rules_turn import turn_limit
 from logs.rules_world import planned_path
@@ -71,7 +71,8 @@ def slope_suggestion(shape: RouteShape, leg: int, item: Finding) -> str:
         return _arc_suggestion(shape, leg)
     word = "climb" if shape.slopes[leg] >= 0.0 else "fall"
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
-    changes = [(longer / run - 1.0, f"make leg {leg} {math.ceil(longer)} m long instead of {run:.0f} m")]
+    instead = "; it goes nowhere now" if run < ON_THE_SPOT else f" instead of {run:.0f} m"
+    changes = [(longer / run - 1.0, f"make leg {leg} {math.ceil(longer)} m long{instead}")]
     if gentler >= 1.0:
         changes.append((1.0 - gentler / rise, f"{word} {math.floor(gentler)} m on leg {leg} instead of {rise:.0f} m"))
     speed = _slope_speed(shape, leg, planned + SPARE_ANGLE) if source == "aircraft" else None

@@ -16,16 +16,17 @@ MISSION = """QGC WPL 110
 """
 
 
-@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "falls")])
-def test_it_is_judged_and_not_flyable(up: int, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "falls"), (1434, "climbs"), (201.5, "climbs")])
+def test_it_is_judged_and_not_flyable(up: float, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     mission = tmp_path / "up.waypoints"
     mission.write_text(MISSION.format(up=up), encoding="utf-8")
     assert main(["check", str(mission), "--json", str(tmp_path / "verdict.json")]) == 4
     verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
     failed = [item for item in verdict["findings"] if item["ok"] is False]
     assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1")]
-    assert abs(failed[0]["planned"]) == pytest.approx(90.0, abs=0.1)
-    rise = abs(up - 200)
-    assert f"leg 1 {verb} {rise} m on the spot, 90.0°; at 25 m/s" in failed[0]["reason"]
+    assert abs(failed[0]["planned"]) == pytest.approx(90.0, abs=0.5)
+    rise, angle = abs(up - 200), "89.6" if up == 201.5 else "90.0"
+    assert f"leg 1 {verb} {rise:g} m on the spot, {angle}°; at 25 m/s" in failed[0]["reason"]
+    assert "m long; it goes nowhere now" in failed[0]["suggestion"]
     assert main(["fly", str(mission), "--log", str(tmp_path / "flight.mcap")]) == 4
     assert "on the spot" in capsys.readouterr().out
