@@ -19,8 +19,14 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
+from flight.state import COMMAND_SIZE
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+# Where the gusts' three setters and the ground's stand, after the commands'.
+GUST_SETTERS, GROUND_SETTER = range(COMMAND_SIZE, COMMAND_SIZE + 3), COMMAND_SIZE + 3
+SETTERS = GROUND_SETTER + 1
 
 _GET, _SET = "_ZNK14SGPropertyNode14getDoubleValueEv", "_ZN14SGPropertyNode14setDoubleValueEd"
 _TABLE = "_ZTV14SGPropertyNode"
@@ -37,9 +43,9 @@ class Links:
     """The bound nodes themselves, in JSBSim's units, for the one loop that cannot afford `Fdm`'s conversions.
 
     getters: the state in the order of `flight.state.S`; times factors (STATE_SIZE,) it is SI. setters: commands in
-    the order of `flight.state.C`, gusts north, east and down, the ground's height. scales: (8, 2) what takes an SI
-    value to JSBSim's where it is above zero, and where not. nodes: (STATE_SIZE + 8,) addresses of all of them for
-    compiled code, 0 for none; None where `flight.nodes` does not know this JSBSim.
+    the order of `flight.state.C`, gusts north, east and down, the ground's height. scales: (SETTERS, 2) what takes
+    an SI value to JSBSim's where it is above zero, and where not. nodes: (STATE_SIZE + SETTERS,) addresses of all of
+    them for compiled code, 0 for none; None where `flight.nodes` does not know this JSBSim.
     """
 
     getters: tuple[Callable[[], float], ...]

@@ -16,7 +16,7 @@ from flight.chart import Chart, Ground
 from flight.fdm import Fdm, Variation
 from flight.gains import load_gains
 from flight.navigation import ERRORS, NAV_STATES, start_navigation
-from flight.nodes import Links
+from flight.nodes import GROUND_SETTER, GUST_SETTERS, Links
 from flight.path import FlyByPath, fly_by_path
 from flight.rows import Lateral, M
 from flight.setup import FlightSetup, limits_of
@@ -232,7 +232,7 @@ class Flight:
         arena.scales[:] = links.scales.ravel()
         self._run = links.run
         # What is not set: gusts in still air, and ground that is not known.
-        unset = [*([] if self.windy else [4, 5, 6]), *([] if self.terrain.known else [7])]
+        unset = [*(() if self.windy else GUST_SETTERS), *(() if self.terrain.known else (GROUND_SETTER,))]
         if links.nodes is not None:
             links.nodes[[STATE_SIZE + k for k in unset]] = 0
             linked = entry(linked_tick, arena.packed, tables, heights, links.nodes)

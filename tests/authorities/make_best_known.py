@@ -58,6 +58,9 @@ def main() -> None:
             tried[how] = round(ratio, 6) if safe else f"not certified: {'; '.join(certificate.problems)[:120]}"
             sys.stdout.write(f"{name}: {how}: {tried[how]}\n")
             sys.stdout.flush()
+            if how == entry.get("how") and ratio != entry["length_ratio"]:
+                # The same run of an older revision, from other coarse seeds.
+                entry["how"] = f"{how}, at an earlier revision"
             if safe and is_safe(certificate) and ratio < entry["length_ratio"]:
                 entry = {"length_ratio": ratio, "how": how, "waypoints_east_north_amsl_m": path}
         known[name] = entry | {"tried": tried}
