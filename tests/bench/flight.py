@@ -20,6 +20,7 @@ from flight.fdm import Fdm, Variation
 from flight.gains import Gains, load_gains
 from flight.setup import FlightSetup
 from flight.simulate import FDM_HZ, Flight, Flown, simulate
+from tests.bench.angles import angles
 from tests.flight.conftest import MakeSetup, setup_maker, standard
 
 Floats = NDArray[np.float64]
@@ -227,6 +228,8 @@ NEEDED = {
     "straight legs, L1, ArduPlane's defaults / ours": (10.0, 50.0),
     "straight legs, L1, best-tuned / ours": (3.0, 5.0),
     "straight legs, vector field, best-tuned / ours": (3.0, 5.0),
+    "feasible missions: turning angles off the plan, most, deg": (0.1, 0.05),
+    "feasible missions: slopes off the plan, most, deg": (0.15, 0.1),
     "closed loop / bare JSBSim at 60 Hz": (1.30, 1.15),
     "closed loop / bare JSBSim at 30 Hz": (1.15, 1.05),
     "real-time factor at 60 Hz": (1500.0, 2100.0),
@@ -254,6 +257,9 @@ def rows(seeds: int = 20) -> dict[str, float]:
         found[f"{name}: largest error"] = max(item.worst for item in flights)
     for name, ratios in rivals(range(seeds)).items():
         found[f"straight legs, {name} / ours"] = float(np.median(ratios))
+    off = angles(range(5 * seeds), 0.1)
+    found["feasible missions: turning angles off the plan, most, deg"] = float(off.turns.max())
+    found["feasible missions: slopes off the plan, most, deg"] = float(off.slopes.max())
     for hz in (60, 30):
         cost = loop_cost(hz)
         found[f"closed loop / bare JSBSim at {hz} Hz"] = cost.ratio

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,12 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from flight.envelope import load_envelope
+from flight.gains import load_gains
 from flight.mission import Mission
 from flight.route import Route
 from flight.setup import FlightSetup, limits_of
 from flight.simulate import simulate
 from flight.track import Track
 from logs.route_shape import route_shape
+from tests.bench.flight import flown_with
 from world.scenario import from_spec
 
 Floats = NDArray[np.float64]
@@ -26,11 +28,13 @@ BANK = math.radians(30.0)
 # A slope is held if the airspeed does not fall in a climb or rise in a dive by more than this (m/s, mean of 5 s), and
 # the height stays within this (m).
 SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
-# A turn is held if the track stays within this of the fly-by path (m; the verdict lets it swing out by 5 m) and the
-# mean bank of two seconds exceeds the limit by at most this: in a steady turn on a 30 degree arc it is 30.8 degrees.
-# It is a turn at this airspeed if guidance does not slow for it: the mean of five seconds falls by more than this, m/s,
-# at less than cruise throttle (a turn downwind takes airspeed too, but at more).
-CROSS_HELD, BANK_HELD, TURN_SPEED_HELD = 2.0, math.radians(1.3), 1.3
+# A leg is long enough if its turns are flown at the bank limit, as they are with this much leg (m) between them: the
+# track within 2 m of the fly-by path (the verdict lets it swing out by 5 m), and the largest mean bank of 2 seconds at
+# most half a degree more than the limit, or than far apart (30.7 degrees on a 30 degree arc in calm air), if that is
+# more, but no more than so much.  Guidance may not slow down for arcs here: that would hold the bank in turns too tight
+# for the airspeed.
+FAR = 4000.0
+CROSS_HELD, BANK_HELD, BANK_MOST = 2.0, math.radians(0.5), BANK + math.radians(1.3)
 _BISECTIONS = 7
 
 
@@ -157,36 +161,33 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
         return np.array([0.0, 0.0, AMSL]) + np.vstack([np.zeros(3), np.cumsum(runs * ways, axis=0)])
 
     def fly(leg: float) -> Track | None:
-        flown = simulate(made_setup(points(leg), aircraft, wind, wind_from), aircraft)
+        with flown_with(replace(load_gains(aircraft), arc_slowing_max=0.0)):
+            flown = simulate(made_setup(points(leg), aircraft, wind, wind_from), aircraft)
         return (
             flown.track.rows(int(np.searchsorted(flown.track.time, 5.0)), len(flown.track))
             if flown.ended == "completed"
             else None
         )
 
+    apart = fly(FAR)
+    if apart is None:
+        return Limit("leg", wind, wind_from, math.nan, math.nan, same_way)
+    bank = min(max(_held_bank(apart), BANK) + BANK_HELD, BANK_MOST)
+
     def holds(leg: float) -> bool:
         track = fly(leg)
-        if track is None or _most(track, track.attitude[:, 0], 2.0) > BANK + BANK_HELD:
-            return False
-        return _slowed(track, aircraft) <= TURN_SPEED_HELD and float(np.abs(track.cross_track).max()) <= CROSS_HELD
+        return track is not None and _held_bank(track) <= bank and float(np.abs(track.cross_track).max()) <= CROSS_HELD
 
-    far = points(4000.0)
-    shape = route_shape(made_setup(far, aircraft, wind, wind_from))
+    shape = route_shape(made_setup(points(FAR), aircraft, wind, wind_from))
     predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
     return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
 
 
-def _most(track: Track, values: NDArray[np.float32], seconds: float) -> float:
-    """Largest mean over so many seconds, either way."""
-    width = round(seconds / float(np.median(np.diff(track.time))))
-    return float(np.abs(np.convolve(values.astype(np.float64), np.full(width, 1.0 / width), "valid")).max())
-
-
-def _slowed(track: Track, aircraft: Aircraft) -> float:
-    """By how much the mean airspeed of five seconds falls below the command at less than cruise throttle, m/s."""
-    throttle = track.controls[:, 3]
-    eased = throttle < np.median(throttle[track.leg == 0])
-    return _most(track, np.where(eased, np.minimum(track.airspeed - np.float32(aircraft.airspeed), 0.0), 0.0), 5.0)
+def _held_bank(track: Track) -> float:
+    """Largest mean bank over two seconds, either way, rad."""
+    width = round(2.0 / float(np.median(np.diff(track.time))))
+    bank = track.attitude[:, 0].astype(np.float64)
+    return float(np.abs(np.convolve(bank, np.full(width, 1.0 / width), "valid")).max())
 
 
 def calm_limits(*, whole: bool) -> list[Limit]:

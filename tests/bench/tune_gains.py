@@ -1,117 +1,82 @@
 """Choose an aircraft's gains by coordinate search on one set of missions, and report on others.
 
 ``python -m tests.bench.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off the linear
-model from there, searches the rest from `STARTS`, prints each improvement and, at the end, how the chosen gains fly the
-standard mission and random missions that the search has not seen.  ``--write`` puts the result into
-``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions come from the seed;
-the standard mission is none of them.  Two to five minutes on one core.
+model from there, searches the rest from round figures (`START`), prints what each round brings and, at the end, how the
+chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts the result
+into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions come from the
+seed (`tests.bench.tuning_missions`); the standard mission is none of them.  Two minutes a round on two cores.
 """
 
 import argparse
 import math
+import multiprocessing
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
 from typing import Any
 
 import numpy as np
 
 from aircraft.catalog import Aircraft, load_aircraft
 from flight import simulate as simulation
-from flight.fdm import JSBSIM_VERSION, Fdm, Variation
+from flight.fdm import JSBSIM_VERSION, Fdm
 from flight.gains import Gains, load_gains
-from flight.setup import FlightSetup
 from flight.simulate import Flown, simulate
 from flight.trim import linearise, straight
 from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
+from tests.bench.tuning_missions import Case, cases
 from tests.flight.conftest import MakeSetup, setup_maker, standard
 
-# Where the search starts: where those before it ended.  The Aerosonde's turn lead, sideslip gain, side lag and push
-# smoothing were then set by hand, as the search gave up corners in wind for straight legs; its gains stand there,
-# without a round of search since (--rounds 0).
-STARTS = {
-    "aerosonde": {
-        "cross_track_frequency": 2.2,
-        "cross_track_damping": 0.803,
-        "cross_track_integral": 0.14,
-        "turn_lead": 0.205,
-        "turn_smoothing": 0.2,
-        "aside_frequency": 2.54,
-        "side_gain": 0.95,
-        "side_lag": 0.06,
-        "push_lead": 0.092,
-        "push_smoothing": 0.07,
-        "roll_frequency": 9.23,
-        "roll_gain": 2.04,
-        "roll_rate_gain": 0.08,
-        "roll_disturbance_lag": 0.0269,
-        "aileron_lead": 0.0385,
-        "yaw_rate_gain": 0.325,
-        "sideslip_gain": 0.85,
-        "height_frequency": 2.3,
-        "height_damping": 1.49,
-        "height_integral": 1.11,
-        "slope_lead": 0.2,
-        "load_lead": 0.13,
-        "pitch_rate_gain": 0.373,
-        "speed_gain": 0.092,
-        "speed_integral": 0.01,
-        "throttle_per_slope": 1.3,
-    },
-    "c172x": {
-        "cross_track_frequency": 0.9,
-        "cross_track_damping": 0.923,
-        "cross_track_integral": 0.065,
-        "turn_lead": 0.35,
-        "turn_smoothing": 0.65,
-        "aside_frequency": 0.615,
-        "side_gain": 0.601,
-        "side_lag": 0.178,
-        "push_lead": 0.1,
-        "push_smoothing": 0.15,
-        "roll_frequency": 6.0,
-        "roll_gain": 2.03,
-        "roll_rate_gain": 0.172,
-        "roll_disturbance_lag": 0.178,
-        "aileron_lead": 0.02,
-        "yaw_rate_gain": 0.507,
-        "sideslip_gain": 0.507,
-        "height_frequency": 1.82,
-        "height_damping": 2.03,
-        "height_integral": 0.104,
-        "slope_lead": 0.308,
-        "load_lead": 0.115,
-        "pitch_rate_gain": 0.455,
-        "speed_gain": 0.101,
-        "speed_integral": 0.0069,
-        "throttle_per_slope": 2.4,
-    },
+# Where every search starts, at an airspeed of 25 m/s: round figures, of the size that earlier searches of the Aerosonde
+# found.  `start` slows them down for an aircraft that is faster: its turns take longer by as much.
+START = {
+    "cross_track_frequency": 1.0,
+    "cross_track_damping": 0.8,
+    "cross_track_integral": 0.05,
+    "turn_lead": 0.2,
+    "turn_smoothing": 0.2,
+    "aside_frequency": 1.0,
+    "side_gain": 0.5,
+    "side_lag": 0.1,
+    "push_lead": 0.05,
+    "push_smoothing": 0.1,
+    "roll_frequency": 6.0,
+    "roll_gain": 1.0,
+    "roll_rate_gain": 0.1,
+    "roll_disturbance_lag": 0.1,
+    "aileron_lead": 0.03,
+    "yaw_rate_gain": 0.2,
+    "sideslip_gain": 0.5,
+    "height_frequency": 1.0,
+    "height_damping": 1.0,
+    "height_integral": 0.1,
+    "slope_lead": 0.2,
+    "load_lead": 0.1,
+    "pitch_rate_gain": 0.2,
+    "speed_gain": 0.1,
+    "speed_integral": 0.01,
+    "throttle_per_slope": 2.0,
 }
-SEARCHED = tuple(STARTS["aerosonde"])
+SEARCHED = tuple(START)
 # Missions that are searched on and reported on, numbered apart under the one seed.
-TRAINED, REPORTED = {"aerosonde": range(8), "c172x": range(4)}, range(1000, 1020)
-FIRST_STEP = 1.3
-# Steepest climb and dive in calm air, in those that the aircraft can.
-SLOPES = (0.5, 0.6)
+TRAINED, REPORTED = {"aerosonde": range(16), "c172x": range(8)}, range(1000, 1024)
+# The first factor that a gain is changed by, and the least share of the cost that a change must save.
+FIRST_STEP, WORTH_TAKING = 1.5, 0.001
 # What a figure counts as one: the issue's aims in wind, of the cross-track's RMS in calm air; and, of the aircraft that
 # the aims are for, of its largest too.
 SCALES = {"aerosonde": (0.05, 0.4, 0.2, 0.8), "c172x": (0.05, 0.6, 0.2, 0.8)}
 # What the cross-track's RMS on straight legs counts as one, m, and how far from corners, m, at 25 m/s.
 STRAIGHT, CLEAR = 0.02, 250.0
+# What the airspeed's error over second halves of legs counts as one, m/s; the verdict lets a leg be that far off.
+SPEED = 1.0
 # Weights of the surfaces' mean rate as a share of what they can, and of each degree of bank beyond the command's limit.
 EFFORT, BEYOND = 0.5, 0.2
 FAILED = 1000.0
 # Bank that guidance may add in what is searched and reported here, rad; flights have `flight.simulate.BANK_RESERVE`.
 RESERVE = math.radians(2.7)
 DIGITS = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Case:
-    """A mission and the aircraft that flies it, which guidance takes for the model."""
-
-    setup: FlightSetup
-    variation: Variation | None
+# No lag or smoothing is shorter than a tick at 60 Hz, s.
+TICK = 0.017
 
 
 def model_gains(aircraft: Aircraft) -> dict[str, float]:
@@ -139,105 +104,124 @@ def model_gains(aircraft: Aircraft) -> dict[str, float]:
     }
 
 
-def cases(aircraft: Aircraft, make: MakeSetup, seed: int, numbers: Iterable[int]) -> list[Case]:
-    """Missions of seven legs with turns, slopes, wind and turbulence of their own, every fourth at 30 Hz."""
-    # Its mass moves a light single's climb by as much as two tenths of the Aerosonde's.
-    variations: list[Variation | None] = [None, Variation(mass=0.95), Variation(mass=1.05)]
-    if aircraft.name == "aerosonde":
-        variations = [
-            *(None, Variation(control=0.75), Variation(control=1.25)),
-            *(Variation(mass=0.9), Variation(mass=1.1, drag=1.3)),
-        ]
-    # A turn's radius grows with the square of the speed.
-    scale = (aircraft.airspeed / 25.0) ** 2
-    climb, dive = make(standard()).envelope.air_angles(aircraft.airspeed, 1000.0)
-    steepest = (-SLOPES[1] * abs(dive), min(math.radians(6.0), SLOPES[0] * climb))
-    found = []
-    for number in numbers:
-        random = np.random.default_rng([seed, number])
-        way, course = [np.array([0.0, 0.0, 1000.0])], random.uniform(0.0, 6.0)
-        for leg in range(7):
-            run = scale * random.uniform(700.0, 1500.0)
-            # Half of the legs at the steepest: where the slope changes in a turn, the turn is hardest.
-            slope = float(np.clip(2.0 * random.uniform(*steepest), *steepest))
-            # What has sunk far climbs: not into the ground.
-            slope = min(abs(slope), steepest[1]) if way[-1][2] < 700.0 else slope
-            turn = math.copysign(random.uniform(0.3, 0.85), random.uniform(-1.0, 1.0))
-            course += turn if leg else 0.0
-            way.append(way[-1] + run * np.array([math.sin(course), math.cos(course), math.tan(slope)]))
-        wind = (float(random.uniform(0.0, 10.0)), float(random.uniform(0.0, 360.0)))
-        setup = make(
-            np.array(way),
-            speeds=aircraft.airspeed,
-            seed=seed * 10_000 + number,
-            wind=wind,
-            turbulence=("none", "moderate", "light", "moderate")[number % 4],
-        )
-        setup = replace(setup, guidance_hz=30 if number % 4 == 3 else 60)
-        found.append(Case(setup, variations[number % len(variations)]))
-    return found
-
-
-def fly(aircraft: Aircraft, gains: Gains, flown: Iterable[Case]) -> list[Flown]:
-    """Fly each case with these gains, and a little less bank than flights have, not to lean on the last of it."""
+def fly(aircraft: Aircraft, gains: Gains, case: Case) -> Flown:
+    """Fly a case with these gains, and a little less bank than flights have, not to lean on the last of it."""
     module: Any = simulation
     usual = module.BANK_RESERVE
     module.BANK_RESERVE = RESERVE
     try:
         with flown_with(gains):
-            return [simulate(case.setup, aircraft, variation=case.variation) for case in flown]
+            return simulate(case.setup, aircraft, variation=case.variation)
     finally:
         module.BANK_RESERVE = usual
 
 
-def cost(aircraft: Aircraft, found: Iterable[tuple[Case, Flown]]) -> float:
-    """Mean of what the flights cost and what the worst of them does; `FAILED` for one that fails.
+def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:
+    """What a flight costs; `FAILED` where it fails.
 
-    A flight costs its errors in units of their aims, those on straight legs once more, its surfaces' rates, and its
+    Its errors in units of their aims, those on straight legs once more, its airspeed's, its surfaces' rates, and its
     bank beyond the command's limit.
     """
-    costs = []
-    clear = CLEAR * (aircraft.airspeed / 25.0) ** 2
-    for case, flown in found:
-        errors = errors_of(flown)
-        if not errors.completed:
-            return FAILED
-        values = (errors.cross_rms, errors.cross_max, errors.height_rms, errors.height_max)
-        one = sum(value / scale for value, scale in zip(values, SCALES[aircraft.name], strict=True))
-        one += straight_rms(case.setup, flown, clear) / STRAIGHT
-        track = flown.track
-        rates = np.diff(track.commands[:, :3].astype(np.float64), axis=0) / float(track.time[1] - track.time[0])
-        one += EFFORT * math.sqrt(float((rates**2).mean())) / aircraft.surface_rate
-        bank = math.degrees(float(np.abs(track.attitude[:, 0]).max()))
-        costs.append(one + BEYOND * max(0.0, bank - math.degrees(aircraft.max_bank) - 3.0))
-    return float(np.mean(costs) + np.max(costs))
+    flown = fly(aircraft, gains, case)
+    if flown.ended != "completed":
+        return FAILED
+    errors = errors_of(flown)
+    values = (errors.cross_rms, errors.cross_max, errors.height_rms, errors.height_max)
+    found = sum(value / scale for value, scale in zip(values, SCALES[aircraft.name], strict=True))
+    if case.straight:
+        found += straight_rms(case.setup, flown, CLEAR * (aircraft.airspeed / 25.0) ** 2) / STRAIGHT
+    found += speed_error(case, flown) / SPEED
+    track = flown.track
+    rates = np.diff(track.commands[:, :3].astype(np.float64), axis=0) / float(track.time[1] - track.time[0])
+    found += EFFORT * math.sqrt(float((rates**2).mean())) / aircraft.surface_rate
+    return found + BEYOND * max(0.0, errors.peak_bank - math.degrees(aircraft.max_bank) - 3.0)
+
+
+def speed_error(case: Case, flown: Flown) -> float:
+    """RMS over the legs of how far the mean airspeed of a leg's second half is from the command, m/s."""
+    track, errors = flown.track, []
+    for leg, command in enumerate(case.setup.route.airspeed):
+        airspeed = track.airspeed[track.leg == leg].astype(np.float64)
+        errors.append(float(airspeed[airspeed.size // 2 :].mean()) - command if airspeed.size else 0.0)
+    return math.sqrt(float(np.mean(np.square(errors))))
+
+
+class Trial:
+    """What gains cost on the missions that are searched on, flown by all processors."""
+
+    def __init__(self, aircraft: Aircraft, trained: Sequence[Case]) -> None:
+        """Start the processes.  Each has the missions from the start; a task names one."""
+        self._count = len(trained)
+        self._pool = multiprocessing.Pool(initializer=_begin, initargs=(aircraft, trained))
+
+    def __enter__(self) -> "Trial":
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the processes."""
+        self._pool.terminate()
+
+    def __call__(self, gains: Gains) -> float:
+        """Root of the mean square of what the flights cost: bad ones count more, but no single one decides."""
+        costs = self._pool.map(_cost, [(gains, k) for k in range(self._count)], chunksize=1)
+        return math.sqrt(float(np.mean(np.square(costs))))
+
+
+_missions: list[tuple[Aircraft, Case]] = []
+
+
+def _begin(aircraft: Aircraft, trained: Sequence[Case]) -> None:
+    _missions[:] = [(aircraft, case) for case in trained]
+
+
+def _cost(task: tuple[Gains, int]) -> float:
+    gains, number = task
+    aircraft, case = _missions[number]
+    return cost(aircraft, gains, case)
+
+
+def start(aircraft: Aircraft) -> dict[str, float]:
+    """`START` for this aircraft's airspeed.
+
+    Gains on surfaces are per airspeed's own effect on them, and stay.
+    """
+    ratio = aircraft.airspeed / 25.0
+    powers = {"frequency": -1, "lead": 1, "smoothing": 1, "lag": 1, "cross_track_integral": -3, "height_integral": -3}
+    found = {}
+    for name, value in START.items():
+        power = next((power for end, power in powers.items() if name.endswith(end)), 0)
+        found[name] = value * ratio**power
+    return found
 
 
 def rounded(gains: Gains) -> Gains:
-    """The gains as the file will hold them."""
-    return replace(gains, **{name: float(f"{getattr(gains, name):.{DIGITS}g}") for name in SEARCHED})
+    """The gains as the file will hold them, lags and smoothing no shorter than a tick."""
+    least = {name: TICK for name in SEARCHED if name.endswith(("lag", "smoothing"))}
+    values = {name: max(least.get(name, 0.0), getattr(gains, name)) for name in SEARCHED}
+    return replace(gains, **{name: float(f"{value:.{DIGITS}g}") for name, value in values.items()})
 
 
-def search(aircraft: Aircraft, gains: Gains, trained: Sequence[Case], rounds: int, seed: int) -> Gains:
+def search(gains: Gains, trial: Callable[[Gains], float], rounds: int, seed: int) -> Gains:
     """Change one gain at a time, in a seeded order, by a factor that shrinks where neither way helps."""
     best = rounded(gains)
-    lowest = cost(aircraft, zip(trained, fly(aircraft, best, trained), strict=True))
+    lowest = trial(best)
     print(f"start: {lowest:.4f}", flush=True)
     steps = dict.fromkeys(SEARCHED, FIRST_STEP)
-    random = np.random.default_rng([seed, 1])
-    for _ in range(rounds):
+    random = np.random.default_rng([seed, 0, 1])
+    for number in range(rounds):
         for name in random.permutation(SEARCHED).tolist():
             for factor in (steps[name], 1.0 / steps[name]):
                 tried = rounded(replace(best, **{name: getattr(best, name) * factor}))
-                found = cost(aircraft, zip(trained, fly(aircraft, tried, trained), strict=True))
-                if found < 0.999 * lowest:
+                found = trial(tried)
+                if found < (1.0 - WORTH_TAKING) * lowest:
                     best, lowest = tried, found
                     # The way that helped comes first the next time.
                     steps[name] = factor
-                    print(f"{name} = {getattr(best, name):.3g}: {lowest:.4f}", flush=True)
                     break
             else:
                 steps[name] = 1.0 + 0.5 * (steps[name] - 1.0)
+        print(f"round {number + 1}: {lowest:.4f}", flush=True)
     return best
 
 
@@ -276,27 +260,26 @@ def print_errors(name: str, found: Sequence[Errors]) -> None:
     )
 
 
-def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, seed: int) -> None:
-    """How the gains fly what the search has not seen."""
+def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Case]) -> None:
+    """How the gains fly what the search has not seen: the standard mission, and fresh random ones."""
     way = standard() * np.array([1.0, 1.0, 1.0])
     way[:, :2] *= (aircraft.airspeed / 25.0) ** 2
     if aircraft.name != "aerosonde":
         # Half the slopes: the standard mission's are the Aerosonde's.
         way[:, 2] = 500.0 + 0.5 * (aircraft.airspeed / 25.0) ** 2 * (way[:, 2] - 500.0)
     winds: list[dict[str, Any]] = [{}] + [{"wind": (10.0, 45.0 * k), "turbulence": "moderate"} for k in range(8)]
-    known = [Case(make(way, speeds=aircraft.airspeed, **wind), None) for wind in winds]
-    fresh = cases(aircraft, make, seed, REPORTED)
+    known = [Case(make(way, speeds=aircraft.airspeed, **wind), None, True) for wind in winds]
     print("reported on (median RMS / 95th percentile of the largest):")
-    print_errors("standard mission, calm", [errors_of(item) for item in fly(aircraft, gains, known[:1])])
-    print_errors("standard mission, windy", [errors_of(item) for item in fly(aircraft, gains, known[1:])])
-    print_errors("fresh random missions", [errors_of(item) for item in fly(aircraft, gains, fresh)])
+    print_errors("standard mission, calm", [errors_of(fly(aircraft, gains, item)) for item in known[:1]])
+    print_errors("standard mission, windy", [errors_of(fly(aircraft, gains, item)) for item in known[1:]])
+    print_errors("fresh random missions", [errors_of(fly(aircraft, gains, item)) for item in fresh])
 
 
 def main() -> None:
     """Search, report, and write if asked to."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench.tune_gains")
-    parser.add_argument("aircraft", nargs="?", default="aerosonde", choices=sorted(STARTS))
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("aircraft", nargs="?", default="aerosonde", choices=sorted(TRAINED))
+    parser.add_argument("--rounds", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--write", action="store_true")
     args = parser.parse_args()
@@ -304,13 +287,15 @@ def main() -> None:
     make = setup_maker(aircraft)
     own = {name: float(f"{value:.4g}") for name, value in model_gains(aircraft).items()}
     print("off the model: " + ", ".join(f"{name} {value:.4g}" for name, value in own.items()))
-    gains = replace(load_gains(aircraft), **own, **STARTS[aircraft.name])
+    gains = replace(load_gains(aircraft), **own, **start(aircraft))
     trained = cases(aircraft, make, args.seed, TRAINED[aircraft.name])
-    gains = search(aircraft, gains, trained, args.rounds, args.seed)
+    fresh = cases(aircraft, make, args.seed, REPORTED)
+    with Trial(aircraft, trained) as trial:
+        gains = search(gains, trial, args.rounds, args.seed)
     print(gains)
-    report(aircraft, make, gains, args.seed)
     if args.write:
         write(aircraft, gains, args.rounds, args.seed)
+    report(aircraft, make, gains, fresh)
 
 
 if __name__ == "__main__":

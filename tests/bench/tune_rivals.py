@@ -24,13 +24,13 @@ SEEDS = range(500, 506)
 SCREEN = 1
 # Grids: of L1 its period (s) and damping; of the field 1/m, 1/s and 1/s^2.
 L1 = {
-    "l1_period": (4.0, 5.0, 6.0),
-    "l1_damping": (1.05, 1.2, 1.4),
+    "l1_period": (3.0, 4.0, 5.0, 6.0, 8.0),
+    "l1_damping": (0.75, 0.9, 1.05, 1.2, 1.4),
 }
 FIELD = {
-    "field_path": (0.1, 0.12, 0.15),
-    "field_course": (8.0, 9.0, 10.0, 11.0, 12.5),
-    "field_course_integral": (0.5,),
+    "field_path": (0.06, 0.08, 0.1, 0.12, 0.15),
+    "field_course": (4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.5),
+    "field_course_integral": (0.2, 0.5),
 }
 LAWS: dict[str, dict[str, tuple[float, ...]]] = {"l1": L1, "vector-field": FIELD}
 # A law that swings is this many times as far off in one wind as it is in the median.

@@ -46,11 +46,11 @@ def zigzag(turn_deg: float, leg: float, legs: int = 4) -> list[list[float]]:
 
 def test_the_aircraft_limits_a_turn_by_its_legs() -> None:
     # 131 m legs at 25 m/s and 30 degrees of bank: the design document's 61 degrees for a row of equal turns; where they
-    # go to and fro, the roll from one bank into the other takes 6.5 m more.
-    assert failing(judge_geometry(make_setup(zigzag(60.0, 135.0)))) == set()
+    # go to and fro, the roll from one bank into the other takes 10.5 m more.
+    assert failing(judge_geometry(make_setup(zigzag(60.0, 139.0)))) == set()
     wrong = failing(judge_geometry(make_setup(zigzag(63.0, 131.0))))
     assert wrong == {("turn", f"waypoint {k}") for k in (1, 2, 3, 4)}
-    assert of(judge_geometry(make_setup(zigzag(60.0, 135.0))), "turn", "waypoint 2").limit_source == "aircraft"
+    assert of(judge_geometry(make_setup(zigzag(60.0, 139.0))), "turn", "waypoint 2").limit_source == "aircraft"
 
 
 def test_only_the_greedy_one_of_two_turns_is_at_fault() -> None:
