@@ -26,6 +26,8 @@ _SPEED_MEMORY = 12.0
 _THROUGHOUT = 0.8
 # Throttle and battery current (A) that count as at a limit.
 _FULL, _IDLE, _NO_CURRENT = 0.99, 0.01, 0.02
+# What an aircraft can is seen at its whole throttle alone: 1 % of the Aerosonde's is 0.6 degrees of climb.
+_ALL_OF_IT = 0.999
 # What an aircraft can is measured over at least this long (s), this long after the throttle came to its limit (s), by
 # numbers that are independent after about this long (s); and what speed and acceleration are known to, m/s of climb.
 _SHOWN_OVER, _SETTLED_AFTER, _INDEPENDENT, _KNOWN_TO = 1.5, 0.5, 0.5, 0.02
@@ -166,6 +168,7 @@ def measure_ability(shape: RouteShape, flown: Flown, leg: int) -> Shown | None:
     if rows.stop - rows.start < 3:
         return None
     full, idle = _at_limits(shape, flown, rows)
+    full &= track.controls[rows, 3] >= _ALL_OF_IT
     along, _ = along_across(shape, leg, track.position[rows])
     low, high = straight_span(shape, leg, 0.0)
     use = _held_for(full if sign > 0.0 else idle, round(_SETTLED_AFTER / flown.tick()))

@@ -27,9 +27,8 @@ OFF_SPEED = 1.0
 # Standard deviation of the gust along the track, as a share of the wind at 6 m (MIL-F-8785C: 0.1 high up to 0.2 at the
 # ground).
 GUST_SHARE = 0.15
-# What an aircraft showed that it can may fall short of what a leg asks by this (rad) and `SURE` of its standard errors:
-# within 1 % of its limit the throttle counts as there, and 1 % of the Aerosonde's throttle is 0.6 degrees of climb.
-SHOWN_TOLERANCE = math.radians(0.25)
+# What an aircraft showed that it can may fall short of what a leg asks by this (rad) and `SURE` of its standard errors.
+SHOWN_TOLERANCE = math.radians(0.1)
 
 
 def slope_findings(shape: RouteShape, flown: Flown | None, *, geometric: bool = False) -> list[Finding]:

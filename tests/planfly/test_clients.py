@@ -21,6 +21,7 @@ from pathlib import Path
 import pytest
 
 from logs.reader import read_log
+from tests.clients import need as client
 from tests.planfly.conftest import Served
 
 pytestmark = pytest.mark.client
@@ -45,11 +46,9 @@ FENCE = "QGC WPL 110\n0\t0\t3\t5004\t50\t0\t0\t0\t46.0100000\t8.0100000\t0\t1\n"
 RALLY = "QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t46.0010000\t8.0100000\t80\t1\n"
 
 
-def need(module: str, package: str) -> None:
-    if importlib.util.find_spec(module) is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail(f"{package} is not installed: in CI the clients must be there")
-        pytest.skip(f"{package} is not installed (pip install {package})")
+def need(package: str) -> None:
+    spec = importlib.util.find_spec(package)
+    client(spec.origin if spec else None, package, f"pip install {package}")
 
 
 def free_port() -> int:
@@ -65,7 +64,7 @@ def free_port() -> int:
 
 
 def mavsdk(folder: Path, port: int, rows: list[list[float]], task: str, limit: float = 120.0) -> dict[str, object]:
-    need("mavsdk", "mavsdk")
+    need("mavsdk")
     (folder / "items.json").write_text(json.dumps(rows), encoding="utf-8")
     result = subprocess.run(
         [sys.executable, SCRIPT, str(port), "items.json", task],
@@ -78,7 +77,7 @@ def mavsdk(folder: Path, port: int, rows: list[list[float]], task: str, limit: f
 
 @pytest.mark.parametrize("speed", [1, 50])
 def test_mavsdk_uploads_arms_starts_and_sees_the_end(serve: Callable[..., Served], tmp_path: Path, speed: int) -> None:
-    need("mavsdk", "mavsdk")
+    need("mavsdk")
     port = free_port()
     vehicle = serve("--scenario", "field.toml", "--speed", str(speed), to=port)
     found = mavsdk(tmp_path, port, ITEMS, "fly")
@@ -93,7 +92,7 @@ def test_mavsdk_uploads_arms_starts_and_sees_the_end(serve: Callable[..., Served
 
 
 def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_path: Path) -> None:
-    need("mavsdk", "mavsdk")
+    need("mavsdk")
     port = free_port()
     vehicle = serve("--scenario", "field.toml", "--speed", "20", to=port)
     found = mavsdk(tmp_path, port, [[46.0, 8.0, 100.0], [46.0, 8.0033, 100.0], [46.0003, 8.0065, 110.0]], "plan")
@@ -106,7 +105,7 @@ def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_
 
 def test_mavsdk_over_a_bad_link(serve: Callable[..., Served], tmp_path: Path) -> None:
     """One datagram in ten lost each way: 200 items in the soak, 40 here; all arrive as they were sent."""
-    need("mavsdk", "mavsdk")
+    need("mavsdk")
     count = 200 if SOAK else 40
     port, middle = free_port(), free_port()
     vehicle = serve("--scenario", "field.toml", to=middle)
@@ -167,7 +166,7 @@ class MavProxy:
 
 @pytest.fixture
 def mavproxy(tmp_path: Path) -> Iterator[Callable[[int], MavProxy]]:
-    need("MAVProxy", "MAVProxy")
+    need("MAVProxy")
     started: list[MavProxy] = []
 
     def start(port: int) -> MavProxy:
