@@ -9,7 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from aircraft.model import OURS, Model, read_model
+from aircraft.jsbsim_model import OURS, Model, read_model
+from world.scenario_file import names_folder
 
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
@@ -119,12 +120,7 @@ def find_aircraft(name: str) -> Aircraft:
 
     Raises ValueError as `load_aircraft` does.
     """
-    return read_aircraft(Path(name)) if is_folder(name) else load_aircraft(name)
-
-
-def is_folder(name: str) -> bool:
-    """Whether a scenario's aircraft is a folder, not a name: it has a slash."""
-    return "/" in name or "\\" in name
+    return read_aircraft(Path(name)) if names_folder(name) else load_aircraft(name)
 
 
 def read_aircraft(folder: Path) -> Aircraft:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.compiled import compiled
+from world.kernels import compiled
 
 Floats = NDArray[np.float64]
 

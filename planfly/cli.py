@@ -4,8 +4,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from planfly.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
-from planfly.parser import build_parser
+from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
+from planfly.terminal.parser import build_parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -21,8 +21,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
-    from planfly.commands import COMMANDS
-    from planfly.output import patient_output
+    from planfly.commands.dispatch import COMMANDS
+    from planfly.terminal.output import patient_output
     from world.errors import PlanflyError
 
     try:

@@ -1,25 +1,28 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from flight.export import plan_mission
-from flight.mission import Mission
-from flight.mission_files import mission_text
-from flight.routing import make_route
-from flight.run_in import with_end_courses
-from flight.setup import FlightSetup, make_limits
-from flight.simulate import simulate
-from flight.track import Track
-from logs.check import judge_flight, judge_plan_only
-from logs.reader import LogEvent
-from logs.recorder import Recorder, thin_track
-from logs.verdict import Verdict
-from planfly.progress import Advance
-from planfly.vehicle import Vehicle, choose_seed, load_vehicle
+from flight.mission.end_courses import with_end_courses
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import Mission
+from flight.mission.routing import make_route
+from flight.mission_files.formats import mission_text
+from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
+from logs.recording.reader import LogEvent
+from logs.recording.recorder import Recorder, thin_track
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from planfly.airframe import Airframe, choose_seed, load_airframe
 from planner.plan import Plan
-from planner.search import plan_path
+from planner.search.plan_path import plan_path
 from world.scenario import Scenario, load_scenario
+
+# How far a stage is: done, whole, a remark.
+Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
 BATCH = 60
@@ -44,38 +47,41 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     """
     world = load_scenario(scenario) if isinstance(scenario, str) else scenario
     number = choose_seed(world, seed)
-    vehicle = load_vehicle(world)
-    plan = make_plan(world, vehicle, number)
-    mission = plan_mission(plan, vehicle.airspeed, vehicle.max_bank)
+    airframe = load_airframe(world)
+    plan = make_plan(world, airframe, number)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
-    setup = make_setup(world, vehicle, mission, number, plan=plan)
-    track, _, verdict = fly(setup, vehicle, None if log is None else Path(log))
+    setup = make_setup(world, airframe, mission, number, plan=plan)
+    track, _, verdict = fly(setup, airframe, None if log is None else Path(log))
     return PlanThenFly(plan, mission, track, verdict)
 
 
 def make_plan(
-    scenario: Scenario, vehicle: Vehicle, seed: int, algorithm: str | None = None, advance: Advance | None = None
+    scenario: Scenario, airframe: Airframe, seed: int, algorithm: str | None = None, advance: Advance | None = None
 ) -> Plan:
     """Plan within the scenario's and the aircraft's limits."""
-    limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+    limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
     return plan_path(scenario, limits, seed=seed, algorithm=algorithm, progress=advance)
 
 
 def make_setup(
     scenario: Scenario,
-    vehicle: Vehicle,
+    airframe: Airframe,
     mission: Mission,
     seed: int,
     *,
     plan: Plan | None = None,
     on_the_spot: bool = False,
 ) -> FlightSetup:
-    """Everything that decides the flight of a mission in a scenario.  on_the_spot: of `flight.routing.make_route`."""
-    limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+    """Everything that decides the flight of a mission in a scenario.
+
+    on_the_spot: of `flight.mission.routing.make_route`.
+    """
+    limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
     fly_over = scenario.flight.fly_over
     route = make_route(
-        mission, scenario.origin, scenario.terrain, vehicle.airspeed, fly_over, limits, on_the_spot=on_the_spot
+        mission, scenario.origin, scenario.terrain, airframe.airspeed, fly_over, limits, on_the_spot=on_the_spot
     )
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
@@ -83,11 +89,11 @@ def make_setup(
         mission=mission,
         mission_text=mission_text(mission, "waypoints"),
         route=route,
-        envelope=vehicle.envelope,
-        aircraft=vehicle.aircraft.name,
-        airspeed=vehicle.airspeed,
-        max_bank=vehicle.max_bank,
-        battery=vehicle.battery,
+        envelope=airframe.envelope,
+        aircraft=airframe.aircraft.name,
+        airspeed=airframe.airspeed,
+        max_bank=airframe.max_bank,
+        battery=airframe.battery,
         seed=seed,
         plan=plan,
         guidance=scenario.flight.guidance,
@@ -103,7 +109,7 @@ def flight_events(track: Track, ended: str) -> list[LogEvent]:
 
 
 def fly(
-    setup: FlightSetup, vehicle: Vehicle, log: Path | None, advance: Advance | None = None, *, every: int = 1
+    setup: FlightSetup, airframe: Airframe, log: Path | None, advance: Advance | None = None, *, every: int = 1
 ) -> tuple[Track, str, Verdict]:
     """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict.
 
@@ -115,10 +121,10 @@ def fly(
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
 
     if log is None:
-        flown = simulate(setup, vehicle.aircraft, progress=tell)
+        flown = simulate(setup, airframe.aircraft, progress=tell)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = simulate(setup, vehicle.aircraft, sink=recorder.write_rows, progress=tell)
+        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=tell)
         track = thin_track(flown.track, every)
         verdict = judge_flight(setup, track, flown.ended)
         for event in flight_events(track, flown.ended):

@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from logs.verdict import Finding, Verdict
+from logs.verdict.findings import Finding, Verdict
 from world.scenario import Scenario, from_spec
 
 Spec = dict[str, Any]

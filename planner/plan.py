@@ -13,8 +13,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from world.errors import MissionError, ScenarioError
 from world.scenario import Scenario, from_spec
-from world.scenario_changes import fixed_ends
 from world.scenario_file import first_error
+from world.scenario_variants import fixed_ends
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]

@@ -1,8 +1,8 @@
 """Random missions with a known answer: inside every limit by a margin, or beyond exactly one of them by it.
 
 Each comes from its number alone, by a seed that is the paper's year: place, courses, lengths, heights, speed, wind,
-turbulence, and whether a limit is the aircraft's or a number of the scenario's.  Limits are asked of `world.limits` and
-of the envelope; nothing here asks the rules that judge.
+turbulence, and whether a limit is the aircraft's or a number of the scenario's.  Limits are asked of
+`aircraft.path_limits` and of the envelope; nothing here asks the rules that judge.
 """
 
 import math
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.envelope import Envelope
-from flight.envelope import load_envelope
-from flight.mission import Command, Frame, Mission, MissionItem, on_grid
-from flight.setup import FlightSetup
+from aircraft.path_limits import Limits
+from flight.dynamics.envelope_tables import load_envelope
+from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
+from flight.simulation.flight_setup import FlightSetup
 from planfly.pipeline import Vehicle, load_vehicle, make_setup
 from world.frames import GeoOrigin, to_geo
-from world.limits import Limits
 from world.scenario import Scenario, from_spec
 from world.wind import Wind
 

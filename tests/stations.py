@@ -11,7 +11,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.mission_server import MissionServer, Station
+from flight.live.mission_server import MissionServer, Station
 
 
 def decode(message: Any, system: int, component: int) -> Any:

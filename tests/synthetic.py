@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope
-from flight.mission import Mission
-from flight.route import Route
-from flight.setup import FlightSetup
-from flight.track import Track
+from flight.mission.items import Mission
+from flight.mission.route import Route
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
 from world.geometry import leg_courses, leg_runs, signed_turns
 from world.scenario import Scenario, from_spec
 from world.terrain import Terrain

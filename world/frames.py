@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled, compiled_views
+from world.kernels import compiled, compiled_views
 
 if TYPE_CHECKING:
     from pyproj import Proj, Transformer

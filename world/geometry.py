@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled_views, inlined
+from world.kernels import compiled_views, inlined
 
 Floats = NDArray[np.float64]
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ValidationError
 
-from aircraft.catalog import is_folder
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
@@ -28,6 +27,7 @@ from world.scenario_file import (
     ThreatTable,
     check_scenario,
     first_error,
+    names_folder,
     parse_scenario,
     read_scenario_text,
 )
@@ -47,8 +47,8 @@ class Scenario:
     """One mission's world, in map axes (m) and radians.
 
     bounds: (2, 2) [[east0, east1], [north0, north1]].  floor, ceiling: m AMSL.  start, destination: (3,).
-    start_course, destination_course: rad or None.  terrain: None where none was given (a foreign mission).
-    foreign: made around a mission file that came without a scenario: its bounds are no limit and its empty
+    start_course, destination_course: rad or None.  terrain: None where none was given (an external mission).
+    external: made around a mission file that came without a scenario: its bounds are no limit and its empty
     threats say nothing.  spec: the checked file it came from, with which `from_spec` makes it again.
     """
 
@@ -68,7 +68,7 @@ class Scenario:
     planner: PlannerTable
     flight: FlightTable
     wind: Wind
-    foreign: bool = False
+    external: bool = False
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -127,7 +127,7 @@ def from_spec(
     base: Path | None = None,
     terrain: str | None = None,
     ground: Terrain | None = None,
-    foreign: bool = False,
+    external: bool = False,
 ) -> Scenario:
     """Make a scenario of a checked file, or of what `Scenario.to_json` gave.
 
@@ -158,7 +158,7 @@ def from_spec(
             ground = _made_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
-    if is_folder(spec.flight.aircraft):
+    if names_folder(spec.flight.aircraft):
         folder = str(Path(base or "", spec.flight.aircraft).resolve())
         spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft": folder})})
     # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
@@ -167,7 +167,7 @@ def from_spec(
         lambda: AreaTable(east_m=bounds[0].tolist(), north_m=bounds[1].tolist()), f"{source}: area"
     )
     spec = spec.model_copy(update={"origin": place, "area": area})
-    return _assemble(spec, source, origin, bounds, ground, foreign=foreign, replaced=terrain is not None)
+    return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
 
 
 def checked_table(make: Callable[[], Table], source: str) -> Table:
@@ -212,7 +212,7 @@ def _assemble(
     bounds: Floats,
     ground: Terrain | None,
     *,
-    foreign: bool,
+    external: bool,
     replaced: bool,
 ) -> Scenario:
     area = spec.area
@@ -224,7 +224,7 @@ def _assemble(
     # Ends that another terrain buries are for the verdict to find.
     for name, point in () if replaced else (("start", start), ("destination", destination)):
         _check_inside(name, point, source, bounds, floor, ceiling, ground)
-    if not foreign and math.dist(start[:2], destination[:2]) < 10.0:
+    if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start")
     wind = Wind(
         spec.wind.speed_mps,
@@ -251,7 +251,7 @@ def _assemble(
         planner=spec.planner,
         flight=spec.flight,
         wind=wind,
-        foreign=foreign,
+        external=external,
     )
 
 

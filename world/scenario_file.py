@@ -213,8 +213,16 @@ class PlannerTable(_Table):
     seed: Seed | None = None
 
 
+def names_folder(aircraft: str) -> bool:
+    """Whether an aircraft's name is that of a folder, not of an embedded aircraft: it has a slash."""
+    return "/" in aircraft or "\\" in aircraft
+
+
 class FlightTable(_Table):
-    """[flight].  guidance: the law that steers.  nav: how well guidance knows where it is, see `flight.navigation`."""
+    """[flight].
+
+    guidance: the law that steers.  nav: how well guidance knows where it is, see `flight.guidance.navigation_error`.
+    """
 
     aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
     airspeed_mps: Annotated[float, _within(15.0, 60.0)] | None = None

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from aircraft.compiled import compiled, compiled_views, inlined
 from world.frames import PolyMap, fit_polymap, polymap
+from world.kernels import compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aircraft import reference
+from aircraft import beard_mclain as reference
 from aircraft.catalog import load_aircraft
-from flight.fdm import Fdm, Variation
-from flight.state import STATE_SIZE, S
-from flight.trim import Trim, attitude, full_throttle, idle, linearise, straight
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.state import STATE_SIZE, S
+from flight.dynamics.trim import Trim, attitude, full_throttle, idle, linearise, straight
 
 Floats = NDArray[np.float64]
 

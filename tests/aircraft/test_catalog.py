@@ -146,8 +146,8 @@ def test_names_and_folders(tmp_path: Path, folder: Path) -> None:
 
 
 def test_metadata_agrees_with_the_trims() -> None:
-    from flight.fdm import Fdm
-    from flight.trim import fastest, slowest
+    from flight.dynamics.fdm import Fdm
+    from flight.dynamics.trim import fastest, slowest
 
     cessna = slowest(Fdm(load_aircraft("c172x")), 0.0)
     assert cessna is not None

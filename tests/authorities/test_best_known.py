@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from planner.search import plan_path
+from planner.search.plan_path import plan_path
 from tests.bench.task import make_task
 from tests.instances import CEILING, CLIMB_DEG, DIVE_DEG, MAP, ground
 from world.scenario import Scenario, load_scenario

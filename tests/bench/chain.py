@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from flight.export import plan_mission
-from flight.fdm import Fdm
-from flight.setup import FlightSetup
-from flight.simulate import FDM_HZ, simulate
-from logs.check import judge_flight
-from logs.reader import read_log
-from logs.recorder import Recorder
+from flight.dynamics.fdm import Fdm
+from flight.mission.from_plan import plan_mission
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.simulate import FDM_HZ, simulate
+from logs.recording.reader import read_log
+from logs.recording.recorder import Recorder
+from logs.verdict.judge_flight import judge_flight
+from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import BATCH, make_plan, make_setup
-from planfly.vehicle import Vehicle, load_vehicle
 from tests.bench.timing import best_cpu
 from world.scenario import load_scenario
 
@@ -33,30 +33,30 @@ ROUNDS = 5
 def run() -> dict[str, Any]:
     """Measure, print a table, and return it."""
     scenario = load_scenario("jacksboro")
-    vehicle = load_vehicle(scenario)
-    plan = make_plan(scenario, vehicle, 1)
-    mission = plan_mission(plan, vehicle.airspeed, vehicle.max_bank)
-    setup = make_setup(scenario, vehicle, mission, 1, plan=plan)
-    flown = simulate(setup, vehicle.aircraft)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, 1)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+    setup = make_setup(scenario, airframe, mission, 1, plan=plan)
+    flown = simulate(setup, airframe.aircraft)
     seconds = float(flown.track.time[-1])
     steps = round(seconds * FDM_HZ)
 
     def bare() -> None:
-        fdm = Fdm(vehicle.aircraft, rate_hz=FDM_HZ)
-        trim = fdm.start(36.5, -84.2, 600.0, 0.0, vehicle.airspeed)
+        fdm = Fdm(airframe.aircraft, rate_hz=FDM_HZ)
+        trim = fdm.start(36.5, -84.2, 600.0, 0.0, airframe.airspeed)
         fdm.write(np.array(trim.commands()))
         fdm.step(steps)
 
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        times = recording(setup, vehicle, folder)
+        times = recording(setup, airframe, folder)
         hour, hours = long_flight(folder)
         size = hour.stat().st_size / hours / 1e6
         out = ("--out", str(folder / "report"), "--overwrite")
         times |= {
             "bare JSBSim": best_cpu(bare, ROUNDS),
             "judging": best_cpu(lambda: judge_flight(setup, flown.track, "completed"), ROUNDS),
-            "planning": best_cpu(lambda: make_plan(scenario, vehicle, 1), ROUNDS),
+            "planning": best_cpu(lambda: make_plan(scenario, airframe, 1), ROUNDS),
             "whole `planfly run`, new process": in_child("run", "--out", str(folder / "run"), "--overwrite"),
             "`planfly --help`, new process": in_child("--help"),
             "reading the long log": best_cpu(lambda: read_log(hour), 3),
@@ -85,17 +85,17 @@ def run() -> dict[str, Any]:
     return {"seconds": times, "ratios": ratios, "log_mb_per_hour": size, "long_log_hours": hours, "report_mb": page}
 
 
-def recording(setup: FlightSetup, vehicle: Vehicle, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
+def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
     """The flight without a log, with one at 20 Hz and with one at 60 Hz, flown in turn: CPU s, the least of each."""
     log = folder / "flight.mcap"
 
     def fly(every: int) -> None:
         with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-            flown = simulate(setup, vehicle.aircraft, sink=recorder.write_rows)
+            flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows)
             recorder.finish(flown.ended, None)
 
     work: dict[str, Callable[[], object]] = {
-        "flight": lambda: simulate(setup, vehicle.aircraft),
+        "flight": lambda: simulate(setup, airframe.aircraft),
         "flight, recorded at 20 Hz": lambda: fly(3),
         "flight, recorded at 60 Hz": lambda: fly(1),
     }

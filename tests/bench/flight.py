@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
-from flight import simulate as simulation
-from flight.fdm import Fdm, Variation
-from flight.gains import Gains, load_gains
-from flight.setup import FlightSetup
-from flight.simulate import FDM_HZ, Flight, Flown, simulate
+from flight.dynamics.fdm import Fdm, Variation
+from flight.guidance.gains import Gains, load_gains
+from flight.simulation import simulate as simulation
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.simulate import FDM_HZ, Flight, SimulatedFlight, simulate
 from tests.bench.angles import angles
 from tests.flight.conftest import MakeSetup, setup_maker, standard
 
@@ -67,7 +67,7 @@ def maker() -> MakeSetup:
     return setup_maker(aerosonde())
 
 
-def errors_of(flown: Flown) -> Errors:
+def errors_of(flown: SimulatedFlight) -> Errors:
     kept = flown.track.time > SETTLING
     cross = flown.track.cross_track[kept].astype(np.float64)
     height = flown.track.height_error[kept].astype(np.float64)
@@ -146,7 +146,7 @@ def flown_with(gains: Gains) -> Iterator[None]:
         module.load_gains = usual
 
 
-def straight_rms(setup: FlightSetup, flown: Flown, clear: float = CLEAR) -> float:
+def straight_rms(setup: FlightSetup, flown: SimulatedFlight, clear: float = CLEAR) -> float:
     """RMS distance (m) of the true track from the legs, further than ``clear`` from their corners."""
     way, track, found = setup.route.waypoints, flown.track, []
     for leg in range(len(way) - 1):

@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
-from flight.envelope import load_envelope
-from flight.gains import load_gains
-from flight.mission import Mission
-from flight.route import Route
-from flight.setup import FlightSetup, limits_of
-from flight.simulate import simulate
-from flight.track import Track
-from logs.route_shape import route_shape
+from flight.dynamics.envelope_tables import load_envelope
+from flight.guidance.gains import load_gains
+from flight.mission.items import Mission
+from flight.mission.route import Route
+from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
+from logs.verdict.measures.route_demands import route_demands
 from tests.bench.flight import flown_with
 from world.scenario import from_spec
 
@@ -88,7 +88,7 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
     route = Route(way, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
     battery = aircraft.battery_energy / 3600.0
     return FlightSetup(
-        scenario=from_spec(spec, "limits", foreign=True),
+        scenario=from_spec(spec, "limits", external=True),
         mission=Mission(None, (), source="limits"),
         mission_text="",
         route=route,
@@ -178,7 +178,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
         track = fly(leg)
         return track is not None and _held_bank(track) <= bank and float(np.abs(track.cross_track).max()) <= CROSS_HELD
 
-    shape = route_shape(made_setup(points(FAR), aircraft, wind, wind_from))
+    shape = route_demands(made_setup(points(FAR), aircraft, wind, wind_from))
     predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
     return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
 

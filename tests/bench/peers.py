@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.search import plan_path
+from planner.search.plan_path import plan_path
 from tests.bench.task import (
     PROBLEMS,
     Task,

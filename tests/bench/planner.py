@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.vehicle import load_vehicle
-from planner.algorithms import DEFAULT
-from planner.criteria import paper_scores
-from planner.preference import NO_GOAL, Level, ranks
-from planner.rules import Rules
-from planner.search import plan_path
+from planfly.airframe import load_airframe
+from planner.evaluation.paper_scores import paper_scores
+from planner.evaluation.problem_arrays import Rules
+from planner.optimisers.preference import NO_GOAL, Level, ranks
+from planner.search.algorithms import DEFAULT
+from planner.search.plan_path import plan_path
 from tests.bench.reference import brute_scores, compiled_generic_ranks, numpy_scores
 from tests.bench.task import PROBLEMS, Task, best_known, graded_scores, make_task
 from tests.bench.timing import best_cpu
@@ -129,16 +129,16 @@ def scaled(threats: int) -> Scenario:
 
 def scale() -> dict[str, Any]:
     """10,000 threats of the coverage of 60: cost a path."""
-    from flight.setup import make_limits
-    from planner.problem import make_problem
+    from flight.simulation.flight_setup import make_limits
+    from planner.evaluation.problem import make_problem
 
     task = make_task("paper-60")
     paths = random_paths(task, 500)
     micro: dict[str, dict[int, float]] = {"paper": {}, "graded": {}}
     for threats in (60, MANY):
         scenario = scaled(threats)
-        vehicle = load_vehicle(scenario)
-        limits = make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank)
+        airframe = load_airframe(scenario)
+        limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
         rules = make_problem(scenario, limits).search
         for name, judge in (("paper", paper_scores), ("graded", graded_scores)):
             judge(rules, paths)
@@ -202,7 +202,7 @@ def _runs_of(task: Task, algorithm: str, runs: int) -> dict[str, Any]:
 _FIRST = """
 import json, time
 from tests.bench.task import make_task
-from planner.search import plan_path
+from planner.search.plan_path import plan_path
 task = make_task("hard-60")
 plan = plan_path(task.scenario, task.problem.limits, seed=1, first_safe=True)
 print(json.dumps([plan.safe, float(plan.objectives[0]), time.process_time()]))

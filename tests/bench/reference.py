@@ -1,7 +1,7 @@
 """What our compiled judge and ranking are measured against: vectorised NumPy, and compiled brute force.
 
-Both are written from the paper's equations and the conventions of `planner.criteria.paper_scores`, and agree with it
-to 1e-12; they serve problems whose limits are numbers and whose ends have no course.
+Both are written from the paper's equations and the conventions of `planner.evaluation.paper_scores.paper_scores`, and
+agree with it to 1e-12; they serve problems whose limits are numbers and whose ends have no course.
 """
 
 import math
@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planner.rules import Rules
+from planner.evaluation.problem_arrays import Rules
 from world.geometry import CLOSEST
 from world.terrain import EDGE
 

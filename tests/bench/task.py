@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.setup import make_limits
-from planfly.vehicle import Vehicle, load_vehicle
-from planner.certify import certify
-from planner.encoding import ENCODINGS, Encoding, rotated_vectors
-from planner.graded import graded_scores
+from flight.simulation.flight_setup import make_limits
+from planfly.airframe import Airframe, load_airframe
+from planner.evaluation.certify import certify
+from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_vectors
+from planner.evaluation.graded_scores import graded_scores
+from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Certificate
-from planner.problem import Problem, make_problem
-from planner.sampling import bridge_basis, bridge_modes
-from planner.seeding import seeds
+from planner.seeding.first_samples import bridge_basis, bridge_modes
+from planner.seeding.grid_routes import seeds
 from world.scenario import Scenario, from_spec, load_scenario
 
 Floats = NDArray[np.float64]
@@ -32,7 +32,7 @@ class Task:
     """A scenario in the form of the compiled judges, in the rotated encoding."""
 
     scenario: Scenario
-    vehicle: Vehicle
+    airframe: Airframe
     problem: Problem
     encoding: Encoding
 
@@ -65,9 +65,9 @@ def is_safe(certificate: Certificate) -> bool:
 def make_task(name: str) -> Task:
     """The task of an embedded scenario."""
     scenario = load_scenario(name)
-    vehicle = load_vehicle(scenario)
-    problem = make_problem(scenario, make_limits(scenario, vehicle.envelope, vehicle.airspeed, vehicle.max_bank))
-    return Task(scenario, vehicle, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
+    airframe = load_airframe(scenario)
+    problem = make_problem(scenario, make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank))
+    return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
 
 
 def best_known(name: str) -> float:

@@ -18,11 +18,11 @@ from typing import Any
 import numpy as np
 
 from aircraft.catalog import Aircraft, load_aircraft
-from flight import simulate as simulation
-from flight.fdm import JSBSIM_VERSION, Fdm
-from flight.gains import Gains, load_gains
-from flight.simulate import Flown, simulate
-from flight.trim import linearise, straight
+from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
+from flight.dynamics.trim import linearise, straight
+from flight.guidance.gains import Gains, load_gains
+from flight.simulation import simulate as simulation
+from flight.simulation.simulate import SimulatedFlight, simulate
 from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
 from tests.bench.tuning_missions import Case, cases
 from tests.flight.conftest import MakeSetup, setup_maker, standard
@@ -72,7 +72,8 @@ SPEED = 1.0
 # Weights of the surfaces' mean rate as a share of what they can, and of each degree of bank beyond the command's limit.
 EFFORT, BEYOND = 0.5, 0.2
 FAILED = 1000.0
-# Bank that guidance may add in what is searched and reported here, rad; flights have `flight.simulate.BANK_RESERVE`.
+# Bank that guidance may add in what is searched and reported here, rad; flights have
+# `flight.simulation.simulate.BANK_RESERVE`.
 RESERVE = math.radians(2.7)
 DIGITS = 3
 # No lag or smoothing is shorter than a tick at 60 Hz, s.
@@ -104,7 +105,7 @@ def model_gains(aircraft: Aircraft) -> dict[str, float]:
     }
 
 
-def fly(aircraft: Aircraft, gains: Gains, case: Case) -> Flown:
+def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
     """Fly a case with these gains, and a little less bank than flights have, not to lean on the last of it."""
     module: Any = simulation
     usual = module.BANK_RESERVE
@@ -137,7 +138,7 @@ def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:
     return found + BEYOND * max(0.0, errors.peak_bank - math.degrees(aircraft.max_bank) - 3.0)
 
 
-def speed_error(case: Case, flown: Flown) -> float:
+def speed_error(case: Case, flown: SimulatedFlight) -> float:
     """RMS over the legs of how far the mean airspeed of a leg's second half is from the command, m/s."""
     track, errors = flown.track, []
     for leg, command in enumerate(case.setup.route.airspeed):

@@ -13,9 +13,9 @@ from typing import Any, cast
 
 import numpy as np
 
-from flight.gains import load_gains
-from flight.setup import FlightSetup
-from flight.simulate import simulate
+from flight.guidance.gains import load_gains
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.simulate import simulate
 from tests.bench.flight import aerosonde, errors_of, flown_with, straight_rms, windy
 
 # Seeds of the training winds, 10 m/s with moderate turbulence from anywhere; the bench's are 0 and up.

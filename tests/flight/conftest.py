@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
-from flight.envelope import load_envelope
-from flight.mission import Mission
-from flight.route import Route
-from flight.setup import FlightSetup
+from flight.dynamics.envelope_tables import load_envelope
+from flight.mission.items import Mission
+from flight.mission.route import Route
+from flight.simulation.flight_setup import FlightSetup
 from world.scenario import from_spec
 
 MakeSetup = Callable[..., FlightSetup]
@@ -72,7 +72,7 @@ def setup_maker(aircraft: Aircraft) -> MakeSetup:
             "destination": ends[1],
             "wind": {"speed_mps": wind[0], "from_deg": wind[1], "turbulence": turbulence},
         }
-        scenario = from_spec(spec | tables, "made", foreign=True)
+        scenario = from_spec(spec | tables, "made", external=True)
         legs = len(way) - 1
         over = np.zeros(len(way), dtype=bool)
         over[list(fly_over)] = True

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import Envelope
-from flight.mission import Home, Mission, MissionItem
-from flight.route import Route
-from flight.setup import FlightSetup
-from flight.track import Track
-from logs.recorder import Recorder
-from logs.verdict import Finding, Verdict
+from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.route import Route
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.recorder import Recorder
+from logs.verdict.findings import Finding, Verdict
 from planner.plan import Certificate, Plan
 from world.scenario import from_spec
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import Envelope
-from world.limits import Limits
+from aircraft.path_limits import Limits
 from world.scenario import Scenario, from_spec
 
 

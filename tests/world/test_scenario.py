@@ -11,7 +11,7 @@ import pytest
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario, embedded_names, embedded_scenarios, from_spec, load_scenario
-from world.scenario_changes import with_wind
+from world.scenario_variants import with_wind
 
 
 def _spec(**changes: Any) -> dict[str, Any]:

@@ -1,0 +1,117 @@
+"""How a JSBSim model is spoken to: the properties behind our four commands and what we read back."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+_COMMANDS = ("elevator", "aileron", "rudder", "throttle")
+_READINGS = (*_COMMANDS, "current", "power")
+
+
+@dataclass(frozen=True, slots=True)
+class CommandProperty:
+    """One command: a property, and how much of it a radian (or full throttle) is, above and below zero.
+
+    Two factors, because a normalised stick often has unequal travels.
+    """
+
+    name: str
+    above: float
+    below: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One reading: a property and its factor to SI.  An empty name reads as zero: the aircraft has no such thing."""
+
+    name: str
+    factor: float
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """The properties of a JSBSim model, and what kind of model it is.
+
+    shipped: it stands in JSBSim's own aircraft folder.  settles: it has an engine with a speed of its own, which runs
+    from the start and settles before anything is measured.  commands: elevator, aileron, rudder, throttle.
+    readings: the same four, then battery current (A) and power (W).
+    """
+
+    shipped: bool
+    settles: bool
+    commands: tuple[CommandProperty, ...]
+    readings: tuple[Reading, ...]
+
+
+OURS = Model(
+    shipped=False,
+    settles=False,
+    commands=(
+        *(CommandProperty(f"command/{name}-rad", 1.0, 1.0) for name in _COMMANDS[:3]),
+        CommandProperty("command/throttle-norm", 1.0, 1.0),
+    ),
+    readings=(
+        *(Reading(f"surface/{name}-rad", 1.0) for name in _COMMANDS[:3]),
+        Reading("motor/throttle-norm", 1.0),
+        Reading("motor/battery-current-a", 1.0),
+        Reading("motor/battery-power-w", 1.0),
+    ),
+)
+
+
+def read_model(table: object) -> Model:
+    """Return the model of a metadata file's ``[model]`` table.
+
+    Raises ValueError, in one line that begins with the key, for an unknown, missing or bad entry.
+    """
+    table = _table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
+    commands = _table(table.get("command", {}), "model.command", _COMMANDS)
+    readings = _table(table.get("reading", {}), "model.reading", _READINGS)
+    made = []
+    for name, ours in zip(_COMMANDS, OURS.commands, strict=True):
+        if name not in commands:
+            made.append(ours)
+            continue
+        prop, above, below = _entry(commands[name], f"model.command.{name}", 2)
+        made.append(CommandProperty(prop, above, below))
+    seen = []
+    for name, mine in zip(_READINGS, OURS.readings, strict=True):
+        if name not in readings:
+            seen.append(mine)
+        elif readings[name] == []:
+            seen.append(Reading("", 0.0))
+        else:
+            prop, factor = _entry(readings[name], f"model.reading.{name}", 1)
+            seen.append(Reading(prop, factor))
+    shipped, settles = (_truth(table, name) for name in ("shipped_by_jsbsim", "engine_settles"))
+    return Model(shipped, settles, tuple(made), tuple(seen))
+
+
+def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
+    if not isinstance(value, dict):
+        raise ValueError(f"{key} = {value!r} is not a table")
+    if unknown := sorted(value.keys() - set(known)):
+        raise ValueError(f"{key}: unknown key {', '.join(unknown)}")
+    return value
+
+
+def _truth(table: dict[str, Any], name: str) -> bool:
+    value = table.get(name, False)
+    if not isinstance(value, bool):
+        raise ValueError(f"model.{name} = {value!r} is not true or false")
+    return value
+
+
+def _entry(value: object, key: str, numbers: int) -> tuple[Any, ...]:
+    """A property and its factors, none of them zero."""
+    good = isinstance(value, list) and len(value) == 1 + numbers and isinstance(value[0], str)
+    # JSBSim aborts the process over a name with a space in it.
+    if good and isinstance(value, list):
+        good = bool(value[0]) and value[0].isascii() and not any(letter.isspace() for letter in value[0])
+        good = good and all(
+            isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number) and number != 0.0
+            for number in value[1:]
+        )
+    if not good or not isinstance(value, list):
+        raise ValueError(f"{key} = {value!r} is not a property and {numbers} number(s) other than 0")
+    return (value[0], *(float(number) for number in value[1:]))

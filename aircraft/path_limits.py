@@ -1,0 +1,247 @@
+"""What a path may ask of the aircraft: the tighter of the scenario's numbers and the envelope's.
+
+The compiled functions judge a planner's candidate, a certificate and a route with one definition.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
+from world.geometry import wrap
+from world.kernels import compiled, compiled_views, inlined
+from world.wind import W20, Wind
+
+Floats = NDArray[np.float64]
+
+# Rolling from one bank into the other takes this long, s per rad, as far as it is more than the bank limit: that much
+# every turn rolls in from level.  From the shortest S-turn legs that flights hold (`tests.bench.limits`).
+ROLL_TIME = 0.8
+# Vertical acceleration where one slope blends into the next, m/s^2.
+BLEND_ACCELERATION = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Limits on turns, slopes and clearance.
+
+    max_turn, max_climb, max_dive: rad, or None where the scenario leaves them to the aircraft.
+    min_clearance: m above ground.  airspeed: m/s.  max_bank: rad, the tighter of scenario and aircraft.
+    """
+
+    max_turn: float | None
+    max_climb: float | None
+    max_dive: float | None
+    min_clearance: float
+    envelope: Envelope
+    airspeed: float
+    max_bank: float
+    wind: Wind
+
+    def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
+        """Steepest climb and dive over the ground that the aircraft can, rad, both positive, on this course.
+
+        Both are 0 where the wind leaves no way along the course.
+        """
+        climb, dive = aircraft_slopes(self.packed(airspeed), course, amsl)
+        return float(climb), float(dive)
+
+    def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
+        """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed on the way."""
+        return float(turn_radius_between(self.packed(airspeed), course_in, course_out, amsl))
+
+    def packed(self, airspeed: float | None = None) -> Floats:
+        """Pack the aircraft's side as one array, for the compiled functions.
+
+        (3, 8 + h): row 0 holds airspeed, tan(max_bank), wind speed, wind direction (towards, rad), gradient,
+        reference height, the number of table heights, the gusts' standard deviation; from column 8 on, rows 0..2 hold
+        the table's heights (m), climb and descent angles to the air (rad) at this airspeed.
+        """
+        speed = self.airspeed if airspeed is None else airspeed
+        heights = self.envelope.amsl
+        packed = np.zeros((3, 8 + heights.size))
+        wind = self.wind
+        packed[0, :8] = (
+            speed,
+            math.tan(self.max_bank),
+            wind.speed,
+            wind.from_course + math.pi,
+            wind.gradient,
+            wind.reference_amsl,
+            heights.size,
+            # sigma_w of MIL-F-8785C, which sigma_u meets at 300 m.
+            0.1 * W20[wind.turbulence],
+        )
+        packed[0, 8:] = heights
+        for k, amsl in enumerate(heights):
+            packed[1:, 8 + k] = self.envelope.air_angles(speed, float(amsl))
+        return packed
+
+
+@inlined
+def wind_speed_at(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
+    """Mean wind speed at a height, m/s."""
+    speed: float = max(0.0, packed[0, 2] + packed[0, 4] * (amsl - packed[0, 5]))
+    return speed
+
+
+@inlined
+def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pragma: no cover - compiled
+    """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
+    wind = wind_speed_at(packed, amsl)
+    angle = packed[0, 3] - course
+    return ground_speed(packed[0, 0], wind * math.cos(angle), wind * math.sin(angle))
+
+
+@inlined
+def downwind(packed: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+    """East and north of the unit vector that the wind blows towards."""
+    return math.sin(packed[0, 3]), math.cos(packed[0, 3])
+
+
+@compiled_views
+def slopes_along(
+    packed: Floats, tail_share: float, cross_share: float, amsl: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Steepest climb and dive over the ground, rad, with these shares of the wind along and across the course."""
+    count = int(packed[0, 6])
+    wind = wind_speed_at(packed, amsl)
+    k = 0
+    while k + 2 < count and packed[0, 9 + k] <= amsl:
+        k += 1
+    # By hand: numba's np.interp of one number costs a microsecond.
+    share = min(1.0, max(0.0, (amsl - packed[0, 8 + k]) / (packed[0, 9 + k] - packed[0, 8 + k])))
+    climb = packed[1, 8 + k] + share * (packed[1, 9 + k] - packed[1, 8 + k])
+    dive = packed[2, 8 + k] + share * (packed[2, 9 + k] - packed[2, 8 + k])
+    up = ground_slope(climb, packed[0, 0], wind * tail_share, wind * cross_share)
+    down = ground_slope(dive, packed[0, 0], wind * tail_share, wind * cross_share)
+    if math.isnan(up) or math.isnan(down):
+        return 0.0, 0.0
+    return up, down
+
+
+@compiled_views
+def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
+    angle = packed[0, 3] - course
+    return slopes_along(packed, math.cos(angle), math.sin(angle), amsl)
+
+
+@compiled_views
+def _turn_radius(
+    packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
+) -> float:  # pragma: no cover - compiled
+    """Arc radius between the unit courses u and v; w: downwind; side: of the turn, 0 for one flown either way."""
+    wind = wind_speed_at(packed, amsl)
+    if wind == 0.0:
+        # No way to be blown: the same speed on every course.
+        fastest = packed[0, 0]
+    else:
+        before = ground_speed(packed[0, 0], wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
+        after = ground_speed(packed[0, 0], wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
+        if math.isnan(before) or math.isnan(after):
+            return math.inf
+        fastest = max(before, after)
+        # The highest ground speed is downwind, if the turn passes through that course.
+        if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
+            fastest = max(fastest, packed[0, 0] + wind)
+    fastest += packed[0, 7]
+    radius: float = fastest * fastest / (GRAVITY * packed[0, 1])
+    return radius
+
+
+@compiled_views
+def turn_radius_between(
+    packed: Floats, course_in: float, course_out: float, amsl: float
+) -> float:  # pragma: no cover - compiled
+    """Arc radius at the bank limit for the highest ground speed between two courses; inf where one cannot be held.
+
+    In turbulence a standard deviation of the gusts comes on top: airspeed, and with it the bank that an arc
+    over the ground takes, swings by that much.
+    """
+    turn = wrap(course_out - course_in)
+    ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
+    wx, wy = downwind(packed)
+    # A U-turn may be flown either way.
+    side = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
+    return _turn_radius(packed, ux, uy, vx, vy, amsl, side, wx, wy)
+
+
+@compiled_views
+def corner_tangent(
+    packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Length of leg that the fly-by arc between the unit courses u and v takes on either side, and its radius, m.
+
+    R tan(theta/2) = R |sin| / (1 + cos); 0 for no turn, inf for a U-turn.  w: `downwind`.
+    """
+    cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
+    if abs(cross) < 1e-9 and dot > 0.0:
+        return 0.0, 0.0
+    if abs(cross) < 1e-6 and dot < 0.0:
+        return math.inf, 0.0
+    radius = _turn_radius(packed, ux, uy, vx, vy, amsl, cross, wx, wy)
+    return radius * abs(cross) / (1.0 + dot), radius
+
+
+@compiled_views
+def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
+    """Tangent of the slope along a fly-by arc: the heights of its tangent points over the arc's own length.
+
+    tan_in, tan_out: of the legs.  tangent = radius x tan(theta/2): the arc, radius x theta, is shorter than its two
+    tangents, and so steeper: by 1.27 at 90 degrees.
+    """
+    if tangent <= 0.0 or radius <= 0.0 or math.isinf(tangent):
+        return 0.0
+    half = math.atan(tangent / radius)
+    return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
+
+
+@compiled_views
+def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
+    """Run after a fly-over turn (rad), in radii; its greatest up to this angle, so that it never falls with the angle.
+
+    With overshoot angle phi, cos phi = (1 + cos turn)/2, the track is back on the leg after sin turn + 2 sin phi.
+    """
+    # Where sin turn + 2 sin phi is greatest, 2 sqrt 2.
+    sharpest = min(turn, math.acos(-1.0 / 3.0))
+    back = 0.5 * (1.0 + math.cos(sharpest))
+    return math.sin(sharpest) + 2.0 * math.sqrt(max(0.0, 1.0 - back * back))
+
+
+@compiled
+def turn_tangents(packed: Floats, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
+    """Length of leg that the fly-by arc at each waypoint uses on either side, (w,) m; 0 at the ends.
+
+    waypoints: (w, 3).  R tan(theta/2); a U-turn has no tangent point and gets inf.
+    """
+    count = waypoints.shape[0]
+    out = np.zeros(count)
+    wx, wy = downwind(packed)
+    for i in range(1, count - 1):
+        ux, uy = waypoints[i, 0] - waypoints[i - 1, 0], waypoints[i, 1] - waypoints[i - 1, 1]
+        vx, vy = waypoints[i + 1, 0] - waypoints[i, 0], waypoints[i + 1, 1] - waypoints[i, 1]
+        u, v = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
+        if u > 1e-6 and v > 1e-6:
+            out[i], _ = corner_tangent(packed, ux / u, uy / u, vx / v, vy / v, waypoints[i, 2], wx, wy)
+    return out
+
+
+@compiled
+def reversal_room(
+    packed: Floats, ux: float, uy: float, amsl: float, radius_in: float, radius_out: float, wx: float, wy: float
+) -> float:  # pragma: no cover - compiled
+    """Length of leg (m) that rolling from a turn into one the other way round takes, between arcs of these radii (m).
+
+    u: the leg's unit course.  w: `downwind`.  0 where the wind leaves no way along the leg.
+    """
+    wind = wind_speed_at(packed, amsl)
+    speed = ground_speed(packed[0, 0], wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + packed[0, 7]
+    if math.isnan(speed):
+        return 0.0
+    pull = speed * speed / GRAVITY
+    roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(packed[0, 1])
+    room: float = speed * ROLL_TIME * max(0.0, roll)
+    return room

@@ -1,0 +1,1 @@
+"""JSBSim behind one class: trims, model checks, envelope tables and flight characteristics."""

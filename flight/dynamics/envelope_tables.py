@@ -1,0 +1,150 @@
+"""Fills an aircraft's envelope from JSBSim trims, and keeps it in the user's cache folder."""
+
+import contextlib
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from platformdirs import user_cache_dir
+
+from aircraft.catalog import Aircraft, model_hash
+from aircraft.envelope import POWERS, TABLES, Envelope
+from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
+from flight.dynamics.state import STATE_SIZE, S
+from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
+from world.atomic_files import write_whole
+
+# Any change of what the file holds or of how it is computed counts this up.
+_SCHEMA = 4
+_SPEEDS = 11
+_AMSL = np.arange(0.0, 9001.0, 1000.0)
+_TABLES = (*TABLES, *POWERS)
+
+
+def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelope:
+    """Return the aircraft's envelope, from the cache if it is there, computed and cached if not.
+
+    Both are equal to the last bit.  A cache file that cannot be read, is damaged or is for another model, JSBSim or
+    schema is computed anew; a cache folder that cannot be written to is left alone.
+    Raises FlightError for a model that JSBSim cannot load.
+    """
+    file = cache_file(aircraft, motor_braking)
+    key = _key(aircraft, motor_braking)
+    tables = _read(file, key, _airspeeds(aircraft))
+    if tables is None:
+        tables = compute_tables(aircraft, motor_braking)
+        _write(file, key, tables)
+    return Envelope(
+        aircraft=aircraft.name,
+        model_hash=model_hash(aircraft),
+        motor_braking=motor_braking,
+        max_bank=aircraft.max_bank,
+        volts=aircraft.battery_voltage,
+        **tables,
+    )
+
+
+def cache_file(aircraft: Aircraft, motor_braking: bool) -> Path:
+    """Where this envelope is kept."""
+    kind = "braking" if motor_braking else "coasting"
+    name = f"envelope-{aircraft.name}-{model_hash(aircraft)[:16]}-{kind}-v{_SCHEMA}.json"
+    return Path(user_cache_dir("planfly")) / name
+
+
+def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]:
+    """Trim over the grid: the tables of `aircraft.envelope.Envelope` by name.
+
+    In still standard atmosphere at 45 degrees latitude on a course due north.
+    """
+    fdm = Fdm(aircraft, motor_braking=motor_braking)
+    airspeeds = _airspeeds(aircraft)
+    climb = np.full((airspeeds.size, _AMSL.size), math.nan)
+    descent = climb.copy()
+    powers = {name: climb.copy() for name in POWERS}
+    slow, fast = np.full(_AMSL.size, math.nan), np.full(_AMSL.size, math.nan)
+    for j, amsl in enumerate(_AMSL.tolist()):
+        up: Trim | None = None
+        down: Trim | None = None
+        even: Trim | None = None
+        # From fast to slow: the last ones may not exist, and each trim starts from its neighbour's.
+        for i in reversed(range(airspeeds.size)):
+            airspeed = float(airspeeds[i])
+            if found := full_throttle(fdm, airspeed, amsl, up):
+                up, climb[i, j] = found, found.climb
+                powers["power_full"][i, j] = _power(fdm, found)
+            if found := idle(fdm, airspeed, amsl, down):
+                down, descent[i, j] = found, -found.climb
+                powers["power_idle"][i, j] = _power(fdm, found)
+            if found := straight(fdm, airspeed, amsl, near=even):
+                even, powers["power_level"][i, j] = found, _power(fdm, found)
+        if found := fastest(fdm, amsl):
+            fast[j] = found.airspeed
+        if found := slowest(fdm, amsl):
+            slow[j] = found.airspeed
+    # A trim is good to about 1e-11; nine decimals are the same on every machine.
+    return {
+        "airspeed": airspeeds,
+        "amsl": _AMSL,
+        "climb": climb.round(9),
+        "descent": descent.round(9),
+        "level_speed_min": slow.round(9),
+        "level_speed_max": fast.round(9),
+        **{name: table.round(6) for name, table in powers.items()},
+    }
+
+
+def _power(fdm: Fdm, at: Trim) -> float:
+    """Power of a trim, W."""
+    state = np.zeros(STATE_SIZE)
+    fdm.balance(at.vector())
+    fdm.read(state)
+    return float(state[S.POWER])
+
+
+def _airspeeds(aircraft: Aircraft) -> Floats:
+    """(v,) from the stall to 5 m/s above the fastest that guidance may use, m/s."""
+    return np.linspace(math.ceil(aircraft.stall_speed), math.ceil(aircraft.airspeed_max) + 5.0, _SPEEDS)
+
+
+def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
+    return {
+        "schema": _SCHEMA,
+        "aircraft": aircraft.name,
+        "model_hash": model_hash(aircraft),
+        "motor_braking": motor_braking,
+        "jsbsim": JSBSIM_VERSION,
+    }
+
+
+def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
+    """Return the tables of a cache file, or None if it is not whole, sound and for this key."""
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        if {name: content[name] for name in key} != key:
+            return None
+        # No trim is kept as null, because JSON has no NaN; numpy reads it back as NaN.
+        tables = {name: np.array(content["tables"][name], dtype=np.float64) for name in _TABLES}
+    except (OSError, ValueError, KeyError, TypeError):
+        return None
+    grid = (airspeeds.size, _AMSL.size)
+    shapes = dict.fromkeys(("climb", "descent", *POWERS), grid) | {"airspeed": airspeeds.shape}
+    if any(tables[name].shape != shapes.get(name, _AMSL.shape) for name in _TABLES):
+        return None
+    if not (np.array_equal(tables["airspeed"], airspeeds) and np.array_equal(tables["amsl"], _AMSL)):
+        return None
+    return tables
+
+
+def _write(file: Path, key: dict[str, Any], tables: dict[str, Floats]) -> None:
+    """Write a cache file whole or not at all; without room or permission, do nothing."""
+    values: dict[str, object] = {}
+    for name, table in tables.items():
+        entries = table.astype(object)
+        entries[np.isnan(table)] = None
+        values[name] = entries.tolist()
+    text = json.dumps(key | {"tables": values}, allow_nan=False)
+    with contextlib.suppress(OSError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(file, text)

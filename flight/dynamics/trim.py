@@ -1,0 +1,264 @@
+"""Steady straight flight: the controls and attitude at which nothing accelerates, and the dynamics about it.
+
+A trim has eight quantities, `T`.  Two are held and Newton's method finds the other six, so that the six body
+accelerations vanish.  Speeds and angles are relative to the air mass.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.dynamics.state import COMMAND_SIZE, C
+from world.errors import FlightError
+
+Floats = NDArray[np.float64]
+
+
+class T(IntEnum):
+    """Rows of a trim vector, SI and radians."""
+
+    AIRSPEED = 0
+    CLIMB = 1  # flight-path angle to the air mass
+    ALPHA = 2
+    BANK = 3  # about the velocity; sideslip is zero
+    ELEVATOR = 4
+    AILERON = 5
+    RUDDER = 6
+    THROTTLE = 7
+
+
+# Of the order of one step of Newton's method; also the scale of the finite differences.
+_STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
+_DIFFERENCE = 1e-5
+START = np.array([25.0, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
+_CONVERGED = 1e-8  # m/s^2 and rad/s^2
+_ITERATIONS = 40
+
+
+@dataclass(frozen=True, slots=True)
+class Trim:
+    """A steady straight flight.
+
+    airspeed: m/s.  amsl: m.  climb: rad, flight-path angle to the air mass.  alpha, bank: rad.
+    elevator, aileron, rudder: rad.  throttle: 0..1.
+    """
+
+    airspeed: float
+    amsl: float
+    climb: float
+    alpha: float
+    bank: float
+    elevator: float
+    aileron: float
+    rudder: float
+    throttle: float
+
+    def commands(self) -> Floats:
+        """(4,) commands that hold it, in the order of `flight.dynamics.state.C`."""
+        commands = np.empty(COMMAND_SIZE)
+        commands[C.ELEVATOR] = self.elevator
+        commands[C.AILERON] = self.aileron
+        commands[C.RUDDER] = self.rudder
+        commands[C.THROTTLE] = self.throttle
+        return commands
+
+    def vector(self) -> Floats:
+        """(8,) the trim vector, in the order of `T`."""
+        return np.array(
+            [
+                self.airspeed,
+                self.climb,
+                self.alpha,
+                self.bank,
+                self.elevator,
+                self.aileron,
+                self.rudder,
+                self.throttle,
+            ]
+        )
+
+
+class Simulator(Protocol):
+    """What a trim needs of a flight-dynamics model; `flight.dynamics.fdm.Fdm` has it."""
+
+    def place(self, amsl: float) -> None:
+        """Move the point of evaluation to this height."""
+
+    def balance(self, values: Floats) -> Floats:
+        """(6,) body accelerations, m/s^2 and rad/s^2, of the steady flight with this trim vector (8,)."""
+
+    def surface_limits(self) -> tuple[float, float, float]:
+        """Elevator, aileron and rudder limits, rad, either way."""
+
+    def first_guess(self) -> Floats:
+        """(8,) a trim vector to start from."""
+
+    def derivatives(self, states: Floats, commands: Floats) -> Floats:
+        """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) with surfaces and motor at their commands."""
+
+
+def solve(
+    balance: Callable[[Floats], Floats],
+    held: dict[T, float],
+    limits: tuple[float, float, float],
+    start: Floats | None = None,
+) -> Floats | None:
+    """Return the trim vector (8,) with two quantities held, or None where there is no such flight.
+
+    balance: trim vector -> (6,) accelerations.  limits: of elevator, aileron, rudder.  start: (8,) first guess.
+    Newton's method with one-sided differences; a step is cut to `_STEP` and halved while it makes things worse.
+    """
+    values = (START if start is None else start).copy()
+    for row, value in held.items():
+        values[row] = value
+    free = np.array([row for row in T if row not in held])
+    lowest, highest = _bounds(limits)
+    residual = balance(values)
+    for _ in range(_ITERATIONS):
+        size = float(np.abs(residual).max())
+        if size < _CONVERGED or not np.isfinite(size):
+            break
+        columns = []
+        for row in free:
+            moved = values.copy()
+            # Away from the stops: a surface past its stop no longer moves, and its column would be zero.
+            difference = _DIFFERENCE * _STEP[row] * (-1.0 if values[row] >= 0.0 else 1.0)
+            moved[row] += difference
+            columns.append((balance(moved) - residual) / difference)
+        step = np.linalg.lstsq(np.array(columns).T, -residual, rcond=1e-12)[0]
+        step /= max(1.0, float(np.abs(step / _STEP[free]).max()))
+        for _ in range(6):
+            trial = values.copy()
+            trial[free] += step
+            trial = np.clip(trial, lowest, highest)
+            changed = balance(trial)
+            if np.abs(changed).max() < size:
+                break
+            step = 0.5 * step
+        values, residual = trial, changed
+    settled = np.abs(residual).max() < 10.0 * _CONVERGED
+    return values if settled else None
+
+
+def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
+    elevator, aileron, rudder = limits
+    lowest = np.array([5.0, -1.2, -0.4, -0.5, -elevator, -aileron, -rudder, 0.0])
+    highest = np.array([80.0, 1.2, 0.4, 0.5, elevator, aileron, rudder, 1.0])
+    return lowest, highest
+
+
+def trim(simulator: Simulator, amsl: float, held: dict[T, float], near: Trim | None = None) -> Trim | None:
+    """Return the steady flight at this height with two of its quantities held, or None if there is none.
+
+    near: a trim to start from.
+    """
+    simulator.place(amsl)
+    start = near.vector() if near else simulator.first_guess()
+    values = solve(simulator.balance, held, simulator.surface_limits(), start)
+    return None if values is None else from_vector(values, amsl)
+
+
+def from_vector(values: Floats, amsl: float) -> Trim:
+    """Return the trim with this vector (8,), in the order of `T`."""
+    airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
+    return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
+
+
+def straight(
+    simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
+) -> Trim | None:
+    """Steady flight at this airspeed (m/s), height (m) and air-mass path angle (rad)."""
+    return trim(simulator, amsl, {T.AIRSPEED: airspeed, T.CLIMB: climb}, near)
+
+
+def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Steepest steady climb at this airspeed (m/s) and height (m)."""
+    return trim(simulator, amsl, {T.AIRSPEED: airspeed, T.THROTTLE: 1.0}, near)
+
+
+def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Steepest steady descent at this airspeed (m/s) and height (m), throttle closed."""
+    return trim(simulator, amsl, {T.AIRSPEED: airspeed, T.THROTTLE: 0.0}, near)
+
+
+def fastest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Level flight at full throttle."""
+    return trim(simulator, amsl, {T.CLIMB: 0.0, T.THROTTLE: 1.0}, near)
+
+
+def slowest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
+    """Level flight with the elevator at its upper stop."""
+    return trim(simulator, amsl, {T.CLIMB: 0.0, T.ELEVATOR: -simulator.surface_limits()[0]}, near)
+
+
+def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
+    """Return A (8, 8) and B (8, 4) about a trim, by central differences.
+
+    States u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air); commands in the order of
+    `flight.dynamics.state.C`, with actuator and motor lags left out.  Height and course are held.
+    """
+    simulator.place(at.amsl)
+    roll, pitch = attitude(at)
+    states = np.array([at.airspeed * np.cos(at.alpha), 0.0, at.airspeed * np.sin(at.alpha), 0.0, 0.0, 0.0, roll, pitch])
+    commands = at.commands()
+
+    def column(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
+        low, high = vector.copy(), vector.copy()
+        low[index] -= 1e-4
+        high[index] += 1e-4
+        return (rate(high) - rate(low)) / 2e-4
+
+    a = [column(i, states, lambda moved: simulator.derivatives(moved, commands)) for i in range(8)]
+    b = [column(i, commands, lambda moved: simulator.derivatives(states, moved)) for i in range(COMMAND_SIZE)]
+    return np.array(a).T, np.array(b).T
+
+
+def attitude(at: Trim) -> tuple[float, float]:
+    """Roll and pitch of a trim, rad."""
+    roll, pitch, _ = euler(body_axes(0.0, at.climb, at.bank, at.alpha))
+    return roll, pitch
+
+
+def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats:
+    """(3, 3) rotation from body to north-east-down axes for a velocity along ``heading`` and ``climb``, no sideslip."""
+    ch, sh, cc, sc = np.cos(heading), np.sin(heading), np.cos(climb), np.sin(climb)
+    cb, sb, ca, sa = np.cos(bank), np.sin(bank), np.cos(alpha), np.sin(alpha)
+    forward = np.array([ch * cc, sh * cc, -sc])
+    level_right = np.array([-sh, ch, 0.0])
+    level_down = np.array([ch * sc, sh * sc, cc])
+    right = cb * level_right + sb * level_down
+    down = cb * level_down - sb * level_right
+    return np.column_stack([ca * forward - sa * down, right, sa * forward + ca * down])
+
+
+def euler(axes: Floats) -> tuple[float, float, float]:
+    """Roll, pitch and yaw, rad, of a rotation (3, 3) from body to north-east-down axes."""
+    return (
+        float(np.arctan2(axes[2, 1], axes[2, 2])),
+        float(np.arcsin(np.clip(-axes[2, 0], -1.0, 1.0))),
+        float(np.arctan2(axes[1, 0], axes[0, 0])),
+    )
+
+
+def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> Floats:
+    """Velocity relative to the air, (3,) north, east, down, of a path over the ground in a wind.
+
+    course, climb: rad, of the path.  airspeed: m/s.  wind: (3,) m/s, the way the air moves.
+    Raises FlightError where the airspeed makes no way against the wind.
+    """
+    along = np.array([math.cos(climb) * math.cos(course), math.cos(climb) * math.sin(course), -math.sin(climb)])
+    tailwind = float(along @ wind)
+    square = airspeed**2 - float(wind @ wind) + tailwind**2
+    speed = tailwind + math.sqrt(square) if airspeed > 0.0 and square > 0.0 else -1.0
+    if speed <= 0.0:
+        raise FlightError(
+            f"no way made along the course of {math.degrees(course):.0f} degrees:"
+            f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind"
+        )
+    velocity: Floats = speed * along - wind
+    return velocity

@@ -1,0 +1,173 @@
+"""The path that a fixed wing can fly: straight legs joined by fly-by arcs, slopes joined by parabolas.
+
+A fly-by arc has the bank-limited radius for the highest ground speed on its way, and the corners of a loiter that of
+its circle.  Where the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
+stays whole: the flight will then leave it, and the verdict says so.  A fly-over waypoint is passed through: its corner
+stays sharp, as do U-turns.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import BLEND_ACCELERATION, Limits
+from flight.guidance.path_kernels import profile
+from flight.mission.route import Route
+from world.geometry import arc_reach, leg_courses, leg_runs, signed_turns
+
+Floats = NDArray[np.float64]
+
+# Where the legs have no room for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
+# by most of the legs, and a U-turn has no arc at all.
+SHARPEST = math.radians(150.0)
+# Chords of an arc turn by at most this, rad.
+CHORD = math.radians(5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class FlyByPath:
+    """A path in packed rows, by distance along it.
+
+    pieces: (p, 8) each row a straight piece or an arc: distance at its start, length, east, north and course at its
+    start, curvature (1/m, positive to the right), leg of its start, distance at which the leg changes.
+    nodes: (k, 4) of the height profile: distance, height of the corner, slope (tangent) after it, half-length of its
+    parabola.  length: m.
+    """
+
+    pieces: Floats
+    nodes: Floats
+    length: float
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        self.pieces.setflags(write=False)
+        self.nodes.setflags(write=False)
+
+
+def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
+    """Join the legs of a route.  The route has at least one leg, and no leg without horizontal length."""
+    points = route.waypoints
+    courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
+    tangents, radii = _arcs(route, limits, courses, runs, turns)
+    pieces: list[list[float]] = []
+    nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
+    slopes = np.diff(points[:, 2]) / runs
+    at = 0.0
+    place = points[0, :2].copy()
+    for leg in range(route.legs):
+        straight = runs[leg] - tangents[leg] - tangents[leg + 1]
+        course = float(courses[leg])
+        if straight > 1e-6 or not pieces:
+            pieces.append([at, straight, *place, course, 0.0, leg, math.inf])
+            at += straight
+        corner = points[leg + 1]
+        place = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
+        entry = float(corner[2] - slopes[leg] * tangents[leg + 1])
+        nodes.append((at, entry))
+        if leg + 1 == route.legs or tangents[leg + 1] == 0.0:
+            continue
+        turn = float(turns[leg])
+        length = radii[leg + 1] * abs(turn)
+        pieces.append([at, length, *place, course, math.copysign(1.0 / radii[leg + 1], turn), leg, at + length / 2])
+        at += length
+        after = float(courses[leg + 1])
+        place = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
+        nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
+    return FlyByPath(np.array(pieces), _profile(nodes, limits, route), float(at))
+
+
+def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats]:
+    """Tangent lengths and radii at each waypoint, (w,) m, shrunk where a leg has no room for them."""
+    count = len(route.waypoints)
+    tangents, radii = np.zeros(count), np.zeros(count)
+    for i in range(1, count - 1):
+        turn = abs(float(turns[i - 1]))
+        if route.fly_over[i] or turn < 1e-6:
+            continue
+        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
+        radius = float(route.arcs[i]) or limits.turn_radius(
+            float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed
+        )
+        tangents[i] = arc_reach(turn, radius)
+    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST, [False]])
+    short = tangents[:-1] + tangents[1:] > runs
+    tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
+    # Where the wind leaves no way along a leg there is no radius; the longest that fits is drawn.
+    tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
+    wanted = tangents.copy()
+    for leg in range(len(runs)):
+        both = wanted[leg] + wanted[leg + 1]
+        if both > runs[leg]:
+            share = runs[leg] / both
+            tangents[leg] = min(tangents[leg], wanted[leg] * share)
+            tangents[leg + 1] = min(tangents[leg + 1], wanted[leg + 1] * share)
+    drawn = np.flatnonzero(tangents)
+    radii[drawn] = tangents[drawn] / np.tan(np.abs(turns[drawn - 1]) / 2)
+    return tangents, radii
+
+
+def _profile(nodes: list[tuple[float, float]], limits: Limits, route: Route) -> Floats:
+    """Corners of the height profile with the parabola that blends each."""
+    at = np.array([node[0] for node in nodes])
+    up = np.array([node[1] for node in nodes])
+    keep = np.concatenate([[True], np.diff(at) > 1e-3])
+    # Of two corners at one place the later one is on the leg that follows.
+    at, up = at[keep], up[keep]
+    slopes = np.diff(up) / np.diff(at)
+    after = np.concatenate([slopes, slopes[-1:]])
+    change = np.concatenate([[0.0], np.diff(slopes), [0.0]])
+    speed = float(route.airspeed.max()) + limits.wind.strongest(route.waypoints[:, 2])
+    half = np.abs(change) * speed**2 / (2.0 * BLEND_ACCELERATION)
+    gaps = np.diff(at)
+    room = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
+    return np.column_stack([at, up, after, np.minimum(half, room)])
+
+
+def sample_path(path: FlyByPath, step: float) -> Floats:
+    """Points on the path about every ``step`` m, (n, 3) with its end, for figures and tests."""
+    distances = np.append(np.arange(0.0, path.length, step), path.length)
+    out = np.empty((distances.size, 3))
+    for k, s in enumerate(distances):
+        out[k] = _point_at(path, float(s))
+    return out
+
+
+def _point_at(path: FlyByPath, s: float) -> tuple[float, float, float]:
+    row = path.pieces[max(0, int(np.searchsorted(path.pieces[:, 0], s, side="right")) - 1)]
+    east, north = arc_point(row, s - row[0])
+    return east, north, float(profile(path.nodes, s)[0])
+
+
+def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
+    """The path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
+
+    Chords of arcs turn by at most `CHORD`; on a 160 m radius they leave the arc by 0.15 m.
+    """
+    stops = [0.0, path.length]
+    for at, length, _, _, _, curvature, _, change in path.pieces:
+        parts = max(1, math.ceil(abs(curvature) * length / CHORD))
+        stops += [at + length * k / parts for k in range(parts + 1)]
+        if math.isfinite(change):
+            stops.append(change)
+    for at, _, _, half in path.nodes:
+        stops += [at + half * share for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    inside = np.clip(np.array(stops), 0.0, path.length)
+    distances = np.unique(np.round(inside, 6))
+    points = np.array([_point_at(path, float(s)) for s in distances])
+    middles = 0.5 * (distances[1:] + distances[:-1])
+    pieces = path.pieces[np.maximum(0, np.searchsorted(path.pieces[:, 0], middles, side="right") - 1)]
+    return points, (pieces[:, 6] + (middles > pieces[:, 7])).astype(np.int64)
+
+
+def arc_point(piece: Floats, along: float) -> tuple[float, float]:
+    """Position on a piece ``along`` metres from its start."""
+    course, curvature = piece[4], piece[5]
+    if curvature == 0.0:
+        return piece[2] + along * math.sin(course), piece[3] + along * math.cos(course)
+    turned = course + curvature * along
+    return (
+        piece[2] + (math.cos(course) - math.cos(turned)) / curvature,
+        piece[3] + (math.sin(turned) - math.sin(course)) / curvature,
+    )

@@ -1,0 +1,101 @@
+"""The lateral laws that other autopilots fly, as formulas: L1 and the vector field.
+
+L1 is the law of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900) in the
+form that ArduPlane gives it: period and damping as parameters, a capture angle of 45 degrees, an integrator, and
+switching legs at a turn distance.  The field is that of Beard and McLain, *Small Unmanned Aircraft*, chapter 10.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.geometry import wrap
+from world.kernels import compiled
+
+Floats = NDArray[np.float64]
+
+# ArduPlane's WP_RADIUS where a mission states no acceptance, m.
+WAYPOINT_RADIUS = 90.0
+# L1 integrates only this near to its line (rad), and up to this much (rad).
+_INTEGRATES, _MOST_INTEGRAL = math.radians(5.0), 0.1
+# Steepest that L1 closes in on its line: sine of 45 degrees.
+_CAPTURE = math.sqrt(0.5)
+# L1 heads back to a waypoint that it passed this long ago, s.
+_PASSED = 3.0
+
+
+@compiled
+def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: no cover - compiled
+    """How far ahead L1 aims, m, at a ground speed (m/s)."""
+    return period * damping * speed / math.pi
+
+
+@compiled
+def l1_angles(place: Floats, a: Floats, b: Floats, length: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Angle from the ground velocity to the leg or the waypoint it heads for, and from there to its aim, rad.
+
+    place: east, north, up, ground velocity east and north.  a, b: the leg's ends, east and north first.  The second is
+    NaN while it heads straight for a waypoint.  Both are positive where the aircraft has to turn left.
+    """
+    leg_e, leg_n = b[0] - a[0], b[1] - a[1]
+    run = max(1e-6, math.hypot(leg_e, leg_n))
+    leg_e, leg_n = leg_e / run, leg_n / run
+    from_e, from_n = place[0] - a[0], place[1] - a[1]
+    along = from_e * leg_e + from_n * leg_n
+    cross = from_e * leg_n - from_n * leg_e
+    distance = math.hypot(from_e, from_n)
+    course = math.atan2(place[3], place[4])
+    if distance > length and along < -_CAPTURE * max(1.0, distance):
+        return wrap(course - math.atan2(-from_e, -from_n)), math.nan
+    if along > run + _PASSED * math.hypot(place[3], place[4]):
+        return wrap(course - math.atan2(b[0] - place[0], b[1] - place[1])), math.nan
+    aim = math.asin(min(_CAPTURE, max(-_CAPTURE, cross / max(0.1, length))))
+    return wrap(course - math.atan2(leg_e, leg_n)), aim
+
+
+@compiled
+def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # pragma: no cover - compiled
+    """The integral after a tick, rad."""
+    if math.isnan(aim) or abs(aim) >= _INTEGRATES:
+        return total
+    return min(_MOST_INTEGRAL, max(-_MOST_INTEGRAL, total + aim * gain * dt))
+
+
+@compiled
+def l1_acceleration(angle: float, speed: float, length: float, damping: float) -> float:  # pragma: no cover - compiled
+    """Acceleration to the right, m/s^2, for a total angle that the velocity stands right of the aim, rad."""
+    angle = min(0.5 * math.pi, max(-0.5 * math.pi, angle))
+    return -4.0 * damping * damping * speed * speed / length * math.sin(angle)
+
+
+@compiled
+def l1_reached(
+    place: Floats, a: Floats, b: Floats, length: float, radius: float
+) -> bool:  # pragma: no cover - compiled
+    """Whether L1 turns to the next leg: within its turn distance of b, or past the line square to the leg there.
+
+    b: east, north, turn (rad), 1 if flown over.  radius: m, for a right angle; smaller turns start later.
+    """
+    leg_e, leg_n = b[0] - a[0], b[1] - a[1]
+    to_e, to_n = b[0] - place[0], b[1] - place[1]
+    if to_e * leg_e + to_n * leg_n <= 0.0:
+        return True
+    distance = min(radius, length) * min(1.0, b[2] / (0.5 * math.pi))
+    within: bool = b[3] == 0.0 and math.hypot(to_e, to_n) <= distance
+    return within
+
+
+@compiled
+def field_course(
+    course: float, cross: float, curvature: float, approach: float, path_gain: float, orbit_gain: float
+) -> float:  # pragma: no cover - compiled
+    """Course that the vector field commands beside a path, rad.
+
+    course: of the path here, rad.  cross: m right of it.  curvature: 1/m, positive to the right.
+    """
+    if curvature == 0.0:
+        return course - approach * 2.0 / math.pi * math.atan(path_gain * cross)
+    # Outside a right turn is left of it: cross is then negative, and the distance over the radius -cross * curvature.
+    side = math.copysign(1.0, curvature)
+    return course + side * math.atan(-orbit_gain * cross * curvature)

@@ -1,0 +1,1 @@
+"""A vehicle that speaks MAVLink: link, signing, telemetry, missions and commands."""

@@ -1,0 +1,138 @@
+"""Arming, modes and start: what a ground station may ask of the vehicle, as a state machine without a clock."""
+
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.flight_process import Ready
+from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, LOITER, MANUAL, MODE_NAMES, NO_MISSION, NOT_STARTED
+
+# param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it: MAVLink's number, and the one that MAVProxy sends to arm.
+_FORCED = (21196, 2989)
+ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
+IN_PROGRESS, UNSUPPORTED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_UNSUPPORTED
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """MAV_RESULT, and words for the stations ("" for none)."""
+
+    result: int
+    text: str = ""
+
+
+@dataclass(slots=True)
+class Pilot:
+    """The vehicle's state as its commands see it.
+
+    judging: a verdict on the mission is on its way.  ready: the last one; None without a mission.  force: PFLY_FORCE.
+    stop_asked: the flight is to be ended.
+    """
+
+    mode: int = MANUAL
+    armed: bool = False
+    flying: bool = False
+    judging: bool = False
+    ready: Ready | None = None
+    force: bool = False
+    stop_asked: bool = False
+    mission_state: int = NO_MISSION
+
+    @property
+    def armable(self) -> bool:
+        """Whether arming would be accepted now."""
+        return not self.judging and not self._why_not_armed(False)
+
+    @property
+    def starts(self) -> bool:
+        """Whether the flight is to be started: armed, in AUTO, and judged."""
+        return self.armed and self.mode == AUTO and not self.flying and not self.judging and self.ready is not None
+
+    def arm(self, on: bool, param2: float) -> Answer:
+        """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).  IN_PROGRESS: ask again when the verdict is there."""
+        forced = param2 in _FORCED
+        if not on:
+            if self.flying and not forced:
+                return Answer(
+                    DENIED, "in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight"
+                )
+            self.stop_asked = self.flying
+            self.armed = False
+            return Answer(ACCEPTED)
+        if self.armed:
+            return Answer(ACCEPTED)
+        if self.judging:
+            return Answer(IN_PROGRESS)
+        reason = self._why_not_armed(forced)
+        if reason:
+            return Answer(DENIED, f"arming denied: {reason}")
+        self.armed = True
+        return Answer(ACCEPTED, "" if self.mode == AUTO else "armed: AUTO starts the mission")
+
+    def set_mode(self, mode: int) -> Answer:
+        """Change to one of ArduPlane's modes."""
+        if mode not in MODE_NAMES:
+            known = mavlink.enums["PLANE_MODE"].get(mode)
+            name = known.name.removeprefix("PLANE_MODE_") if known else f"mode {mode}"
+            return Answer(DENIED, f"{name} denied: this vehicle has MANUAL, LOITER and AUTO")
+        if self.flying and mode != AUTO:
+            return Answer(DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; a forced disarm ends the flight")
+        if mode == AUTO and self.ready is None and not self.judging:
+            return Answer(DENIED, "AUTO denied: no mission")
+        self.mode = mode
+        return Answer(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
+
+    def start(self) -> Answer:
+        """MAV_CMD_MISSION_START."""
+        if not self.armed:
+            return Answer(DENIED, "start denied: not armed")
+        return self.set_mode(AUTO)
+
+    def hold(self, on: bool) -> Answer:
+        """MAV_CMD_DO_PAUSE_CONTINUE: a flight cannot be paused."""
+        return (
+            Answer(ACCEPTED) if on else Answer(DENIED, "pause denied: a flight is evidence only if it is flown through")
+        )
+
+    def uploaded(self) -> None:
+        """A mission has come and is being judged."""
+        self.judging, self.mission_state = True, NOT_STARTED
+
+    def judged(self, ready: Ready) -> str:
+        """Take a verdict; why the vehicle was disarmed, "" if it was not."""
+        self.judging = False
+        self.ready = ready
+        self.mission_state = NOT_STARTED
+        reason = self._why_not_armed(False)
+        if self.armed and reason:
+            self.armed = False
+            return f"disarmed: {reason}"
+        return ""
+
+    def cleared(self) -> None:
+        """The mission is gone."""
+        self.judging, self.ready, self.mission_state = False, None, NO_MISSION
+        if self.mode == AUTO:
+            self.mode = MANUAL
+
+    def took_off(self) -> None:
+        """The flight has started."""
+        self.flying, self.mission_state = True, ACTIVE
+
+    def ended(self, completed: bool) -> None:
+        """The flight is over: disarmed, ready to be flown again."""
+        self.flying = self.armed = self.stop_asked = False
+        self.mode = MANUAL
+        self.mission_state = COMPLETE if completed else NOT_STARTED
+
+    def _why_not_armed(self, forced: bool) -> str:
+        if self.ready is None:
+            return ""
+        if not self.ready.possible:
+            return "the mission cannot be flown"
+        if not (self.ready.flyable or self.force or forced):
+            return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it all the same"
+        return ""
+
+
+__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "UNSUPPORTED", "Answer", "Pilot"]

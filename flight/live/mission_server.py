@@ -1,0 +1,304 @@
+"""The vehicle's side of the MAVLink mission protocol, as a state machine: no socket, no clock of its own.
+
+A mission, a fence and rally points are each taken whole or not at all: an upload is collected beside the list that is
+there and replaces it only when its last item is in and every item is sound.  One station uploads at a time; another is
+denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)
+"""
+
+from collections.abc import Hashable
+from dataclasses import dataclass, field
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.mavlink_items import MissionType, from_message, to_message
+from flight.mission.items import FENCES, Command, MissionItem
+from world.errors import MissionError
+
+# Most items that an upload may announce: bounds what a station can make the vehicle hold (some 2 MB a list).
+MOST_UPLOADED = 5_000
+# A request is sent again after `RETRY` s, or half as long again as the item before took, then after twice as long each
+# time, up to `SLOWEST_RETRY`.  A station that is only slow counts them: MAVSDK gives up at the sixth for an item.
+RETRY, SLOWEST_RETRY = 0.05, 0.4
+# An upload's last ACK may be lost, and the station wait for it in silence, as MAVSDK does for five times 0.5 s.  Where
+# other messages of the upload were lost, its last item is asked for again so often, this long apart (s), until it says
+# something else.  Not on a good link: who has the ACK has no use for it, and MAVSDK takes it for its next upload's.
+CONFIRMATIONS, CONFIRM = 4, 0.4
+# A last item that comes twice within this time is a duplicate and gets no ACK again: that would end the next upload, s.
+ACK_AGAIN = 0.3
+# After this silence another station may take over; after the longer one the upload is given up, s.
+LOCK, PATIENCE = 1.0, 8.0
+
+_FENCE_RETURN = 5000
+_ALLOWED = {
+    MissionType.FENCE: FENCES | {_FENCE_RETURN},
+    MissionType.RALLY: frozenset({int(Command.NAV_RALLY_POINT)}),
+}
+_NAMES = {MissionType.MISSION: "mission", MissionType.FENCE: "fence", MissionType.RALLY: "rally points"}
+
+
+@dataclass(frozen=True, slots=True)
+class Station:
+    """Who sent a message: where it came from, and the system and component that it names."""
+
+    address: Hashable
+    system: int
+    component: int
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A message for one station; or, with ``text``, words for all of them as well."""
+
+    station: Station
+    message: Any
+    text: str = ""
+
+
+@dataclass(slots=True)
+class _Upload:
+    """An upload in progress.
+
+    heard: when it last sent something; first_asked, asked: when the item that is due was first and last asked for, s of
+    the caller's clock.  wait: how long to wait for it, s.  repeated: whether any request had to be sent again.
+    """
+
+    station: Station
+    count: int
+    heard: float
+    asked: float
+    first_asked: float
+    wait: float = RETRY
+    repeated: bool = False
+    items: list[MissionItem] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Finished:
+    """An upload that was accepted.
+
+    asked, acknowledged: when its last item was last asked for, and its ACK last sent, s.  left: how often the item may
+    still be asked for.
+    """
+
+    station: Station
+    count: int
+    asked: float
+    acknowledged: float
+    left: int
+
+
+@dataclass(slots=True)
+class MissionServer:
+    """Three lists of items and their transfers.
+
+    lists: what the vehicle holds, seq from 0 on; item 0 of a mission may be home.  changed: the lists that an upload
+    replaced since the caller last cleared it.  locked: a reason why the mission may not change now, "" if it may.
+    """
+
+    lists: dict[MissionType, tuple[MissionItem, ...]] = field(default_factory=lambda: dict.fromkeys(MissionType, ()))
+    changed: set[MissionType] = field(default_factory=set)
+    locked: str = ""
+    _uploads: dict[MissionType, _Upload] = field(default_factory=dict)
+    # Who finished which list last: its final ACK is repeated if its last item comes again.
+    _finished: dict[MissionType, _Finished] = field(default_factory=dict)
+
+    def handle(self, message: Any, station: Station, now: float) -> list[Reply]:
+        """Answer a message of the protocol; any other gets nothing.  ``now``: s, any clock that never goes back."""
+        if message.get_type() in _HANDLERS and message.get_type() != "MISSION_ITEM_INT":
+            self._moved_on(station)
+        try:
+            kind = MissionType(getattr(message, "mission_type", 0))
+        except ValueError:
+            if message.get_type() == "MISSION_CLEAR_ALL" and message.mission_type == mavlink.MAV_MISSION_TYPE_ALL:
+                return self._clear(station, tuple(MissionType), mavlink.MAV_MISSION_TYPE_ALL, now)
+            if message.get_type() in _HANDLERS:
+                return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, int(message.mission_type))]
+            return []
+        handler = _HANDLERS.get(message.get_type())
+        return handler(self, message, station, kind, now) if handler else []
+
+    def tick(self, now: float) -> list[Reply]:
+        """Ask again for what did not come, or may not have arrived; give up uploads that have gone silent."""
+        replies = []
+        for kind, upload in list(self._uploads.items()):
+            if now - upload.heard > PATIENCE:
+                del self._uploads[kind]
+                words = (
+                    f"{_NAMES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
+                )
+                replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, words))
+            elif now - upload.asked >= upload.wait:
+                upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
+                upload.repeated = True
+                replies.append(self._request(upload, kind, now))
+        for kind, done in self._finished.items():
+            if done.left > 0 and now - done.asked >= CONFIRM:
+                done.left -= 1
+                done.asked = now
+                replies.append(_request(done.station, done.count - 1, kind))
+        return replies
+
+    @property
+    def busy(self) -> bool:
+        """Whether an upload is in progress."""
+        return bool(self._uploads)
+
+    def _count(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+        count = int(message.count)
+        refusal = self._refusal(station, kind, now)
+        if refusal:
+            return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
+        if count > MOST_UPLOADED:
+            words = f"{count} items: at most {MOST_UPLOADED} are stored"
+            return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, words)]
+        self._drop_rivals(station)
+        if count == 0:
+            return self._clear(station, (kind,), kind, now)
+        # A count always starts anew: a station that starts over with as many items must not have them mixed.
+        upload = self._uploads[kind] = _Upload(station, count, now, now, now)
+        self._finished.pop(kind, None)
+        return [self._request(upload, kind, now)]
+
+    def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+        upload = self._uploads.get(kind)
+        if upload is None or upload.station != station:
+            done = self._finished.get(kind)
+            known = done is not None and (done.station, done.count) == (station, message.seq + 1)
+            if done is not None and known and now - done.acknowledged >= ACK_AGAIN:
+                # Its last item again: the ACK was lost.
+                done.acknowledged = now
+                return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
+            return []
+        upload.heard = now
+        if message.seq != len(upload.items):
+            # A duplicate, or one that was overtaken; what is missing is asked for again in time.
+            return []
+        try:
+            item = from_message(message, _NAMES[kind])
+        except MissionError as error:
+            return [self._fail(upload, kind, _result_of(message), str(error))]
+        wrong = _misplaced(item, kind)
+        if wrong:
+            return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
+        upload.items.append(item)
+        upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
+        upload.first_asked = now
+        if len(upload.items) < upload.count:
+            return [self._request(upload, kind, now)]
+        del self._uploads[kind]
+        self.lists[kind] = tuple(upload.items)
+        self.changed.add(kind)
+        self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
+
+    def _float_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+        upload = self._uploads.get(kind)
+        if upload is None or upload.station != station:
+            return []
+        words = "MISSION_ITEM carries positions as floats, up to 0.3 m off: MISSION_ITEM_INT is expected"
+        return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, words)]
+
+    def _list(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[Reply]:
+        count = len(self.lists[kind])
+        return [
+            Reply(station, mavlink.MAVLink_mission_count_message(station.system, station.component, count, int(kind)))
+        ]
+
+    def _wanted(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[Reply]:
+        items = self.lists[kind]
+        if not message.seq < len(items):
+            return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
+        item = to_message(
+            items[message.seq],
+            target_system=station.system,
+            target_component=station.component,
+            seq=message.seq,
+            mission_type=kind,
+        )
+        return [Reply(station, item)]
+
+    def _clear_one(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+        return self._clear(station, (kind,), kind, now)
+
+    def _clear(self, station: Station, kinds: tuple[MissionType, ...], named: int, now: float) -> list[Reply]:
+        for kind in kinds:
+            refusal = self._refusal(station, kind, now)
+            if refusal:
+                return [self._ack(station, mavlink.MAV_MISSION_DENIED, named, refusal)]
+        for kind in kinds:
+            self._uploads.pop(kind, None)
+            self._finished.pop(kind, None)
+            if self.lists[kind]:
+                self.lists[kind] = ()
+                self.changed.add(kind)
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
+
+    def _stopped(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[Reply]:
+        """Let a station that gives up (MISSION_ACK with an error) free the lock."""
+        upload = self._uploads.get(kind)
+        if upload is not None and upload.station == station and message.type != mavlink.MAV_MISSION_ACCEPTED:
+            del self._uploads[kind]
+        return []
+
+    def _moved_on(self, station: Station) -> None:
+        """Ask a station that speaks of something else for nothing that is finished."""
+        for done in self._finished.values():
+            if done.station == station:
+                done.left = 0
+
+    def _refusal(self, station: Station, kind: MissionType, now: float) -> str:
+        if self.locked and kind == MissionType.MISSION:
+            return self.locked
+        for upload in self._uploads.values():
+            if upload.station != station and now - upload.heard <= LOCK:
+                return f"another station (system {upload.station.system}) is uploading"
+        return ""
+
+    def _drop_rivals(self, station: Station) -> None:
+        """Forget the uploads of other stations, which have gone silent, when one takes the lock."""
+        self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
+
+    def _request(self, upload: _Upload, kind: MissionType, now: float) -> Reply:
+        upload.asked = now
+        return _request(upload.station, len(upload.items), kind)
+
+    def _fail(self, upload: _Upload, kind: MissionType, result: int, words: str) -> Reply:
+        del self._uploads[kind]
+        return self._ack(upload.station, result, kind, f"{words}; nothing changed")
+
+    def _ack(self, station: Station, result: int, kind: int, words: str = "") -> Reply:
+        message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(kind))
+        return Reply(station, message, words)
+
+
+def _request(station: Station, seq: int, kind: MissionType) -> Reply:
+    message = mavlink.MAVLink_mission_request_int_message(station.system, station.component, seq, int(kind))
+    return Reply(station, message)
+
+
+def _misplaced(item: MissionItem, kind: MissionType) -> str:
+    """Why an item does not belong into a list; "" if it does."""
+    fits = item.command in _ALLOWED[kind] if kind in _ALLOWED else item.command not in _ALLOWED[MissionType.FENCE]
+    return "" if fits else f"{_NAMES[kind]}: item {item.seq}: command {item.command} does not belong there"
+
+
+def _result_of(message: Any) -> int:
+    """MAV_MISSION_RESULT for an item that `from_message` refused: which number it was about."""
+    if abs(message.x) > 900_000_000:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
+    if abs(message.y) > 1_800_000_000:
+        return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
+    return int(mavlink.MAV_MISSION_INVALID)
+
+
+_HANDLERS = {
+    "MISSION_COUNT": MissionServer._count,
+    "MISSION_ITEM_INT": MissionServer._item,
+    "MISSION_ITEM": MissionServer._float_item,
+    "MISSION_REQUEST_LIST": MissionServer._list,
+    "MISSION_REQUEST_INT": MissionServer._wanted,
+    "MISSION_REQUEST": MissionServer._wanted,
+    "MISSION_CLEAR_ALL": MissionServer._clear_one,
+    "MISSION_ACK": MissionServer._stopped,
+}

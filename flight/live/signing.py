@@ -1,0 +1,102 @@
+"""MAVLink 2 message signing: a signature is verified before anything about its packet is believed or kept.
+
+(mavlink.io, "Message Signing".)  pymavlink keeps a packet's timestamp before it checks the signature: one forged packet
+from the future then locks the real station out.
+"""
+
+import hashlib
+import hmac
+import os
+import re
+import stat
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from pymavlink.generator.mavcrc import x25crc
+
+from flight.live.mavlink_frames import SIGNATURE, SIGNED, Frame
+from world.errors import FlightError
+
+# Timestamps count 10 us from 2015-01-01; a stream that is new may lag by a minute.
+EPOCH = 1_420_070_400.0
+_UNITS = 100_000
+_MOST_LAG = 60 * _UNITS
+_MOST_STREAMS = 64
+_LARGEST_KEY = 1024
+
+
+def read_key(path: Path) -> bytes:
+    """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
+
+    The hash is what MAVProxy's "signing setup" and Mission Planner make of a passphrase.  Raises FlightError for a file
+    that another user could read, or that is empty.
+    """
+    try:
+        with path.open("rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise FlightError(f"{path}: not a plain file: a signing key is expected")
+            if status.st_uid != os.getuid() or stat.S_IMODE(status.st_mode) & 0o077:
+                mode = stat.S_IMODE(status.st_mode)
+                raise FlightError(f"{path}: mode {mode:03o}: a signing key is its owner's alone to read (chmod 600)")
+            data = file.read(_LARGEST_KEY + 1).strip()
+    except OSError as error:
+        raise FlightError(f"{path}: cannot be read: {error.strerror}") from error
+    if not 8 <= len(data) <= _LARGEST_KEY:
+        raise FlightError(f"{path}: {len(data)} bytes: a key of 64 hexadecimal digits or a passphrase of 8..1024")
+    if re.fullmatch(rb"[0-9a-fA-F]{64}", data):
+        return bytes.fromhex(data.decode())
+    return hashlib.sha256(data).digest()
+
+
+@dataclass(slots=True)
+class Signing:
+    """Signs what goes out and checks what comes in.
+
+    key: 32 bytes.  link: our link id.  newest: the largest timestamp sent or believed.
+    """
+
+    key: bytes
+    link: int = 0
+    newest: int = 0
+    _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
+
+    def accepts(self, frame: Frame, wall: float) -> bool:
+        """Whether a frame is signed with our key and newer than all before it in its stream.
+
+        wall: s since 1970.  A frame with a bad signature leaves no trace.
+        """
+        if not frame.signed:
+            return False
+        body, tag = frame.raw[:-6], frame.raw[-6:]
+        if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], tag):
+            return False
+        link = frame.raw[-SIGNATURE]
+        stamp = int.from_bytes(frame.raw[-12:-6], "little")
+        stream = (frame.system, frame.component, link)
+        last = self._streams.get(stream)
+        if last is None:
+            # By our clock, not by what others said: a station whose clock runs ahead locks nobody out.
+            if stamp + _MOST_LAG < _stamp(wall) or len(self._streams) >= _MOST_STREAMS:
+                return False
+        elif stamp <= last:
+            return False
+        self._streams[stream] = stamp
+        return True
+
+    def sign(self, packed: bytes, wall: float) -> bytes:
+        """Sign a packed MAVLink 2 frame that is not signed yet."""
+        self.newest = max(self.newest + 1, _stamp(wall))
+        number = packed[7] | packed[8] << 8 | packed[9] << 16
+        body = bytearray(packed[:-2])
+        body[2] |= SIGNED
+        crc = x25crc(bytes(body[1:]))
+        crc.accumulate(bytes([mavlink.mavlink_map[number].crc_extra]))
+        signed = bytes(body) + struct.pack("<H", crc.crc) + bytes([self.link]) + self.newest.to_bytes(6, "little")
+        return signed + hashlib.sha256(self.key + signed).digest()[:6]
+
+
+def _stamp(wall: float) -> int:
+    return max(0, int((wall - EPOCH) * _UNITS))

@@ -1,0 +1,246 @@
+"""Telemetry: MAVLink messages of a moment of flight, and how often each is sent."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.snapshot import Moment
+from flight.mission.items import Home
+
+# ArduPlane's numbers for its modes (custom_mode of HEARTBEAT).
+MANUAL, AUTO, LOITER = 0, 10, 12
+MODE_NAMES = {MANUAL: "MANUAL", AUTO: "AUTO", LOITER: "LOITER"}
+
+# MISSION_STATE of MISSION_CURRENT.
+NO_MISSION, NOT_STARTED, ACTIVE, COMPLETE = 1, 2, 3, 5
+
+_SENSORS = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | mavlink.MAV_SYS_STATUS_GEOFENCE
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER
+)
+_PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_CAPABILITIES = (
+    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
+)
+# Version told to ground stations: of ArduPlane, whose conventions (modes, home as item 0) the vehicle follows.
+_VERSION = (4 << 24) | (5 << 16) | (0 << 8) | 255
+
+# Seconds between two messages of a kind, unless a station asks otherwise; HEARTBEAT is not theirs to change.
+PERIODS: dict[str, float] = {
+    "ATTITUDE": 1 / 30,
+    "GLOBAL_POSITION_INT": 0.1,
+    "VFR_HUD": 0.1,
+    "MISSION_CURRENT": 0.5,
+    "SYS_STATUS": 1.0,
+    "GPS_RAW_INT": 0.5,
+    "WIND": 1.0,
+    "WIND_COV": 1.0,
+    "EXTENDED_SYS_STATE": 1.0,
+    "HOME_POSITION": 2.0,
+}
+# Which of them each MAV_DATA_STREAM of REQUEST_DATA_STREAM means (as ArduPilot groups them).
+STREAMS: dict[int, tuple[str, ...]] = {
+    0: tuple(PERIODS),
+    2: ("SYS_STATUS", "MISSION_CURRENT", "GPS_RAW_INT"),
+    6: ("GLOBAL_POSITION_INT",),
+    10: ("ATTITUDE",),
+    11: ("VFR_HUD",),
+    12: ("WIND", "WIND_COV", "EXTENDED_SYS_STATE", "HOME_POSITION"),
+}
+
+
+@dataclass(slots=True)
+class Status:
+    """What the vehicle is doing; `telemetry_messages` tells it.
+
+    boot: s since the vehicle came up.  battery: Wh when full.  load: share of time that the event loop is busy.
+    current: the mission item that is flown to.  total: how many items a mission has beside home.
+    """
+
+    moment: Moment
+    home: Home
+    boot: float = 0.0
+    wall: float = 0.0
+    mode: int = MANUAL
+    armed: bool = False
+    flying: bool = False
+    ready: bool = True
+    battery: float = 1.0
+    load: float = 0.0
+    current: int = 0
+    total: int = 0
+    mission_state: int = NO_MISSION
+
+
+def heartbeat(status: Status) -> Any:
+    """HEARTBEAT of a fixed wing that follows ArduPilot's conventions."""
+    base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+    if status.mode == AUTO:
+        base |= (
+            mavlink.MAV_MODE_FLAG_AUTO_ENABLED
+            | mavlink.MAV_MODE_FLAG_GUIDED_ENABLED
+            | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
+        )
+    if status.armed:
+        base |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    state = mavlink.MAV_STATE_ACTIVE if status.flying else mavlink.MAV_STATE_STANDBY
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_FIXED_WING, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, base, status.mode, state, 3
+    )
+
+
+def telemetry_message(name: str, status: Status) -> Any:
+    """Message of a kind, as the vehicle stands; None for a kind that it does not send.  ``name``: see `PERIODS`."""
+    maker = _MAKERS.get(name)
+    return maker(status) if maker else None
+
+
+def status_texts(text: str, severity: int, number: int) -> list[Any]:
+    """STATUSTEXT of any text, in pieces of 50 bytes that stations join again.  number: 1..65535, new for each text."""
+    # Ground stations show ASCII.
+    data = text.replace("°", " deg").encode("ascii", "replace")[:400]
+    pieces = [data[at : at + 50] for at in range(0, len(data), 50)]
+    if len(pieces) <= 1:
+        return [mavlink.MAVLink_statustext_message(severity, data)]
+    # A text ends with the first piece that is not full.
+    if len(pieces[-1]) == 50:
+        pieces.append(b"")
+    return [mavlink.MAVLink_statustext_message(severity, piece, number, k) for k, piece in enumerate(pieces)]
+
+
+def _ms(status: Status) -> int:
+    return int(status.boot * 1e3) & 0xFFFFFFFF
+
+
+def _attitude(status: Status) -> Any:
+    now = status.moment
+    return mavlink.MAVLink_attitude_message(_ms(status), now.roll, now.pitch, now.yaw, now.p, now.q, now.r)
+
+
+def _position(status: Status) -> Any:
+    now = status.moment
+    return mavlink.MAVLink_global_position_int_message(
+        _ms(status),
+        round(now.lat_deg * 1e7),
+        round(now.lon_deg * 1e7),
+        round(now.amsl * 1e3),
+        round((now.amsl - status.home.alt) * 1e3),
+        _short(now.v_north * 100),
+        _short(now.v_east * 100),
+        _short(now.v_down * 100),
+        round(_degrees(now.yaw) * 100) % 36000,
+    )
+
+
+def _hud(status: Status) -> Any:
+    now = status.moment
+    return mavlink.MAVLink_vfr_hud_message(
+        now.airspeed,
+        math.hypot(now.v_north, now.v_east),
+        int(_degrees(now.yaw)),
+        max(0, min(100, round(now.throttle * 100))),
+        now.amsl,
+        -now.v_down,
+    )
+
+
+def _mission_current(status: Status) -> Any:
+    return mavlink.MAVLink_mission_current_message(status.current, status.total, status.mission_state, 0)
+
+
+def _sys_status(status: Status) -> Any:
+    health = _SENSORS | (_PREARM if status.ready else 0)
+    share = max(0.0, 1.0 - status.moment.energy / status.battery)
+    present = _SENSORS | _PREARM
+    return mavlink.MAVLink_sys_status_message(
+        present, present, health, min(1000, round(status.load * 1000)), 44_400,
+        _short(status.moment.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
+    )  # fmt: skip
+
+
+def _gps(status: Status) -> Any:
+    now = status.moment
+    return mavlink.MAVLink_gps_raw_int_message(
+        int(status.boot * 1e6), mavlink.GPS_FIX_TYPE_RTK_FIXED,
+        round(now.lat_deg * 1e7), round(now.lon_deg * 1e7), round(now.amsl * 1e3), 50, 80,
+        min(65534, round(math.hypot(now.v_north, now.v_east) * 100)),
+        round(_degrees(math.atan2(now.v_east, now.v_north)) * 100) % 36000, 16,
+    )  # fmt: skip
+
+
+def _wind(status: Status) -> Any:
+    now = status.moment
+    # The way it comes from.
+    source = math.degrees(math.atan2(-now.wind_east, -now.wind_north))
+    return mavlink.MAVLink_wind_message(source, math.hypot(now.wind_east, now.wind_north), 0.0)
+
+
+def _wind_cov(status: Status) -> Any:
+    now = status.moment
+    unknown = math.nan
+    return mavlink.MAVLink_wind_cov_message(
+        int(status.boot * 1e6), now.wind_north, now.wind_east, 0.0, unknown, unknown, now.amsl, unknown, unknown
+    )
+
+
+def _extended(status: Status) -> Any:
+    landed = mavlink.MAV_LANDED_STATE_IN_AIR if status.flying else mavlink.MAV_LANDED_STATE_ON_GROUND
+    return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, landed)
+
+
+def _home(status: Status) -> Any:
+    home = status.home
+    return mavlink.MAVLink_home_position_message(
+        round(home.lat_deg * 1e7), round(home.lon_deg * 1e7), round(home.alt * 1e3),
+        0.0, 0.0, 0.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0, int(status.boot * 1e6),
+    )  # fmt: skip
+
+
+def _autopilot_version(_status: Status) -> Any:
+    return mavlink.MAVLink_autopilot_version_message(
+        _CAPABILITIES, _VERSION, 0, 0, 0, list(b"planfly\0"), [0] * 8, [0] * 8, 0, 0, 0x706C616E
+    )
+
+
+def _system_time(status: Status) -> Any:
+    return mavlink.MAVLink_system_time_message(int(status.wall * 1e6), _ms(status))
+
+
+def _short(value: float) -> int:
+    return max(-32767, min(32767, round(value)))
+
+
+def _degrees(angle: float) -> float:
+    return math.degrees(angle) % 360.0
+
+
+_MAKERS = {
+    "HEARTBEAT": heartbeat,
+    "ATTITUDE": _attitude,
+    "GLOBAL_POSITION_INT": _position,
+    "VFR_HUD": _hud,
+    "MISSION_CURRENT": _mission_current,
+    "SYS_STATUS": _sys_status,
+    "GPS_RAW_INT": _gps,
+    "WIND": _wind,
+    "WIND_COV": _wind_cov,
+    "EXTENDED_SYS_STATE": _extended,
+    "HOME_POSITION": _home,
+    "AUTOPILOT_VERSION": _autopilot_version,
+    "SYSTEM_TIME": _system_time,
+}

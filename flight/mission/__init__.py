@@ -1,0 +1,1 @@
+"""A mission and what it asks for: its items, its itinerary, the route, fences and loiters."""

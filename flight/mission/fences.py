@@ -1,0 +1,147 @@
+"""Geofences and rally points: made of a scenario, taken apart into shapes, and asked whether a place is allowed."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from world.errors import MissionError
+from world.frames import GeoOrigin, to_geo, to_map
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+POLYGONS = (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_POLYGON_EXCLUSION)
+INCLUSIONS = (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
+
+
+def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
+    """Items of each shape: a polygon's corners together, a circle alone.
+
+    Raises MissionError for a polygon of fewer corners than it counts.
+    """
+    shapes = []
+    k = 0
+    while k < len(fences):
+        item = fences[k]
+        count = int(item.params[0]) if item.command in POLYGONS else 1
+        shape = fences[k : k + count]
+        if len(shape) < count or any(
+            corner.command != item.command or (count > 1 and corner.params[0] != item.params[0]) for corner in shape
+        ):
+            raise MissionError(
+                f"{source}: fence item {item.seq}: p1 {item.params[0]:g}: fewer corners follow than it counts"
+            )
+        shapes.append(shape)
+        k += count
+    return shapes
+
+
+def fence_problem(fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float) -> str | None:
+    """Which fence a place (m) breaks, or None.
+
+    fences: items 5001..5004, a polygon's corners together.  Inclusions count together: a place must be in all of them.
+    """
+    for shape in fence_shapes(fences):
+        item = shape[0]
+        lat, lon = [corner.lat_deg for corner in shape], [corner.lon_deg for corner in shape]
+        corners_east, corners_north = to_map(origin, lat, lon)
+        if item.command in POLYGONS:
+            inside = _in_polygon(np.asarray(corners_east), np.asarray(corners_north), east, north)
+            name = "polygon"
+        else:
+            inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
+            name = f"circle of {item.params[0]:.0f} m"
+        if inside != (item.command in INCLUSIONS):
+            return f"{'outside an inclusion' if not inside else 'inside an exclusion'} {name} (fence item {item.seq})"
+    return None
+
+
+def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[str, ...]]:
+    """Mission with a scenario's area and threats as its fence and the route's ends as rally points, and what is lost.
+
+    The area becomes an inclusion polygon, its four corners; each missile's reach an exclusion circle, which has no
+    height: a plan that passes above or below the sphere passes through the cylinder.  Radars are no fence: being seen
+    is not forbidden.  Rally points are the first and last position of the mission, at the mission's height over home.
+    """
+    (west, east), (south, north) = scenario.bounds
+    corners = np.array([[west, south], [east, south], [east, north], [west, north]])
+    fences = [_fence(scenario.origin, Command.NAV_FENCE_POLYGON_INCLUSION, 4.0, point) for point in corners]
+    threats = scenario.threats
+    lost = []
+    for name, place, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True):
+        if radius > 0.0:
+            fences.append(_fence(scenario.origin, Command.NAV_FENCE_CIRCLE_EXCLUSION, float(radius), place[:2]))
+            lost.append(str(name))
+    notes = []
+    if lost:
+        notes.append(
+            f"{len(lost)} missile spheres became exclusion circles: a fence has no height, so that each is a cylinder"
+        )
+    notes += _crossings(mission, fences, scenario.origin)
+    return replace(mission, fences=numbered(fences), rally=numbered(_rally(mission))), tuple(notes)
+
+
+def _crossings(mission: Mission, fences: list[MissionItem], origin: GeoOrigin) -> list[str]:
+    """A note if the mission's own legs pass through a circle of its fence."""
+    places = [item for item in mission.items if item.has_position]
+    if len(places) < 2:
+        return []
+    east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
+    start = np.stack([east[:-1], north[:-1]], axis=1)
+    step = np.stack([np.diff(east), np.diff(north)], axis=1)
+    length2 = np.maximum((step**2).sum(axis=1), 1e-9)
+    crossed = 0
+    for item in fences:
+        if item.command == Command.NAV_FENCE_CIRCLE_EXCLUSION:
+            centre = np.array([float(value) for value in to_map(origin, item.lat_deg, item.lon_deg)])
+            share = np.clip(((centre - start) * step).sum(axis=1) / length2, 0.0, 1.0)
+            off = start + share[:, None] * step - centre
+            crossed += bool((np.hypot(off[:, 0], off[:, 1]) <= item.params[0]).any())
+    if not crossed:
+        return []
+    over = f"the mission passes through {crossed} of the exclusion circles, above or below the threat"
+    return [f"{over}: an autopilot with this fence refuses it or breaks off"]
+
+
+def _fence(origin: GeoOrigin, command: Command, p1: float, place: Floats) -> MissionItem:
+    lat, lon = to_geo(origin, float(place[0]), float(place[1]))
+    params = (round(p1, 3), 0.0, 0.0, 0.0)
+    return MissionItem(0, int(command), int(Frame.GLOBAL), params, on_grid(float(lat)), on_grid(float(lon)), 0.0)
+
+
+def _rally(mission: Mission) -> list[MissionItem]:
+    places = [item for item in mission.items if item.has_position]
+    home = mission.home
+    if home is None or not places or math.isnan(home.alt):
+        return []
+    ends = [places[0], places[-1]] if len(places) > 1 else places
+    return [
+        MissionItem(
+            0, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, end.lat_deg, end.lon_deg,
+            round(end.alt - _zero(end, home), 3),
+        )
+        for end in ends
+    ]  # fmt: skip
+
+
+def _zero(item: MissionItem, home: Home) -> float:
+    return home.alt if item.frame in (Frame.GLOBAL, Frame.GLOBAL_INT) else 0.0
+
+
+def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
+    """Items of a fence or of rally points with their numbers from 0, as their lists on a vehicle count."""
+    return tuple(replace(item, seq=k) for k, item in enumerate(items))
+
+
+def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
+    """Whether a place lies in a polygon, by the crossings of a ray to the east."""
+    e0, n0 = corners_east, corners_north
+    e1, n1 = np.roll(e0, -1), np.roll(n0, -1)
+    spans = (n0 > north) != (n1 > north)
+    rise = np.where(spans, n1 - n0, 1.0)
+    at = e0 + (north - n0) / rise * (e1 - e0)
+    return bool((spans & (at > east)).sum() % 2)

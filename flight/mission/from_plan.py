@@ -1,0 +1,72 @@
+"""A plan as a mission: speed, then waypoints above mean sea level in the world's frame."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from planner.plan import Plan
+from world.frames import to_geo
+from world.geometry import turning_angles
+
+Floats = NDArray[np.float64]
+
+# Added to how far a fly-by turn passes from its waypoint, m: the tolerance of the verdict's waypoint rule.
+REACH = 10.0
+
+
+def plan_mission(plan: Plan, airspeed: float, max_bank: float, source: str = "plan") -> Mission:
+    """Mission of a plan: it starts at the first waypoint and ends at the last.
+
+    airspeed: m/s.  max_bank: rad.  Home is the ground below the start.  Positions are put on the 1e-7 degree grid of
+    MISSION_ITEM_INT and heights on whole millimetres, so every form of the mission carries the same numbers; that moves
+    a waypoint by less than 8 mm on the map.
+
+    The acceptance radius is how far a fly-by turn at this speed and bank, in the scenario's wind from behind, passes
+    from its waypoint, R(1/cos(theta/2) - 1), and `REACH` more, up to a whole metre.  It is advisory: PX4 has its own on
+    fixed wings.
+    """
+    points = plan.waypoints
+    lat, lon = to_geo(plan.scenario.origin, points[:, 0], points[:, 1])
+    radii = _acceptance(plan, airspeed, max_bank)
+    items = [
+        MissionItem(
+            1, int(Command.DO_CHANGE_SPEED), int(Frame.MISSION), (0.0, _milli(airspeed), -1.0, 0.0), 0.0, 0.0, 0.0
+        )
+    ]
+    items += [
+        MissionItem(
+            k + 2,
+            int(Command.NAV_WAYPOINT),
+            int(Frame.GLOBAL),
+            (0.0, float(radii[k]), 0.0, 0.0),
+            on_grid(float(lat[k])),
+            on_grid(float(lon[k])),
+            _milli(float(points[k, 2])),
+        )
+        for k in range(len(points))
+    ]
+    first = items[1]
+    under = math.nan
+    if plan.scenario.terrain is not None:
+        under = float(plan.scenario.terrain.height(points[0, 0], points[0, 1]))
+    home = Home(first.lat_deg, first.lon_deg, first.alt if math.isnan(under) else _milli(under))
+    return Mission(home=home, items=tuple(items), cruise_speed=_milli(airspeed), source=source)
+
+
+def _acceptance(plan: Plan, airspeed: float, max_bank: float) -> Floats:
+    """(w,) m, whole."""
+    wind = max(math.hypot(*plan.scenario.wind.at(float(amsl))) for amsl in plan.waypoints[:, 2])
+    radius = (airspeed + wind) ** 2 / (GRAVITY * math.tan(max_bank))
+    # A U-turn's fly-by arc would pass at infinity.
+    half = np.minimum(turning_angles(plan.waypoints), math.radians(150.0)) / 2.0
+    radii = np.full(len(plan.waypoints), REACH)
+    radii[1:-1] += radius * (1.0 / np.cos(half) - 1.0)
+    return np.ceil(radii - 1e-6)
+
+
+def _milli(value: float) -> float:
+    """Double nearest to whole thousandths."""
+    return round(value * 1e3) / 1e3

@@ -1,0 +1,307 @@
+"""A mission's items in flying order: jumps unrolled, speeds assigned, a note for all that is not flown as written."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from flight.mission.items import (
+    LANDINGS,
+    OVER_TERRAIN,
+    PLACES,
+    TAKEOFFS,
+    Command,
+    Frame,
+    Home,
+    Mission,
+    MissionItem,
+    command_name,
+)
+from world.errors import MissionError
+
+# A mission unrolls to no more places than this, and no more items are walked through on the way.
+MOST_STOPS = 10_000
+_MOST_STEPS = 200_000
+
+# A loiter without end is flown for this long, s, and the mission ends there.
+UNLIMITED = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Loiter:
+    """A circle to fly: radius in m, positive to the right, 0 for the aircraft's own.
+
+    turns, seconds: how long, 0 for what does not count; neither is shortened, and the circle is left on the first
+    tangent to the next place after them.  to_height: until the item's height is reached.
+    """
+
+    radius: float
+    turns: float = 0.0
+    seconds: float = 0.0
+    to_height: bool = False
+
+    def sweep(self, airspeed: float, radius: float) -> float:
+        """Angle to fly around at least, rad.  In wind a circle over the ground takes longer than the air distance."""
+        return max(2.0 * math.pi * self.turns, self.seconds * airspeed / radius)
+
+
+def loiter_of(item: MissionItem) -> Loiter | None:
+    """Circle that an item asks for; None for any other command."""
+    p1, p2, p3, _ = (0.0 if math.isnan(value) else value for value in item.params)
+    if item.command == Command.NAV_LOITER_UNLIM:
+        return Loiter(p3, seconds=UNLIMITED)
+    if item.command == Command.NAV_LOITER_TURNS:
+        return Loiter(p3, turns=p1)
+    if item.command == Command.NAV_LOITER_TIME:
+        return Loiter(p3, seconds=p1)
+    if item.command == Command.NAV_LOITER_TO_ALT:
+        # Its radius is the second parameter; the first asks to leave on the next leg's course, as all do here.
+        return Loiter(p2, to_height=True)
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """A place to fly to: the item's seq (-1: none), degrees, height in the item's frame, NaN to keep the last height.
+
+    airspeed: m/s on the leg that ends here.  acceptance: m, 0 where none is stated.  loiter: the circle flown about it.
+    """
+
+    item: int
+    command: int
+    lat_deg: float
+    lon_deg: float
+    alt: float
+    frame: int
+    airspeed: float
+    acceptance: float = 0.0
+    loiter: Loiter | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Itinerary:
+    """Where a mission goes: at least one stop.
+
+    home: the mission's, or the first position item with height NaN.  takeoff: the item that the flight starts with.
+    """
+
+    stops: tuple[Stop, ...]
+    home: Home
+    has_home: bool
+    takeoff: MissionItem | None
+    notes: tuple[str, ...]
+
+
+@dataclass(slots=True)
+class Notes:
+    """Notes by text, each with the items it is about, in the order they came up."""
+
+    _items: dict[str, list[int]] = field(default_factory=dict)
+
+    def add(self, text: str, seq: int | None = None) -> None:
+        """Note something, about an item or the whole mission; the same note twice counts once."""
+        items = self._items.setdefault(text, [])
+        if seq is not None and seq not in items[-1:]:
+            items.append(seq)
+
+    def lines(self) -> tuple[str, ...]:
+        """One line a note: "items 3-5, 9: DO_SET_SERVO: not flown"."""
+        found = []
+        for text, items in self._items.items():
+            numbers = sorted(set(items))
+            label = f"item{'s' if len(numbers) > 1 else ''} {_ranges(numbers)}: " if numbers else ""
+            found.append(label + text)
+        return tuple(found)
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Sorted numbers as "3-5, 9"."""
+    parts: list[list[int]] = []
+    for number in numbers:
+        if parts and number == parts[-1][1] + 1:
+            parts[-1][1] = number
+        else:
+            parts.append([number, number])
+    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
+
+
+def plan_stops(mission: Mission, default_airspeed: float) -> Itinerary:
+    """Walk through the mission as an autopilot would.
+
+    default_airspeed: m/s until the mission's first DO_CHANGE_SPEED.  Raises MissionError for a mission without a
+    position, a jump to an item that is not there, and a mission that unrolls to more than `MOST_STOPS` places.
+    """
+    walk = _Walk(mission, default_airspeed)
+    reached = set()
+    for item in _in_flying_order(mission, walk.notes):
+        reached.add(item.seq)
+        walk.visit(item)
+        if len(walk.stops) > MOST_STOPS:
+            raise MissionError(
+                f"{mission.source}: item {item.seq}: more than {MOST_STOPS:,} places to fly to, jumps unrolled"
+            )
+        if walk.ended:
+            break
+    for item in mission.items:
+        if item.seq not in reached and not (walk.ended and item.command == Command.DO_JUMP):
+            walk.notes.add("never reached", item.seq)
+    if not walk.stops:
+        raise MissionError(f"{mission.source}: no item with a position: at least two are expected")
+    return Itinerary(tuple(walk.stops), walk.home, walk.has_home, walk.takeoff, walk.notes.lines())
+
+
+def _in_flying_order(mission: Mission, notes: Notes) -> Iterator[MissionItem]:
+    """Items with jumps followed; a jump's counter is never reset, as in ArduPilot."""
+    index = {item.seq: k for k, item in enumerate(mission.items)}
+    jumped: dict[int, int] = {}
+    k = steps = 0
+    while k < len(mission.items):
+        item = mission.items[k]
+        steps += 1
+        if steps > _MOST_STEPS:
+            raise MissionError(f"{mission.source}: item {item.seq}: jumps lead through more than {_MOST_STEPS:,} items")
+        k += 1
+        yield item
+        if item.command != Command.DO_JUMP:
+            continue
+        target, repeats = int(item.params[0]), int(item.params[1])
+        if target not in index:
+            raise MissionError(
+                f"{mission.source}: item {item.seq}: DO_JUMP p1 {target}: the mission has no item {target}"
+            )
+        if repeats < 0:
+            notes.add("DO_JUMP without end: taken once", item.seq)
+            repeats = 1
+        if jumped.get(item.seq, 0) < repeats:
+            jumped[item.seq] = jumped.get(item.seq, 0) + 1
+            k = index[target]
+
+
+class _Walk:
+    """What is known after the items so far."""
+
+    def __init__(self, mission: Mission, airspeed: float) -> None:
+        self.source = mission.source
+        self.default = self.airspeed = airspeed
+        self.notes = Notes()
+        self.stops: list[Stop] = []
+        self.takeoff: MissionItem | None = None
+        self.ended = False
+        self.has_home = mission.home is not None
+        self.home = mission.home or _first_position(mission)
+
+    def visit(self, item: MissionItem) -> None:
+        """Take one item into account."""
+        if not item.autocontinue:
+            self.notes.add("autocontinue is 0, where the mission would wait: flown on", item.seq)
+        if item.command in TAKEOFFS:
+            self._take_off(item)
+        elif item.command in PLACES:
+            self._go(item)
+        elif item.command == Command.NAV_RETURN_TO_LAUNCH:
+            self._return(item)
+        elif item.command in LANDINGS:
+            self._land(item)
+        elif item.command == Command.DO_CHANGE_SPEED:
+            self._change_speed(item)
+        elif item.command == Command.DO_LAND_START:
+            self.notes.add("DO_LAND_START: a mark, nothing to fly", item.seq)
+        elif item.command != Command.DO_JUMP:
+            self.notes.add(f"{command_name(item.command)}: not flown", item.seq)
+
+    def _stop(self, item: MissionItem, acceptance: float = 0.0) -> Stop:
+        lat, lon = item.lat_deg, item.lon_deg
+        return Stop(item.seq, item.command, lat, lon, item.alt, item.frame, self.airspeed, acceptance, loiter_of(item))
+
+    def _take_off(self, item: MissionItem) -> None:
+        name = command_name(item.command)
+        if self.stops:
+            if item.has_position:
+                self.notes.add(f"{name} in the air: flown through as a waypoint", item.seq)
+                self.stops.append(self._stop(item))
+            else:
+                self.notes.add(f"{name} in the air: not flown", item.seq)
+            return
+        if math.isnan(item.alt):
+            raise MissionError(f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected")
+        self.takeoff = item
+        over_home = replace(self._stop(item), lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg)
+        goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (self.home.lat_deg, self.home.lon_deg)
+        if goes_on:
+            self.stops += [replace(over_home, item=-1), self._stop(item)]
+        else:
+            self.stops.append(over_home)
+
+    def _go(self, item: MissionItem) -> None:
+        name = command_name(item.command)
+        if not item.has_position and loiter_of(item) is not None and self.stops:
+            self.notes.add(f"{name} without a position: flown about the place before", item.seq)
+            alt = math.nan if item.frame == Frame.MISSION else item.alt
+            item = replace(item, lat_deg=self.stops[-1].lat_deg, lon_deg=self.stops[-1].lon_deg, alt=alt)
+        elif not item.has_position:
+            self.notes.add(
+                f"{name} without a position, which means the place where the aircraft is: not flown", item.seq
+            )
+            return
+        if item.command == Command.NAV_WAYPOINT:
+            if item.params[0] > 0.0:
+                self.notes.add("NAV_WAYPOINT with a time to hold: flown through", item.seq)
+        elif item.command == Command.NAV_SPLINE_WAYPOINT:
+            self.notes.add(f"{name}: flown as a straight waypoint", item.seq)
+        elif item.command == Command.NAV_LOITER_UNLIM:
+            self.notes.add(f"{name}: flown for {UNLIMITED:.0f} s; the mission ends there", item.seq)
+            self.ended = True
+        elif loiter_of(item) is None:
+            self.notes.add(f"{name}: flown through as a waypoint", item.seq)
+        if math.isnan(item.alt):
+            self.notes.add(f"{name} without an altitude: keeps the last height", item.seq)
+        elif item.frame in OVER_TERRAIN:
+            self.notes.add("height above terrain: held at the waypoint, the legs between are straight", item.seq)
+        radius = item.params[1] if item.command in (Command.NAV_WAYPOINT, Command.NAV_SPLINE_WAYPOINT) else 0.0
+        self.stops.append(self._stop(item, radius if radius > 0.0 else 0.0))
+
+    def _return(self, item: MissionItem) -> None:
+        if not self.has_home:
+            self.notes.add("NAV_RETURN_TO_LAUNCH without a home: ignored", item.seq)
+        elif not self.stops:
+            self.notes.add("NAV_RETURN_TO_LAUNCH before the start: ignored", item.seq)
+        else:
+            self.notes.add("NAV_RETURN_TO_LAUNCH: flown as a leg to home at the last height", item.seq)
+            home = replace(item, lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg, alt=math.nan)
+            self.stops.append(self._stop(home))
+            self.ended = True
+
+    def _land(self, item: MissionItem) -> None:
+        name = command_name(item.command)
+        if not self.stops:
+            self.notes.add(f"{name} before the start: ignored", item.seq)
+            return
+        self.ended = True
+        if item.has_position:
+            self.notes.add(f"{name}: not flown to the ground; the flight ends above it at the last height", item.seq)
+            self.stops.append(self._stop(replace(item, alt=math.nan)))
+        else:
+            self.notes.add(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
+
+    def _change_speed(self, item: MissionItem) -> None:
+        kind, speed, throttle = item.params[:3]
+        if kind not in (0.0, 1.0):
+            self.notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
+            return
+        if speed == -2.0:
+            self.airspeed = self.default
+        elif speed > 0.0:
+            self.airspeed = speed
+            if kind == 1.0:
+                self.notes.add("DO_CHANGE_SPEED of ground speed: flown as airspeed", item.seq)
+        elif speed != -1.0:
+            self.notes.add(f"DO_CHANGE_SPEED to {speed:g} m/s: ignored", item.seq)
+        if throttle > 0.0:
+            self.notes.add("DO_CHANGE_SPEED's throttle: ignored", item.seq)
+
+
+def _first_position(mission: Mission) -> Home:
+    """Place of the first item that has one, at a height not known."""
+    for item in mission.items:
+        if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
+            return Home(item.lat_deg, item.lon_deg, math.nan)
+    raise MissionError(f"{mission.source}: no item with a position: at least two are expected")

@@ -1,0 +1,191 @@
+"""Loiters on the map: where a route joins a circle, how far around it goes, and where it leaves.
+
+A circle is flown as the corners of a polygon around it, each with an arc of the circle's radius: the arcs touch, so the
+path is the circle, while turns, legs, heights and clearances are judged as everywhere else.  It is joined and left on
+tangents.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.itinerary import MOST_STOPS, Loiter, Notes, Stop
+from world.errors import MissionError
+
+Floats = NDArray[np.float64]
+
+# Course change at a corner of the polygon at most, rad: its corners then lie 8 % of the radius outside the circle.
+CORNER = math.pi / 4.0
+# Radii (m) that are flown.  Below the smallest a corner's legs would be no legs; no aircraft of ours turns as tightly.
+TIGHTEST, WIDEST = 10.0, 20_000.0
+# A place must be this far (m) outside a circle to have a tangent to it.
+_CLEAR = 2.0
+# Slope (tangent) of a spiral where no aircraft is known.
+PLAIN_SLOPE = 0.05
+
+# Steepest climb and dive (tangents) that a spiral at this airspeed (m/s) and height (m AMSL) is flown with.
+SpiralSlopes = Callable[[float, float], tuple[float, float]]
+# Radius (m) of a loiter that states none, at this airspeed and height.
+OwnRadius = Callable[[float, float], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """One waypoint of a route: whose it is, where (east, north, up m), and the radius of its arc (0: bank limit)."""
+
+    stop: Stop
+    place: tuple[float, float, float]
+    arc: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A place, or a circle about it: turn is its radius, positive to the right, 0 for a place."""
+
+    stop: Stop
+    east: float
+    north: float
+    up: float
+    turn: float = 0.0
+
+    def away(self, other: "_Node") -> float:
+        return math.hypot(other.east - self.east, other.north - self.north)
+
+
+def lay_circles(
+    source: str, stops: list[tuple[Stop, Floats]], notes: Notes, own_radius: OwnRadius, slopes: SpiralSlopes
+) -> list[Point]:
+    """Waypoints of a route through places and around circles.
+
+    stops: each with its east, north and up.  Places inside a circle before or after them are left out, with a note: no
+    straight leg joins them.  Raises MissionError for a loiter too wide or too long to lay out.
+    """
+    nodes = _nodes(source, stops, notes, own_radius)
+    courses = [_course(a, b) for a, b in pairwise(nodes)]
+    points: list[Point] = []
+    up = float(stops[0][1][2])
+    for k, node in enumerate(nodes):
+        if node.turn == 0.0:
+            up = node.up
+            points.append(Point(node.stop, (node.east, node.north, up)))
+            continue
+        into = courses[k - 1] if k else (courses[k] if k < len(courses) else 0.0)
+        onward = courses[k] if k < len(courses) else None
+        run = math.hypot(node.east - points[-1].place[0], node.north - points[-1].place[1]) if points else 0.0
+        laid = _around(source, node, into, onward, up, run, slopes)
+        if not k:
+            laid.insert(0, Point(node.stop, (*_rim(node, into), laid[0].place[2])))
+        up = laid[-1].place[2]
+        points += laid
+        if len(points) > MOST_STOPS:
+            raise MissionError(f"{source}: item {node.stop.item}: more than {MOST_STOPS:,} places, circles laid out")
+    return points
+
+
+def _nodes(source: str, stops: list[tuple[Stop, Floats]], notes: Notes, own_radius: OwnRadius) -> list[_Node]:
+    """Places and circles in flying order, each with a tangent to the next."""
+    nodes: list[_Node] = []
+    for stop, (east, north, up) in stops:
+        node = _Node(stop, float(east), float(north), float(up))
+        if stop.loiter is not None:
+            node = replace(node, turn=_turn(source, stop, stop.loiter, float(up), notes, own_radius))
+            while nodes and nodes[-1].turn == 0.0 and nodes[-1].away(node) < abs(node.turn) + _CLEAR:
+                _left_out(nodes.pop().stop, node.stop, notes)
+        before = nodes[-1] if nodes else None
+        if before is not None and before.turn != 0.0 and not _joined(before, node):
+            if node.turn == 0.0:
+                _left_out(stop, before.stop, notes)
+                continue
+            notes.add(
+                f"its circle has no tangent from that of item {before.stop.item}: flown on that circle", stop.item
+            )
+            node = replace(node, east=before.east, north=before.north, turn=before.turn)
+        nodes.append(node)
+    return nodes
+
+
+def _left_out(stop: Stop, circle: Stop, notes: Notes) -> None:
+    name = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
+    notes.add(name if stop.item >= 0 else f"home {name}", stop.item if stop.item >= 0 else None)
+
+
+def _turn(source: str, stop: Stop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius) -> float:
+    """Signed radius of a loiter, m."""
+    radius = abs(loiter.radius)
+    if radius > WIDEST:
+        raise MissionError(f"{source}: item {stop.item}: loiter radius {radius:g} m: allowed up to {WIDEST:,.0f}")
+    if radius == 0.0:
+        radius = own_radius(stop.airspeed, up)
+        notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
+    elif radius < TIGHTEST:
+        notes.add(f"loiter radius below {TIGHTEST:.0f} m: flown with {TIGHTEST:.0f} m", stop.item)
+        radius = TIGHTEST
+    return math.copysign(radius, loiter.radius)
+
+
+def _joined(a: _Node, b: _Node) -> bool:
+    """Whether a tangent leads from one circle to another circle or place, or both are one circle."""
+    apart = a.away(b)
+    return apart > abs(b.turn - a.turn) + _CLEAR or (apart < 1.0 and abs(a.turn - b.turn) < 1.0)
+
+
+def _course(a: _Node, b: _Node) -> float:
+    """Course of the tangent from one circle (or place) to the next, rad; of one circle to itself, north."""
+    apart = a.away(b)
+    if apart < 1.0:
+        return 0.0
+    bearing = math.atan2(b.east - a.east, b.north - a.north)
+    # Square to the tangent, the centres lie b.turn - a.turn apart.
+    return bearing - math.asin(min(1.0, max(-1.0, (b.turn - a.turn) / apart)))
+
+
+def _rim(node: _Node, course: float, out: float = 1.0) -> tuple[float, float]:
+    """Where the circle is flown on this course; ``out``: that many radii from the centre instead."""
+    return (
+        node.east - node.turn * out * math.cos(course),
+        node.north + node.turn * out * math.sin(course),
+    )
+
+
+def _around(
+    source: str, node: _Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes
+) -> list[Point]:
+    """Corners around a circle, joined on one course and left on another (None: the mission ends there).
+
+    up: height where the leg before started, m.  run: its length, m.
+    """
+    radius, side = abs(node.turn), math.copysign(1.0, node.turn)
+    first, wanted = node.up, 0.0
+    loiter = node.stop.loiter
+    if loiter is not None and loiter.to_height:
+        climb, dive = slopes(node.stop.airspeed, max(up, node.up))
+        first = min(max(node.up, up - dive * run), up + climb * run)
+        missing = abs(node.up - first)
+        if missing > 0.0:
+            # Heights are counted between the corners, of which there is one more than spaces between them.
+            wanted = missing / (climb if node.up > first else dive) / radius + CORNER
+    elif loiter is not None:
+        wanted = loiter.sweep(node.stop.airspeed, radius)
+    sweep = wanted
+    if onward is not None:
+        part = (side * (onward - into)) % (2.0 * math.pi)
+        sweep = part + 2.0 * math.pi * max(0, math.ceil((wanted - part) / (2.0 * math.pi) - 1e-9))
+    if sweep > MOST_STOPS * CORNER:
+        raise MissionError(
+            f"{source}: item {node.stop.item}: {sweep / (2.0 * math.pi):,.0f} turns to loiter: at most"
+            f" {MOST_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
+        )
+    count = max(1, math.ceil(sweep / CORNER - 1e-9))
+    step = sweep / count
+    points = []
+    for k in range(count):
+        share = 1.0 if count == 1 else k / (count - 1)
+        east, north = _rim(node, into + side * (k + 0.5) * step, 1.0 / math.cos(0.5 * step))
+        points.append(Point(node.stop, (east, north, first + share * (node.up - first)), radius))
+    if onward is None and sweep > 0.0:
+        points.append(Point(node.stop, (*_rim(node, into + side * sweep), node.up)))
+    return points

@@ -1,0 +1,258 @@
+"""From a mission to the route that is flown: map positions and heights above mean sea level."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission, command_name
+from flight.mission.itinerary import Itinerary, Notes, Stop, plan_stops
+from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, SpiralSlopes, lay_circles
+from flight.mission.route import Route
+from world.errors import MissionError
+from world.frames import GeoOrigin, to_geo, to_map
+from world.geometry import leg_courses
+from world.scenario_file import MAP_REACH
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+# Places nearer to each other than this (m) are one place.
+SAME_PLACE = 1.0
+# Leg that stands for a climb on the spot, m: a metre of height on it is 89.4 degrees.
+STEP = 0.01
+# Heights (m AMSL) that a flight may be asked to keep.
+LOWEST, HIGHEST = -500.0, 9000.0
+# Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.
+DEFAULT_RADIUS = 80.0
+OVER_TIGHTEST = 1.1
+# A spiral climbs and sinks with this share of what the aircraft can in straight flight.
+SPIRAL_SHARE = 0.6
+# A home that is further than this (m) from the ground at its place is worth a note.
+_HOME_ERROR = 30.0
+
+
+def make_route(
+    mission: Mission,
+    origin: GeoOrigin,
+    terrain: Terrain | None,
+    default_airspeed: float,
+    fly_over: bool,
+    limits: Limits | None = None,
+    *,
+    on_the_spot: bool = False,
+) -> Route:
+    """Route of a mission in the map about ``origin``.
+
+    terrain: None where none is known; heights above terrain are then an error.  default_airspeed: m/s until the
+    mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and sets none).  fly_over: whether
+    waypoints are flown through instead of by.  limits: the aircraft's, for the radius of a loiter that states none and
+    the slope of a spiral; None takes 80 m and 5 %.  on_the_spot: whether a place straight above or below the one before
+    it becomes a leg of `STEP` m, for a judge to call it what it is; otherwise it is an error.
+
+    Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
+    has a horizontal length of at least `SAME_PLACE`, or `STEP` on the spot.  Raises MissionError, naming the item, for
+    what cannot be placed, and for a mission of fewer than two places.
+    """
+    itinerary = plan_stops(mission, default_airspeed)
+    notes = Notes()
+    heights = _Heights(mission.source, itinerary, origin, terrain, notes)
+    flat = _on_map(mission.source, itinerary.stops, origin)
+    kept: list[tuple[Stop, Floats]] = []
+    for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
+        last = float(kept[-1][1][2]) if kept else math.nan
+        point = np.array([east, north, heights.amsl(stop, float(east), float(north), last)])
+        circles = stop.loiter is not None or bool(kept and kept[-1][0].loiter is not None)
+        if kept and not circles and math.dist(kept[-1][1][:2], point[:2]) < SAME_PLACE:
+            if on_the_spot and _straight_up(kept[-1], (stop, point)):
+                kept.append((stop, _step_aside(kept, point)))
+                continue
+            kept[-1] = (_merge(mission.source, kept[-1], (stop, point), notes), kept[-1][1])
+        else:
+            kept.append((stop, point))
+    points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
+    if len(points) < 2:
+        raise MissionError(f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected")
+    stops = [point.stop for point in points]
+    waypoints = np.array([point.place for point in points])
+    arcs = np.array([point.arc for point in points])
+    if mission.cruise_speed not in (None, default_airspeed) and stops[1].airspeed == default_airspeed:
+        notes.add(
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
+            f" started at {default_airspeed:g} m/s"
+        )
+    return Route(
+        waypoints=waypoints,
+        airspeed=np.array([stop.airspeed for stop in stops[1:]]),
+        acceptance=np.array([stop.acceptance for stop in stops]),
+        fly_over=np.where(arcs > 0.0, False, fly_over),
+        items=np.array([stop.item for stop in stops], dtype=np.int64),
+        started=_started(itinerary, stops[0], origin, waypoints),
+        notes=itinerary.notes + notes.lines(),
+        arcs=arcs,
+    )
+
+
+def _own_radius(limits: Limits | None) -> OwnRadius:
+    """Radius of a loiter that states none: a tenth over the bank limit's in this wind, in whole tens of metres."""
+
+    def radius(airspeed: float, up: float) -> float:
+        if limits is None:
+            return DEFAULT_RADIUS
+        tightest = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
+        if not math.isfinite(tightest):
+            return DEFAULT_RADIUS
+        return max(DEFAULT_RADIUS, math.ceil(OVER_TIGHTEST * tightest / 10.0) * 10.0)
+
+    return radius
+
+
+def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
+    """Slopes of a spiral: a share of what the aircraft can on the worst course around it."""
+
+    def slopes(airspeed: float, up: float) -> tuple[float, float]:
+        if limits is None:
+            return PLAIN_SLOPE, PLAIN_SLOPE
+        found = []
+        for k, most in enumerate((limits.max_climb, limits.max_dive)):
+            can = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
+            least = min(can, math.inf if most is None else most)
+            # An aircraft that cannot climb at all gets a plain spiral, and the slope rule says so.
+            found.append(SPIRAL_SHARE * math.tan(least) if 0.0 < least < 1.5 else PLAIN_SLOPE)
+        return found[0], found[1]
+
+    return slopes
+
+
+def _name(stop: Stop) -> str:
+    return f"item {stop.item}" if stop.item >= 0 else "home"
+
+
+def _on_map(source: str, stops: tuple[Stop, ...], origin: GeoOrigin) -> Floats:
+    """East and north of each stop, (n, 2) m."""
+    east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
+    points = np.stack([east, north], axis=1)
+    far = ~(np.abs(points) <= MAP_REACH).all(axis=1)
+    if far.any():
+        stop = stops[int(np.argmax(far))]
+        raise MissionError(
+            f"{source}: {_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
+            f" {MAP_REACH / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
+            " (columns swapped, or a sign lost?)"
+        )
+    return points
+
+
+class _Heights:
+    """Heights above mean sea level of heights in any frame."""
+
+    def __init__(
+        self, source: str, itinerary: Itinerary, origin: GeoOrigin, terrain: Terrain | None, notes: Notes
+    ) -> None:
+        self.source = source
+        self.origin = origin
+        self.terrain = terrain
+        self.notes = notes
+        self.home = itinerary.home
+        self._home_amsl: float | None = None
+
+    def amsl(self, stop: Stop, east: float, north: float, last: float) -> float:
+        """Height of a stop; ``last``: the one before, NaN at the first."""
+        if math.isnan(stop.alt):
+            if math.isnan(last):
+                raise MissionError(f"{self.source}: {_name(stop)}: no altitude, and none before to keep")
+            return last
+        if stop.frame in AMSL:
+            height = stop.alt
+        elif stop.frame in OVER_HOME:
+            height = self._over_home(stop) + stop.alt
+        else:
+            height = self._ground(stop, east, north) + stop.alt
+        if not LOWEST <= height <= HIGHEST:
+            raise MissionError(
+                f"{self.source}: {_name(stop)}: {height:.1f} m AMSL: allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+            )
+        return height
+
+    def _ground(self, stop: Stop, east: float, north: float) -> float:
+        asked = f"{self.source}: {_name(stop)}: height above terrain (frame {stop.frame})"
+        if self.terrain is None:
+            raise MissionError(f"{asked}: no terrain is given to count from")
+        under = float(self.terrain.height(east, north))
+        if math.isnan(under):
+            raise MissionError(f"{asked}: {self.terrain.source} has no data there")
+        return under
+
+    def _over_home(self, stop: Stop) -> float:
+        if self._home_amsl is None:
+            self._home_amsl = self._find_home(stop, self.home)
+        return self._home_amsl
+
+    def _find_home(self, stop: Stop, home: Home) -> float:
+        under = math.nan
+        if self.terrain is not None:
+            east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
+            if abs(float(east)) <= MAP_REACH and abs(float(north)) <= MAP_REACH:
+                under = float(self.terrain.height(east, north))
+        if not math.isnan(home.alt):
+            if abs(home.alt - under) > _HOME_ERROR:
+                self.notes.add(
+                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {under:.1f} m:"
+                    " heights over home count from the former"
+                )
+            return home.alt
+        if math.isnan(under):
+            self.notes.add("no home height, and no terrain to take one from: heights over home count from 0 m AMSL")
+            return 0.0
+        self.notes.add(
+            f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {under:.1f} m AMSL"
+        )
+        return under
+
+
+def _straight_up(kept: tuple[Stop, Floats], new: tuple[Stop, Floats]) -> bool:
+    """Whether a place is straight above or below the one before, and no take-off's."""
+    return abs(float(new[1][2] - kept[1][2])) >= SAME_PLACE and new[0].command not in TAKEOFFS
+
+
+def _step_aside(kept: list[tuple[Stop, Floats]], point: Floats) -> Floats:
+    """The place `STEP` m further on the course that leads to the last one; east of it where there is none."""
+    course = math.pi / 2.0
+    if len(kept) > 1:
+        course = float(leg_courses(np.array([kept[-2][1], kept[-1][1]]))[0])
+    east, north, _ = kept[-1][1]
+    return np.array([east + STEP * math.sin(course), north + STEP * math.cos(course), point[2]])
+
+
+def _merge(source: str, kept: tuple[Stop, Floats], new: tuple[Stop, Floats], notes: Notes) -> Stop:
+    """Leave out a stop at the place of the one before it; returns the one before, under its number."""
+    before, after = kept[0], new[0]
+    climb = float(new[1][2] - kept[1][2])
+    if abs(climb) >= SAME_PLACE:
+        side = "above" if climb > 0.0 else "below"
+        if after.command not in TAKEOFFS:
+            raise MissionError(
+                f"{source}: {_name(after)}: {abs(climb):.1f} m straight {side} {_name(before)}:"
+                " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing"
+            )
+        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", after.item)
+    else:
+        notes.add(f"at the place of {_name(before)}: merged with it", after.item)
+    return before if before.item >= 0 else after
+
+
+def _started(itinerary: Itinerary, first: Stop, origin: GeoOrigin, waypoints: Floats) -> str:
+    course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
+    lat, lon = first.lat_deg, first.lon_deg
+    if first.loiter is not None:
+        lat, lon = (float(value) for value in to_geo(origin, waypoints[0, 0], waypoints[0, 1]))
+    where = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
+    item = itinerary.takeoff
+    name = "no TAKEOFF" if item is None else f"{command_name(item.command)} (item {item.seq})"
+    if first.loiter is not None:
+        return f"{name}: starts trimmed in the air on the circle of item {first.item}: {where}"
+    if item is not None:
+        over = "home" if itinerary.has_home else "the first position, as there is no home,"
+        return f"{name}: starts trimmed in the air over {over} at that item's height: {where}"
+    return f"{name}: starts trimmed at the first position, item {first.item}: {where}"

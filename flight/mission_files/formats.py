@@ -1,0 +1,82 @@
+"""Mission files by suffix and content."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal
+
+from flight.mission.items import MOST_BYTES, Mission
+from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
+from flight.mission_files.wpl import fence_text, parse_waypoints, rally_text, waypoints_text
+from world.errors import MissionError
+
+Kind = Literal["waypoints", "plan", "fence", "rally"]
+
+KINDS: dict[str, Kind] = {
+    ".waypoints": "waypoints",
+    ".plan": "plan",
+    ".txt": "waypoints",
+    ".fence": "fence",
+    ".rally": "rally",
+}
+
+_WRITERS: dict[Kind, Callable[[Mission], str]] = {
+    "waypoints": waypoints_text,
+    "plan": plan_file_text,
+    "fence": fence_text,
+    "rally": rally_text,
+}
+_UTF16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+def mission_kind(path: Path) -> Kind:
+    """Form that a file's suffix names.  Raises MissionError for any other suffix."""
+    try:
+        return KINDS[path.suffix.lower()]
+    except KeyError:
+        raise MissionError(f"{path}: suffix {path.suffix!r}: allowed {', '.join(KINDS)}") from None
+
+
+def read_mission(path: Path) -> Mission:
+    """Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
+
+    The suffix must be known; where text and suffix disagree, the text decides.  Raises MissionError with one line:
+    file, line or field, value, what is allowed.
+    """
+    mission_kind(path)
+    return parse_mission(_read_text(path), str(path))
+
+
+def parse_mission(text: str, source: str) -> Mission:
+    """Read the text of a mission in either form; a `.plan` is the one that starts with a brace or bracket."""
+    if text.removeprefix("\ufeff").lstrip()[:1] in ("{", "["):
+        return parse_plan_file(text, source)
+    if source.lower().endswith(".plan") and not text.removeprefix("\ufeff").lstrip().startswith("QGC"):
+        return parse_plan_file(text, source)
+    return parse_waypoints(text, source)
+
+
+def mission_text(mission: Mission, kind: Kind) -> str:
+    """Mission as the text of a file; the same mission always gives the same bytes."""
+    return _WRITERS[kind](mission)
+
+
+def _read_text(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise MissionError(f"{path}: {size:,} bytes: a mission file has at most {MOST_BYTES:,}")
+        data = path.read_bytes()
+    except OSError as error:
+        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+    if not data.strip():
+        raise MissionError(f"{path}: empty: a mission is expected")
+    if data.startswith(_UTF16):
+        raise MissionError(f"{path}: text in UTF-16: a mission file is UTF-8 or ASCII")
+    if b"\0" in data:
+        line = data.count(b"\n", 0, data.index(b"\0")) + 1
+        raise MissionError(f"{path}:{line}: a NUL byte: a text file is expected")
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise MissionError(f"{path}:{line}: not a text file in UTF-8 (byte {error.start})") from error

@@ -1,0 +1,300 @@
+"""The `.plan` JSON form of a mission (QGroundControl's "Plan File Format"): read, and written for QGC and MAVSDK.
+
+ComplexItems are read as the simple items that they stand for (`flight.mission_files.qgc_complex_items`).
+"""
+
+import json
+import math
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from flight.mission.fences import INCLUSIONS, POLYGONS, fence_shapes
+from flight.mission.items import (
+    AMSL,
+    LANDINGS,
+    MOST_ITEMS,
+    OVER_HOME,
+    PLACES,
+    Command,
+    Frame,
+    Home,
+    Mission,
+    MissionItem,
+    command_name,
+    is_located,
+    item_problem,
+    on_grid,
+    position_problem,
+    renumbered,
+)
+from flight.mission_files.qgc_complex_items import expand_items
+from world.errors import MissionError
+from world.scenario_file import first_error
+
+_HOVER_SPEED = 5.0  # QGC's own default; a fixed wing has none
+_CRUISE_SPEED = 15.0  # QGC's own default
+_FASTEST = 1000.0  # m/s
+
+
+class _Table(BaseModel):
+    # QGC adds keys from release to release: unknown ones are ignored.
+    model_config = ConfigDict(extra="ignore", allow_inf_nan=False, frozen=True, strict=True)
+
+
+_Number = Annotated[float, Field(ge=-3.5e38, le=3.5e38)]
+_Unset = _Number | None
+_Pair = Annotated[list[_Number], Field(min_length=2, max_length=2)]
+
+
+class _Item(_Table):
+    # A ComplexItem has none of a SimpleItem's keys; `_check_kind` speaks first.
+    autoContinue: bool = True
+    command: Annotated[int, Field(ge=0, le=65535)]
+    doJumpId: Annotated[int, Field(ge=0, le=65535)] | None = None
+    frame: Annotated[int, Field(ge=0, le=255)]
+    params: Annotated[list[_Unset], Field(min_length=7, max_length=7)]
+
+
+class _Mission(_Table):
+    version: Annotated[int, Field(ge=2, le=2)]
+    cruiseSpeed: Annotated[float, Field(ge=0.0, le=_FASTEST)] | None = None
+    plannedHomePosition: Annotated[list[_Unset], Field(min_length=3, max_length=3)] | None = None
+    items: Annotated[list[_Item], Field(max_length=MOST_ITEMS)]
+
+
+class _Disc(_Table):
+    center: _Pair
+    radius: Annotated[float, Field(gt=0.0, le=1e7)]
+
+
+class _Circle(_Table):
+    circle: _Disc
+    inclusion: bool
+
+
+class _Polygon(_Table):
+    polygon: Annotated[list[_Pair], Field(min_length=3, max_length=1000)]
+    inclusion: bool
+
+
+class _Fence(_Table):
+    circles: Annotated[list[_Circle], Field(max_length=1000)] = []
+    polygons: Annotated[list[_Polygon], Field(max_length=1000)] = []
+
+
+class _Rally(_Table):
+    points: Annotated[list[Annotated[list[_Number], Field(min_length=3, max_length=3)]], Field(max_length=1000)] = []
+
+
+class _File(_Table):
+    fileType: Literal["Plan"]
+    version: Annotated[int, Field(ge=1, le=1)]
+    mission: _Mission
+    geoFence: _Fence = _Fence()
+    rallyPoints: _Rally = _Rally()
+
+
+def parse_plan_file(text: str, source: str) -> Mission:
+    """Read the text of a `.plan` file; ``source`` names it in messages.
+
+    An item's number is its doJumpId, or its place in the list where it has none.  null is NaN.  Raises MissionError
+    with file, field, value and what is allowed.
+    """
+    try:
+        data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
+    except (ValueError, RecursionError) as error:
+        raise MissionError(f"{source}: not valid JSON: {_line(error)}") from error
+    warnings = _check_kind(data, source)
+    try:
+        file = _File.model_validate(data)
+    except ValidationError as error:
+        raise MissionError(f"{source}: {first_error(error)}") from error
+    items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
+    if not items:
+        raise MissionError(f"{source}: mission.items: no items")
+    for k, (before, after) in enumerate(pairwise(items), 1):
+        if after.seq <= before.seq:
+            raise MissionError(
+                f"{source}: mission.items.{k}.doJumpId: {after.seq}: must be above the one before, {before.seq}"
+            )
+    lost = [item for item in items if item.command in PLACES | LANDINGS and not item.has_position]
+    if lost:
+        name = command_name(lost[0].command)
+        warnings.append(f"{source}: item {lost[0].seq}: {name} has no position ({len(lost)} such items in all)")
+    return Mission(
+        home=_read_home(file.mission.plannedHomePosition, source),
+        items=tuple(items),
+        fences=_read_fences(file.geoFence, source),
+        rally=_read_rally(file.rallyPoints, source),
+        cruise_speed=file.mission.cruiseSpeed,
+        warnings=tuple(warnings),
+        source=source,
+    )
+
+
+def _check_kind(data: Any, source: str) -> list[str]:
+    """Refuse what is no plan before its missing keys are named, and expand its items; returns warnings."""
+    if not isinstance(data, dict):
+        raise MissionError(f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}')
+    if data.get("fileType") != "Plan":
+        raise MissionError(f'{source}: fileType: {json.dumps(data.get("fileType"))[:60]}: "Plan" is expected')
+    warnings: list[str] = []
+    mission = data.get("mission")
+    if isinstance(mission, dict) and isinstance(mission.get("items"), list):
+        mission["items"] = expand_items(mission["items"], source, warnings)
+    for key in ("geoFence", "rallyPoints"):
+        part = data.get(key)
+        if isinstance(part, dict) and part.get("version") != 2:
+            warnings.append(f"{source}: {key}: version {json.dumps(part.get('version'))[:20]}: not read; 2 is known")
+            data[key] = {}
+    return warnings
+
+
+def _read_item(item: _Item, k: int, source: str) -> MissionItem:
+    p1, p2, p3, p4, lat, lon, alt = (math.nan if value is None else value + 0.0 for value in item.params)
+    if is_located(item.command, item.frame) and position_problem(lat, lon) is None:
+        lat, lon = on_grid(lat), on_grid(lon)
+    seq = k + 1 if item.doJumpId is None else item.doJumpId
+    read = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
+    problem = item_problem(read)
+    if problem is not None:
+        raise MissionError(f"{source}: mission.items.{k} (item {seq}): {problem}")
+    return read
+
+
+def _read_home(values: list[float | None] | None, source: str) -> Home | None:
+    if values is None or values[0] is None or values[1] is None:
+        return None
+    lat, lon, alt = values[0], values[1], values[2] or 0.0
+    place = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
+    problem = item_problem(place)
+    if problem is not None:
+        raise MissionError(f"{source}: mission.plannedHomePosition: {problem}")
+    return Home(on_grid(lat), on_grid(lon), alt + 0.0) if place.has_position else None
+
+
+def _read_fences(fence: _Fence, source: str) -> tuple[MissionItem, ...]:
+    found: list[MissionItem] = []
+
+    def add(command: Command, p1: float, point: list[float], place: str) -> None:
+        item = MissionItem(
+            len(found), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
+        )
+        problem = item_problem(item)
+        if problem is not None:
+            raise MissionError(f"{source}: geoFence.{place}: {problem}")
+        found.append(item)
+
+    for k, shape in enumerate(fence.polygons):
+        command = Command.NAV_FENCE_POLYGON_INCLUSION if shape.inclusion else Command.NAV_FENCE_POLYGON_EXCLUSION
+        for point in shape.polygon:
+            add(command, float(len(shape.polygon)), point, f"polygons.{k}")
+    for k, ring in enumerate(fence.circles):
+        command = Command.NAV_FENCE_CIRCLE_INCLUSION if ring.inclusion else Command.NAV_FENCE_CIRCLE_EXCLUSION
+        add(command, ring.circle.radius, ring.circle.center, f"circles.{k}")
+    return tuple(found)
+
+
+def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
+    found = []
+    for k, (lat, lon, alt) in enumerate(rally.points):
+        item = MissionItem(
+            k, int(Command.NAV_RALLY_POINT), Frame.GLOBAL_RELATIVE_ALT, (0.0,) * 4, on_grid(lat), on_grid(lon), alt
+        )
+        problem = item_problem(item)
+        if problem is not None:
+            raise MissionError(f"{source}: rallyPoints.points.{k}: {problem}")
+        found.append(item)
+    return tuple(found)
+
+
+def plan_file_text(mission: Mission) -> str:
+    """Mission as a `.plan` file; the same mission always gives the same bytes.
+
+    cruiseSpeed is the mission's, or its first DO_CHANGE_SPEED, or QGC's default.
+    """
+    mission = renumbered(mission)
+    home = mission.home or Home(0.0, 0.0, 0.0)
+    modes = _altitude_modes(mission.items)
+    data = {
+        "fileType": "Plan",
+        "geoFence": _fence_json(mission.fences),
+        "groundStation": "planfly",
+        "mission": {
+            "cruiseSpeed": _cruise_speed(mission),
+            "firmwareType": 12,
+            # 0: mixed.
+            "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
+            "hoverSpeed": _HOVER_SPEED,
+            "items": [_item_json(item) for item in mission.items],
+            "plannedHomePosition": [home.lat_deg, home.lon_deg, home.alt],
+            "vehicleType": 1,
+            "version": 2,
+        },
+        "rallyPoints": {"points": [[p.lat_deg, p.lon_deg, _or_null(p.alt)] for p in mission.rally], "version": 2},
+        "version": 1,
+    }
+    return json.dumps(data, indent=4, allow_nan=False) + "\n"
+
+
+def _altitude_mode(frame: int) -> int:
+    """QGC's altitude mode of a frame: 1 relative to home, 2 above mean sea level, 4 above terrain."""
+    return 1 if frame in OVER_HOME else 2 if frame in AMSL else 4
+
+
+def _altitude_modes(items: tuple[MissionItem, ...]) -> list[int]:
+    return sorted({_altitude_mode(item.frame) for item in items if is_located(item.command, item.frame)})
+
+
+def _cruise_speed(mission: Mission) -> float:
+    if mission.cruise_speed is not None:
+        return mission.cruise_speed
+    for item in mission.items:
+        if item.command == Command.DO_CHANGE_SPEED and 0.0 < item.params[1] <= _FASTEST:
+            return item.params[1]
+    return _CRUISE_SPEED
+
+
+def _item_json(item: MissionItem) -> dict[str, Any]:
+    numbers = [_or_null(value) for value in (*item.params, item.lat_deg, item.lon_deg, item.alt)]
+    data: dict[str, Any] = {
+        "autoContinue": item.autocontinue,
+        "command": int(item.command),
+        "doJumpId": item.seq,
+        "frame": int(item.frame),
+        "params": numbers,
+        "type": "SimpleItem",
+    }
+    if is_located(item.command, item.frame):
+        # QGC leaves these out for commands without a place.
+        data |= {"AMSLAltAboveTerrain": None, "Altitude": numbers[6], "AltitudeMode": _altitude_mode(item.frame)}
+    return data
+
+
+def _fence_json(fences: tuple[MissionItem, ...]) -> dict[str, Any]:
+    circles: list[dict[str, Any]] = []
+    polygons: list[dict[str, Any]] = []
+    for shape in fence_shapes(fences):
+        item = shape[0]
+        inclusion = item.command in INCLUSIONS
+        if item.command in POLYGONS:
+            polygon = [[corner.lat_deg, corner.lon_deg] for corner in shape]
+            polygons.append({"inclusion": inclusion, "polygon": polygon, "version": 1})
+        else:
+            disc = {"center": [item.lat_deg, item.lon_deg], "radius": item.params[0]}
+            circles.append({"circle": disc, "inclusion": inclusion, "version": 1})
+    return {"circles": circles, "polygons": polygons, "version": 2}
+
+
+def _or_null(value: float) -> float | None:
+    return None if math.isnan(value) else value
+
+
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not a number")
+
+
+def _line(error: BaseException) -> str:
+    return str(error).splitlines()[0]

@@ -1,0 +1,224 @@
+"""The QGC WPL 110 text form of a mission (`.waypoints`): read as people write it, written for the strictest reader.
+
+A header line, then twelve columns a line: seq, current, frame, command, p1..p4, latitude, longitude, altitude,
+autocontinue (MAVLink file formats, "Plain-Text File Format").  Line 0 is home.
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from itertools import pairwise
+
+from flight.mission.fences import fence_shapes, numbered
+from flight.mission.items import (
+    FENCES,
+    LANDINGS,
+    MOST_ITEMS,
+    PLACES,
+    Command,
+    Frame,
+    Home,
+    Mission,
+    MissionItem,
+    command_name,
+    is_located,
+    item_problem,
+    on_grid,
+    position_problem,
+    renumbered,
+)
+from world.errors import MissionError
+
+HEADER = "QGC WPL 110"
+# Lines of a file, comments and empty ones included: ten an item.
+MOST_LINES = 10 * MOST_ITEMS
+
+_COLUMNS = (
+    "seq",
+    "current",
+    "frame",
+    "command",
+    "p1",
+    "p2",
+    "p3",
+    "p4",
+    "latitude",
+    "longitude",
+    "altitude",
+    "autocontinue",
+)
+_WHOLE = re.compile(r"[+-]?[0-9]{1,10}")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_ALLOWED = {"seq": (0, 65535), "current": (0, 1), "frame": (0, 255), "command": (0, 65535), "autocontinue": (0, 1)}
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    """One line of the file, as numbers."""
+
+    place: str
+    current: bool
+    item: MissionItem
+
+
+def parse_waypoints(text: str, source: str) -> Mission:
+    """Read the text of a WPL 110 file; ``source`` names it in messages.
+
+    Taken as found: CRLF, spaces for TABs, '#' comments and empty lines, gaps in seq, no current item, more than seven
+    decimals (rounded to the 1e-7 degrees that MISSION_ITEM_INT carries).  Raises MissionError with file, line, field,
+    value and what is allowed.
+    """
+    breaks = max(text.count("\n"), text.count("\r"))
+    if breaks > MOST_LINES:
+        raise MissionError(f"{source}: {breaks:,} lines: at most {MOST_LINES:,} are read")
+    lines = [
+        (number, line.strip())
+        for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise MissionError(
+            f"{source}: empty: a first line '{HEADER}' and lines of {len(_COLUMNS)} columns are expected"
+        )
+    number, header = lines[0]
+    if header.split() != HEADER.split():
+        raise MissionError(f"{source}:{number}: header {_shown(header)}: '{HEADER}' is expected")
+    if len(lines) - 1 > MOST_ITEMS:
+        raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MOST_ITEMS:,} are read")
+    rows = [_row(f"{source}:{number}", line) for number, line in lines[1:]]
+    if not rows:
+        raise MissionError(f"{source}: no items after the header")
+    for before, after in pairwise(rows):
+        if after.item.seq <= before.item.seq:
+            raise MissionError(f"{after.place}: seq {after.item.seq}: must be above the one before, {before.item.seq}")
+    home, body = _split_home(rows)
+    fences = numbered([row.item for row in body if row.item.command in FENCES])
+    fence_shapes(fences, source)
+    return Mission(
+        home=home,
+        items=tuple(row.item for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}),
+        fences=fences,
+        rally=numbered([row.item for row in body if row.item.command == Command.NAV_RALLY_POINT]),
+        warnings=tuple(_warnings(rows, body)),
+        source=source,
+    )
+
+
+def _row(place: str, line: str) -> _Row:
+    fields = line.split()
+    if len(fields) != len(_COLUMNS):
+        raise MissionError(f"{place}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})")
+    values = dict(zip(_COLUMNS, fields, strict=True))
+    whole = {name: _whole(place, name, values[name]) for name in _ALLOWED}
+    p1, p2, p3, p4, lat, lon, alt = (_number(place, name, values[name]) for name in _COLUMNS[4:11])
+    # A home line of Mission Planner may carry command 0.
+    command = whole["command"] or (Command.NAV_WAYPOINT if whole["seq"] == 0 else 0)
+    if is_located(command, whole["frame"]) and position_problem(lat, lon) is None:
+        lat, lon = on_grid(lat), on_grid(lon)
+    item = MissionItem(
+        whole["seq"], int(command), whole["frame"], (p1, p2, p3, p4), lat, lon, alt, bool(whole["autocontinue"])
+    )
+    problem = item_problem(item)
+    if problem is not None:
+        raise MissionError(f"{place}: {problem}")
+    return _Row(place, bool(whole["current"]), item)
+
+
+def _whole(place: str, name: str, text: str) -> int:
+    low, high = _ALLOWED[name]
+    if not _WHOLE.fullmatch(text) or not low <= int(text) <= high:
+        raise MissionError(f"{place}: {name} {_shown(text)}: a whole number {low}..{high} is expected")
+    return int(text)
+
+
+def _number(place: str, name: str, text: str) -> float:
+    if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
+        hint = " (a decimal comma?)" if "," in text else ""
+        raise MissionError(f"{place}: {name} {_shown(text)}: a finite number is expected{hint}")
+    # 0.0 for -0.0, which no other form of a mission keeps.
+    return float(text) + 0.0
+
+
+def _split_home(rows: list[_Row]) -> tuple[Home | None, list[_Row]]:
+    first = rows[0].item
+    if first.seq != 0 or first.command != Command.NAV_WAYPOINT:
+        return None, rows
+    if not first.has_position:
+        return None, rows[1:]
+    return Home(first.lat_deg, first.lon_deg, first.alt), rows[1:]
+
+
+def _warnings(rows: list[_Row], body: list[_Row]) -> list[str]:
+    found: list[str] = []
+    plain = [row for row in body if row.item.command not in FENCES | {Command.NAV_RALLY_POINT}]
+    if not plain:
+        # A fence or rally file: no home line, as MAVProxy has it, or one, as Mission Planner does.
+        return found
+    if not any(row.current for row in rows):
+        found.append("no current item: flown from the first")
+    if len(body) == len(rows):
+        found.append(f"{rows[0].place}: not a home line (seq 0, command 16): the mission has no home")
+    elif rows[0].item.has_position and rows[0].item.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
+        found.append(
+            f"{rows[0].place}: home in frame {rows[0].item.frame}: its height is taken as above mean sea level"
+        )
+    gaps = [after for before, after in pairwise(rows) if after.item.seq != before.item.seq + 1]
+    if gaps:
+        found.append(
+            f"{gaps[0].place}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): numbers kept as written"
+        )
+    lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
+    if lost:
+        name = command_name(lost[0].item.command)
+        found.append(f"{lost[0].place}: {name} at 0, 0, which is no position ({len(lost)} such items in all)")
+    return found
+
+
+def waypoints_text(mission: Mission) -> str:
+    """Mission's items as a WPL 110 file: TABs, LF, coordinates with at least eight decimals.
+
+    A NaN is written as 0, which is what this form has for "unset".  Fences and rally points have files of their own.
+    """
+    return _text(mission.home, renumbered(mission).items)
+
+
+def fence_text(mission: Mission) -> str:
+    """Fences of a mission as a WPL file of their own: numbered from 0, and no home line (MAVProxy's `fence load`)."""
+    return _lines(mission.fences)
+
+
+def rally_text(mission: Mission) -> str:
+    """Rally points of a mission as a WPL file of their own, as `fence_text`."""
+    return _lines(mission.rally)
+
+
+def _lines(items: tuple[MissionItem, ...]) -> str:
+    return "\n".join([HEADER, *(_line(item, current=False) for item in items)]) + "\n"
+
+
+def _text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
+    at = home or Home(0.0, 0.0, 0.0)
+    first = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), at.lat_deg, at.lon_deg, at.alt)
+    lines = [HEADER, *(_line(item, current=item is first) for item in (first, *items))]
+    return "\n".join(lines) + "\n"
+
+
+def _line(item: MissionItem, *, current: bool) -> str:
+    numbers = [_decimal(value, 0) for value in item.params]
+    place = [_decimal(item.lat_deg, 8), _decimal(item.lon_deg, 8), _decimal(item.alt, 3)]
+    whole = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
+    return "\t".join([*whole, *numbers, *place, str(int(item.autocontinue))])
+
+
+def _decimal(value: float, places: int) -> str:
+    """Text of a number that reads back to the same double, without an exponent, with at least so many decimals."""
+    if math.isnan(value):
+        value = 0.0
+    whole, _, part = format(Decimal(repr(value + 0.0)), "f").partition(".")
+    part = part.rstrip("0").ljust(places, "0")
+    return f"{whole}.{part}" if part else whole
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")

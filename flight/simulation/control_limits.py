@@ -1,0 +1,30 @@
+"""The aircraft's controls: their limits, and when a flight asked for all that they give."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import load_aircraft
+from flight.simulation.track import Track
+
+# A control counts as at its limit within this share of its range.
+_EDGE = 1e-3
+
+
+def control_limits(aircraft: str) -> list[tuple[str, float]]:
+    """Name each control and its limit either way (rad; 1 for the throttle; NaN for an aircraft that is not known)."""
+    try:
+        known = load_aircraft(aircraft)
+    except ValueError:
+        limits = (math.nan, math.nan, math.nan)
+    else:
+        limits = (known.max_elevator, known.max_aileron, known.max_rudder)
+    return list(zip(("elevator", "aileron", "rudder", "throttle"), (*limits, 1.0), strict=True))
+
+
+def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.bool_]:
+    """Rows at which control k (a column of `Track.commands`) is asked for its limit or more; none for NaN limits."""
+    command = track.commands[:, k].astype(np.float64)
+    edge = _EDGE * (high - low)
+    return np.asarray((command <= low + edge) | (command >= high - edge))

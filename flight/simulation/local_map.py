@@ -1,0 +1,99 @@
+"""The world as the compiled loop needs it: from JSBSim's latitude and longitude to the map, and the ground below."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.flight_setup import FlightSetup
+from world.errors import FlightError
+from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
+from world.terrain import Heights, Terrain
+
+Floats = NDArray[np.float64]
+
+# The chart reaches this far (m) beyond the area and the route.
+SPARE = 5000.0
+# Worst error of the chart that a flight accepts, m and rad.
+WORST = (0.01, 1e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """From geodetic radians to the map, fitted around one flight.
+
+    position: (latitude, longitude) to (east, north).  angle: to the map course of true north (rad), and 0.
+    """
+
+    position: PolyMap
+    angle: PolyMap
+
+    @staticmethod
+    def around(setup: FlightSetup) -> "Chart":
+        """Fit the area and the route with `SPARE` to spare; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
+
+        Raises FlightError where the map cannot be fitted: an area about a pole.
+        """
+        origin: GeoOrigin = setup.scenario.origin
+        points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
+        low, high = points.min(axis=0) - SPARE, points.max(axis=0) + SPARE
+        outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
+        lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+        # Longitudes about the origin's, so that an area may lie across the 180th meridian.
+        middle = math.radians(origin.lon_deg)
+        lon = middle + (lon - middle + math.pi) % (2.0 * math.pi) - math.pi
+        bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
+        if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
+            raise FlightError(f"{setup.mission.source}: the area lies about a pole")
+
+        def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            return to_map(origin, np.degrees(phi), np.degrees(lam))
+
+        def angle(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            step = 1e-5
+            east0, north0 = position(phi - step, lam)
+            east1, north1 = position(phi + step, lam)
+            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(phi)
+
+        chart = Chart(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9))
+        if not (chart.position.residual <= WORST[0] and chart.angle.residual <= WORST[1]):
+            raise FlightError(
+                f"{setup.mission.source}: the area is too large to fly in: its map is out by"
+                f" {chart.position.residual:.2g} m; {WORST[0]:g} m is allowed"
+            )
+        return chart
+
+    def convergence(self, lat_deg: float, lon_deg: float) -> float:
+        """Map course of true north at a place, rad."""
+        middle = float(self.angle.packed[0, 1])
+        lon = middle + math.remainder(math.radians(lon_deg) - middle, 2.0 * math.pi)
+        return float(self.angle(math.radians(lat_deg), lon)[0])
+
+
+class Ground:
+    """Terrain for the compiled tick; unknown ground is a raster without data."""
+
+    def __init__(self, terrain: Terrain | None) -> None:
+        self.known = terrain is not None
+        self.terrain = terrain
+        self.heights: Heights
+        if terrain is None:
+            self.heights, self.packed = np.full((2, 2), np.nan, dtype=np.float32), _nowhere()
+            # Locked like a terrain's: a compiled function has one type for locked arrays and one for others.
+            self.heights.setflags(write=False)
+        else:
+            self.heights, self.packed = terrain.heights, terrain.to_pixel.packed
+
+    def height(self, east: float, north: float) -> float:
+        """Ground height at a map position, m; NaN where it is unknown."""
+        return math.nan if self.terrain is None else float(self.terrain.height(east, north))
+
+
+def _nowhere() -> Floats:
+    """Pack a `PolyMap` that takes every place off the raster."""
+    packed = np.zeros((6, 2))
+    packed[1, :] = 1.0
+    packed[2, 0] = packed[4, 0] = -9.0
+    packed.setflags(write=False)
+    return packed

@@ -1,0 +1,1 @@
+"""Figures of a plan, a flight and an aircraft, drawn with matplotlib."""

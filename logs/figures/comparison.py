@@ -1,0 +1,95 @@
+"""Two flights in one picture: from above, and over the distance flown."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.figures.elements import style
+from logs.figures.elements.panels import Axis, Line, Panel, draw_panels, singles
+from logs.figures.map import draw_map
+
+Floats = NDArray[np.float64]
+
+_SECOND = "#D55E00"
+_POINTS = 3000
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFlight:
+    """A flight to draw, and the name that its lines have in the legend."""
+
+    name: str
+    setup: FlightSetup
+    track: Track
+
+
+def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
+    """Draw the first flight's map with the second's route and track over it."""
+    first, _ = flights
+    both = Track(
+        *(np.concatenate([getattr(flight.track, name) for flight in flights]) for name in Track.__dataclass_fields__)
+    )
+    setup = first.setup
+    paths: dict[str, Any] = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
+    # The view holds both tracks; the line that joins them is taken out again.
+    figure = draw_map(setup.scenario, **paths, track=both, verdict=None)
+    axes = figure.axes[0]
+    next(line for line in axes.lines if line.get_label() == "flown track").remove()
+    looks: tuple[dict[str, Any], dict[str, Any]] = (
+        {"color": style.FLOWN, "linewidth": 1.6},
+        {"color": _SECOND, "linewidth": 1.6, "linestyle": (0, (5, 2))},
+    )
+    with style.clean_style():
+        for flight, look in zip(flights, looks, strict=True):
+            rows = flight.track.position[:: max(1, len(flight.track) // 6000)]
+            axes.plot(rows[:, 0], rows[:, 1], zorder=6, label=style.shorten(flight.name, 40), **look)
+        handles = axes.lines[-2:]
+        axes.legend(handles=handles, loc="best", frameon=True, framealpha=0.9)
+        axes.set_title(f"{style.shorten(setup.scenario.name, 40)}: two flights from above", fontweight="bold")
+    return figure
+
+
+def draw_overlay(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
+    """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle."""
+    flown = [_distance(flight.track) for flight in flights]
+    along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
+
+    def lines(values: list[Floats]) -> list[Line]:
+        looks: tuple[dict[str, Any], dict[str, Any]] = (
+            {"color": style.FLOWN, "width": 1.6},
+            {"color": _SECOND, "width": 1.1, "dashes": (0, (4, 1.2))},
+        )
+        return [
+            Line(style.shorten(flight.name, 22), np.interp(along, distance, value, right=np.nan), **look)
+            for flight, distance, value, look in zip(flights, flown, values, looks, strict=True)
+        ]
+
+    tracks = [flight.track for flight in flights]
+    panels = [
+        Panel("height\n(m AMSL)", lines([track.position[:, 2] for track in tracks])),
+        Panel("height above\nground (m)", lines([_above(flight) for flight in flights])),
+        Panel("airspeed\n(m/s)", lines([singles(track.airspeed) for track in tracks]), least_span=4.0),
+        Panel("bank, right +\n(°)", lines([np.degrees(singles(track.attitude[:, 0])) for track in tracks])),
+        Panel("cross-track,\nright + (m)", lines([singles(track.cross_track) for track in tracks]), least_span=2.0),
+        Panel("throttle\n(%)", lines([100.0 * singles(track.controls[:, 3]) for track in tracks])),
+    ]
+    return draw_panels(
+        "Two flights along their way", panels, Axis("distance flown over the ground (km)", along / 1e3), None
+    )
+
+
+def _distance(track: Track) -> Floats:
+    steps = np.nan_to_num(np.hypot(*np.diff(track.position[:, :2], axis=0).T))
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _above(flight: NamedFlight) -> Floats:
+    terrain, position = flight.setup.scenario.terrain, flight.track.position
+    if terrain is None:
+        return np.full(len(position), np.nan)
+    return np.asarray(position[:, 2] - terrain.height(position[:, 0], position[:, 1]))

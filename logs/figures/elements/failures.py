@@ -1,0 +1,96 @@
+"""Where a verdict's failures lie on a route, and how far along it a flight has come."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.track import Track
+from logs.verdict.findings import Verdict
+from world.geometry import leg_runs
+
+Floats = NDArray[np.float64]
+
+_PLACE = re.compile(r"(waypoint|leg) (\d+)")
+
+
+@dataclass(frozen=True, slots=True)
+class Failures:
+    """Rules that failed, by leg and by waypoint number (each rule once, in the verdict's order)."""
+
+    legs: dict[int, tuple[str, ...]]
+    waypoints: dict[int, tuple[str, ...]]
+
+    def __bool__(self) -> bool:
+        """Something failed at a place."""
+        return bool(self.legs or self.waypoints)
+
+
+def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
+    """Find the failing places of a verdict; places that the route does not have are left out."""
+    found: dict[str, dict[int, list[str]]] = {"leg": {}, "waypoint": {}}
+    for finding in verdict.findings if verdict is not None else ():
+        place = _PLACE.match(finding.where)
+        if finding.ok is not False or place is None:
+            continue
+        kind, number = place.group(1), int(place.group(2))
+        if number < waypoint_count - (kind == "leg"):
+            rules = found[kind].setdefault(number, [])
+            if finding.rule not in rules:
+                rules.append(finding.rule)
+    return Failures(
+        legs={number: tuple(rules) for number, rules in sorted(found["leg"].items())},
+        waypoints={number: tuple(rules) for number, rules in sorted(found["waypoint"].items())},
+    )
+
+
+def route_distance(waypoints: Floats) -> Floats:
+    """Horizontal distance of each waypoint along the route, (w,) m."""
+    return np.concatenate([[0.0], np.cumsum(leg_runs(waypoints))])
+
+
+def route_samples(waypoints: Floats, step: float) -> tuple[Floats, Floats]:
+    """Points along the route: distance (s,) m and position (s, 3) m, at most `step` apart, waypoints included."""
+    at = route_distance(waypoints)
+    count = max(2, int(np.ceil(at[-1] / step)) + 1) if at[-1] > 0.0 else 2
+    distance = np.union1d(np.linspace(0.0, at[-1], count), at)
+    return distance, np.column_stack([np.interp(distance, at, waypoints[:, axis]) for axis in range(3)])
+
+
+def paths_differ(a: Floats, b: Floats, tolerance: float) -> bool:
+    """Whether a corner of one path lies further than `tolerance` (m) from the other; order along it is not looked at.
+
+    a, b: (n, 3) and (m, 3) m.
+    """
+    return max(_farthest(a, b), _farthest(b, a)) > tolerance
+
+
+def _farthest(points: Floats, path: Floats) -> float:
+    """Largest distance (m) from any of the points to the path."""
+    start, step = path[:-1], np.diff(path, axis=0)
+    length2 = (step**2).sum(axis=1)
+    farthest = 0.0
+    for point in points:
+        dot = ((point - start) * step).sum(axis=1)
+        share = np.clip(np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0), 0.0, 1.0)
+        near = start + share[:, None] * step
+        farthest = max(farthest, float(np.sqrt(((near - point) ** 2).sum(axis=1).min())))
+    return farthest
+
+
+def track_distance(waypoints: Floats, track: Track) -> Floats:
+    """How far along the route each row of a track is, (t,) m, never falling.
+
+    A row is projected onto its active leg and held between that leg's ends; a row without a position keeps the
+    distance reached before it.
+    """
+    at = route_distance(waypoints)
+    leg = np.clip(track.leg.astype(np.intp), 0, len(waypoints) - 2)
+    start, end = waypoints[leg, :2], waypoints[leg + 1, :2]
+    step = end - start
+    length2 = (step**2).sum(axis=1)
+    dot = ((track.position[:, :2] - start) * step).sum(axis=1)
+    share = np.divide(dot, length2, out=np.zeros_like(dot), where=length2 > 0.0)
+    distance = at[leg] + np.clip(share, 0.0, 1.0) * np.sqrt(length2)
+    return np.asarray(np.maximum.accumulate(np.where(np.isfinite(distance), distance, 0.0)))

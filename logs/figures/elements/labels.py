@@ -1,0 +1,129 @@
+"""Places small labels near their points so that they cover neither each other nor the lines."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from matplotlib import patheffects
+from numpy.typing import ArrayLike, NDArray
+
+from logs.figures.elements.style import DPI, INK
+
+Floats = NDArray[np.float64]
+Box = tuple[float, float, float, float]
+
+# Directions that are tried for a label, best first: right-up, left-up, right-down, left-down, up, down, right, left.
+_DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
+
+
+@dataclass(slots=True)
+class LabelPlacer:
+    """Greedy placement in pixels on one axes, whose limits and place must be final.
+
+    lines: (n, 2) pixel positions that labels should not cover.  boxes: what labels already cover.
+    """
+
+    axes: Any
+    lines: Floats = field(default_factory=lambda: np.zeros((0, 2)))
+    boxes: list[Box] = field(default_factory=list)
+
+    def avoid(self, east: ArrayLike, north: ArrayLike, spacing: float = 6.0) -> None:
+        """Keep labels off a line through these data positions, sampled every `spacing` pixels."""
+        points = self._pixels(east, north)
+        points = points[np.isfinite(points).all(axis=1)]
+        if len(points) < 2:
+            self.lines = np.vstack([self.lines, points])
+            return
+        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        at = np.arange(0.0, run[-1] + spacing, spacing)
+        sampled = np.column_stack([np.interp(at, run, points[:, axis]) for axis in (0, 1)])
+        self.lines = np.vstack([self.lines, sampled])
+
+    def place(
+        self,
+        text: str,
+        x: float,
+        y: float,
+        *,
+        size: float = 7.0,
+        gap: float = 6.0,
+        prefer: tuple[int, int] = (1, 1),
+        optional: bool = False,
+        **style: Any,
+    ) -> None:
+        """Write the text beside data position (x, y), where it disturbs least.
+
+        gap: pixels.  prefer: the direction tried first; (0, 0) centres the text on the position.  optional: left out
+        where it would cover another label.  style: of the text; one with a box gets a line to its point.
+        """
+        (px, py) = self._pixels([x], [y])[0]
+        if not (math.isfinite(px) and math.isfinite(py)):
+            return
+        pad = 5.0 if "bbox" in style else 1.0
+        width = 0.62 * size * len(text) * DPI / 72.0 + 2 * pad
+        height = 1.25 * size * DPI / 72.0 + 2 * pad
+        best, best_cost = self._box(px, py, width, height, gap, prefer), math.inf
+        for ring, reach in enumerate((gap, gap + height, gap + 2.2 * height)):
+            for rank, direction in enumerate((prefer, *_DIRECTIONS)):
+                box = self._box(px, py, width, height, reach, direction)
+                cost = self._cost(box) + 0.05 * rank + 1.5 * ring
+                if cost < best_cost:
+                    best, best_cost = box, cost
+        if optional and any(_overlap(best, other) for other in self.boxes):
+            return
+        self.boxes.append(best)
+        where = self.axes.transData.inverted().transform((0.5 * (best[0] + best[2]), 0.5 * (best[1] + best[3])))
+        artist = self.axes.text(
+            where[0], where[1], text, fontsize=size, ha="center", va="center", **{"color": INK, "zorder": 9, **style}
+        )
+        if "bbox" in style:
+            self._lead(best, px, py, style["bbox"]["edgecolor"])
+        else:
+            artist.set_path_effects([patheffects.withStroke(linewidth=1.8, foreground="white", alpha=0.85)])
+
+    def _lead(self, box: Box, x: float, y: float, color: str) -> None:
+        """Draw a thin line from under a framed label to its point."""
+        middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
+        ends = self.axes.transData.inverted().transform([middle, (x, y)])
+        self.axes.plot(ends[:, 0], ends[:, 1], "-", color=color, linewidth=0.8, zorder=8.9, gid="leader")
+
+    def _pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
+        points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
+        return np.asarray(self.axes.transData.transform(points), dtype=np.float64)
+
+    @staticmethod
+    def _box(x: float, y: float, width: float, height: float, reach: float, direction: tuple[int, int]) -> Box:
+        dx, dy = direction
+        # A diagonal label touches the point's surroundings with its corner, so it may come closer.
+        near = reach * (0.7 if dx and dy else 1.0)
+        middle_x = x + dx * (near + 0.5 * width)
+        middle_y = y + dy * (near + 0.5 * height)
+        return (
+            middle_x - 0.5 * width,
+            middle_y - 0.5 * height,
+            middle_x + 0.5 * width,
+            middle_y + 0.5 * height,
+        )
+
+    def _cost(self, box: Box) -> float:
+        frame = self.axes.get_window_extent()
+        cost = 0.0
+        if box[0] < frame.x0 or box[1] < frame.y0 or box[2] > frame.x1 or box[3] > frame.y1:
+            cost += 60.0
+        for other in self.boxes:
+            if _overlap(box, other):
+                cost += 12.0
+        if len(self.lines):
+            inside = (
+                (self.lines[:, 0] > box[0])
+                & (self.lines[:, 0] < box[2])
+                & (self.lines[:, 1] > box[1])
+                & (self.lines[:, 1] < box[3])
+            )
+            cost += float(np.count_nonzero(inside))
+        return cost
+
+
+def _overlap(a: Box, b: Box) -> bool:
+    return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]

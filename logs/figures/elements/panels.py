@@ -1,0 +1,148 @@
+"""Stacked panels over one axis: series, limits and legs, as the time, control and energy pictures share them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
+
+from flight.simulation.track import Track
+from logs.figures.elements import style
+
+Floats = NDArray[np.float64]
+
+_LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 2.15, 0.72, 0.55, 1.12, 0.2
+# Runs that a line is thinned to; each keeps its lowest and highest row.
+_RUNS = 700
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One series of a panel: values (t,), and how it looks in panel and legend; filled: down to zero."""
+
+    label: str
+    values: Floats
+    color: str = style.FLOWN
+    width: float = 0.9
+    dashes: Any = "-"
+    filled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Panel:
+    """One quantity: its axis label with unit, its lines, level limits (label, value), and the least span it shows.
+
+    held: (t,) rows that are shaded, where a control stands at its limit.
+    """
+
+    title: str
+    lines: Sequence[Line]
+    limits: Sequence[tuple[str, float]] = ()
+    least_span: float = 1.0
+    held: NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What the panels run along: its label and values (t,), which never fall."""
+
+    label: str
+    values: Floats
+
+
+def time_axis(track: Track) -> Axis:
+    """Time since the start."""
+    return Axis("time since the start (s)", track.time)
+
+
+def singles(values: NDArray[np.float32]) -> Floats:
+    """Widen a column, so that what is computed from it is not rounded again."""
+    return values.astype(np.float64)
+
+
+def draw_panels(title: str, panels: Sequence[Panel], axis: Axis, track: Track | None) -> Figure:
+    """Stack panels over one axis.
+
+    track: with as many rows as the axis; grey lines with numbers then part its legs.
+    """
+    total = _TOP + _BOTTOM + len(panels) * _PANEL + (len(panels) - 1) * _GAP
+    with style.clean_style():
+        figure = style.new_figure(total)
+        for row, panel in enumerate(panels):
+            base = _BOTTOM + (len(panels) - 1 - row) * (_PANEL + _GAP)
+            place = (_LEFT / style.WIDTH, base / total, 1 - (_LEFT + _RIGHT) / style.WIDTH, _PANEL / total)
+            axes = figure.add_axes(place)
+            _draw(axes, panel, axis.values)
+            if track is not None:
+                _legs(axes, axis.values, track, numbered=row == 0)
+            if row < len(panels) - 1:
+                axes.tick_params(labelbottom=False)
+            else:
+                axes.set_xlabel(axis.label)
+        where = (_LEFT / style.WIDTH, 1 - 0.3 / total)
+        figure.text(*where, title, fontsize=11, fontweight="bold", va="center")
+    return figure
+
+
+def _draw(axes: Any, panel: Panel, along: Floats) -> None:
+    for label, value in panel.limits:
+        axes.axhline(value, color=style.MISSILE, linewidth=1.0, linestyle=(0, (5, 2)), label=label or None, zorder=2)
+    if panel.held is not None and panel.held.any():
+        frame = axes.get_xaxis_transform()
+        look: dict[str, Any] = {"color": style.FAIL, "alpha": 0.25, "linewidth": 0, "zorder": 0.5}
+        axes.fill_between(along, 0.0, 1.0, where=panel.held, transform=frame, label="held at its limit", **look)
+    seen = [value for _, value in panel.limits]
+    for line in panel.lines:
+        rows = style.outline_rows(line.values, _RUNS)
+        axes.plot(
+            along[rows],
+            line.values[rows],
+            linestyle=line.dashes,
+            color=line.color,
+            linewidth=line.width,
+            label=line.label,
+        )
+        if line.filled:
+            axes.fill_between(along[rows], 0.0, line.values[rows], color=line.color, alpha=0.25, linewidth=0)
+        finite = line.values[np.isfinite(line.values)]
+        seen += [float(finite.min()), float(finite.max())] if finite.size else []
+    low, high = (min(seen), max(seen)) if seen else (0.0, 1.0)
+    spare = max(0.0, panel.least_span - (high - low)) / 2
+    rim = 0.08 * (high - low + 2 * spare)
+    axes.set_ylim(low - spare - rim, high + spare + rim)
+    axes.set_xlim(float(along[0]), float(max(along[-1], along[0] + 1e-3)))
+    axes.xaxis.set_major_locator(MultipleLocator(style.nice_step(float(np.ptp(axes.get_xlim())), 14)))
+    axes.set_ylabel(panel.title)
+    axes.yaxis.set_label_coords(-0.062, 0.5)
+    axes.grid(color="#e4e4e4", linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), handlelength=1.6, borderaxespad=0.2)
+
+
+def _legs(axes: Any, along: Floats, track: Track, *, numbered: bool) -> None:
+    """Part the legs by thin lines; number them above the topmost panel, as far as the numbers have room."""
+    changes = np.flatnonzero(np.diff(track.leg)) + 1
+    for row in changes:
+        axes.axvline(float(along[row]), color="#b5b5b5", linewidth=0.6, zorder=1)
+    if not numbered:
+        return
+    span = float(np.ptp(axes.get_xlim()))
+    starts = np.concatenate([[0], changes]).astype(int)
+    ends = np.concatenate([changes, [len(track) - 1]]).astype(int)
+    last = -np.inf
+    for start, end in zip(starts, ends, strict=True):
+        middle = 0.5 * float(along[start] + along[end])
+        if middle - last < 0.022 * span:
+            continue
+        text = f"leg {track.leg[start]}" if last == -np.inf else str(track.leg[start])
+        place: dict[str, Any] = {
+            "xycoords": ("data", "axes fraction"),
+            "textcoords": "offset points",
+            "ha": "center",
+            "fontsize": 7,
+        }
+        axes.annotate(text, (middle, 1.0), (0, 3), color=style.QUIET, annotation_clip=False, **place)
+        last = middle

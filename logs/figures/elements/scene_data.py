@@ -1,0 +1,112 @@
+"""What the report's 3-D view shows: ground, threats, plan and flight as a small JSON text."""
+
+import base64
+import json
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.figures.elements.failures import Failures
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+MOST_GROUND = 170  # vertices a side: index numbers of the mesh stay below 65,536
+MOST_TRACK = 1600
+MISSING = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class GroundGrid:
+    """Heights (n, e) m AMSL at the crossings of ``north`` (n,) and ``east`` (e,) m; NaN where unknown."""
+
+    east: Floats
+    north: Floats
+    heights: Floats
+
+
+def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
+    """East and north range (2, 2) m of area, route and flight."""
+    points = [setup.scenario.bounds.T, setup.route.waypoints[:, :2]]
+    if track is not None:
+        points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
+    together = np.vstack(points)
+    return np.stack([together.min(axis=0), together.max(axis=0)], axis=1)
+
+
+def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGrid | None:
+    """Sample the ground at no more than ``most`` crossings a side, square as far as that goes; None without any."""
+    if terrain is None:
+        return None
+    spans = np.ptp(bounds, axis=1)
+    pitch = max(float(spans.max()) / (most - 1), terrain.spacing, 1.0)
+    axes = [
+        np.linspace(float(low), float(high), int(np.clip(np.ceil((high - low) / pitch) + 1, 2, most)))
+        for low, high in bounds
+    ]
+    heights = np.asarray(terrain.height(axes[0][None, :], axes[1][:, None]), dtype=np.float64)
+    return GroundGrid(axes[0], axes[1], heights) if np.isfinite(heights).any() else None
+
+
+def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
+    """How many times heights are stretched to be seen: 1, 1.5, 2 or 3."""
+    up = setup.route.waypoints[:, 2]
+    low, high = float(up.min()), float(up.max())
+    if grid is not None:
+        low, high = min(low, float(np.nanmin(grid.heights))), max(high, float(np.nanmax(grid.heights)))
+    wished = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(high - low, 50.0)
+    return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wished, 1.0))
+
+
+def track_rows(track: Track, most: int = MOST_TRACK) -> Floats:
+    """At most ``most`` positions of the track that are numbers, (n, 3) m."""
+    good = track.position[np.isfinite(track.position).all(axis=1)]
+    rows = np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))
+    return good[rows]
+
+
+def scene_json(setup: FlightSetup, track: Track | None, failed: Failures) -> str:
+    """Write the scene as JSON that may stand inside an HTML script element.
+
+    Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
+    """
+    bounds = scene_bounds(setup, track)
+    grid = ground_grid(setup.scenario.terrain, bounds, MOST_GROUND)
+    threats = setup.scenario.threats
+    scene = {
+        "name": setup.scenario.name,
+        "bounds": np.round(bounds, 1).tolist(),
+        "stretch": exaggeration(setup, bounds, grid),
+        "ground": None if grid is None else _ground(grid),
+        "threats": [
+            {
+                "name": name,
+                "at": np.round(threats.position[k], 1).tolist(),
+                "kill": round(float(threats.kill_radius[k]), 1),
+                "detection": round(float(threats.detection_radius[k]), 1),
+            }
+            for k, name in enumerate(threats.names)
+        ],
+        "plan": np.round(setup.route.waypoints, 1).tolist(),
+        "track": [] if track is None else np.round(track_rows(track), 1).tolist(),
+        "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
+    }
+    # "<" would end the script element early where a name holds one.
+    text = json.dumps(scene, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _ground(grid: GroundGrid) -> dict[str, object]:
+    low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
+    share = (grid.heights - low) / max(high - low, 1e-6)
+    steps = np.where(np.isfinite(share), np.round(share * (MISSING - 1)), MISSING).astype("<u2")
+    return {
+        "columns": len(grid.east),
+        "rows": len(grid.north),
+        "low": low,
+        "high": high,
+        "heights": base64.b64encode(steps.tobytes()).decode("ascii"),
+    }

@@ -1,0 +1,143 @@
+"""Threats on the map (circles) and on the profile (the part of each sphere that stands over the path)."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.collections import PatchCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Patch
+from numpy.typing import NDArray
+
+from logs.figures.elements import style
+from logs.figures.elements.failures import route_samples
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+
+_DASHES = (0, (4, 2.5))
+
+
+def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> list[Any]:
+    """Circles of missiles and radars, and what the legend says of them."""
+    handles: list[Any] = []
+    missiles = np.flatnonzero(threats.kill_radius > 0.0)
+    radars = np.flatnonzero(threats.detection_radius > 0.0)
+    where = threats.position[:, :2]
+    if missiles.size:
+        reach = _reach_at_path(threats, missiles, route)
+        axes.add_collection(
+            PatchCollection(
+                [Circle(tuple(where[k]), float(r)) for k, r in zip(missiles, reach, strict=True) if r > 0.0],
+                facecolor=style.MISSILE,
+                alpha=0.3,
+                edgecolor="none",
+                zorder=3,
+            )
+        )
+        axes.add_collection(
+            PatchCollection(
+                [Circle(tuple(where[k]), float(threats.kill_radius[k])) for k in missiles],
+                facecolor="none",
+                edgecolor=style.MISSILE,
+                linewidth=1.1,
+                zorder=3.1,
+            )
+        )
+        handles.append(
+            Patch(
+                facecolor="#f2bf9f",
+                edgecolor=style.MISSILE,
+                label="missile: line = sphere's radius,\nfill = its reach at path height",
+            )
+        )
+    if radars.size:
+        axes.add_collection(
+            PatchCollection(
+                [Circle(tuple(where[k]), float(threats.detection_radius[k])) for k in radars],
+                facecolor="none",
+                edgecolor=style.RADAR,
+                linewidth=1.1,
+                linestyle=_DASHES,
+                zorder=3.2,
+            )
+        )
+        label = "radar: sphere's radius\n(at altitude the reach is smaller)"
+        handles.append(Line2D([], [], color=style.RADAR, linewidth=1.1, linestyle=_DASHES, label=label))
+    if len(threats):
+        axes.plot(*where.T, "x", color="#333333", markersize=3.0, markeredgewidth=0.8, zorder=3.3)
+    return handles
+
+
+def _reach_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
+    """Radius (m) of each chosen missile sphere's cut at the height of the path where it passes nearest."""
+    radius = threats.kill_radius[chosen]
+    if route is None:
+        return radius
+    _, points = route_samples(route, max(50.0, float(radius.min()) / 20.0))
+    points = points[:: max(1, len(points) // 2000)]
+    reach = np.zeros(len(chosen))
+    for row, k in enumerate(chosen):
+        nearest = points[np.argmin(((points[:, :2] - threats.position[k, :2]) ** 2).sum(axis=1))]
+        above = float(nearest[2] - threats.position[k, 2])
+        reach[row] = np.sqrt(max(0.0, float(radius[row]) ** 2 - above**2))
+    return reach
+
+
+def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:
+    """Lower and upper surface (m AMSL) of a sphere over each of the points, NaN where none stands over them.
+
+    centre: (3,), points: (s, 3) m.
+    """
+    beside2 = ((points[:, :2] - centre[:2]) ** 2).sum(axis=1)
+    half = np.sqrt(np.where(beside2 <= radius**2, radius**2 - beside2, np.nan))
+    return centre[2] - half, centre[2] + half
+
+
+def draw_threat_cuts(
+    axes: Any, threats: Threats, distance: Floats, points: Floats
+) -> tuple[list[Any], list[tuple[str, float, float]]]:
+    """Fill what missile and radar spheres take of the vertical plane through the path.
+
+    distance: (s,) m along the path, points: (s, 3) m.  Returns the legend's handles, and for each sphere that stands
+    over the path its name, the middle of its stretch (km) and its highest cut (m AMSL), once for each unit.
+    """
+    handles: list[Any] = []
+    names: dict[str, tuple[str, float, float]] = {}
+    low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+    kilometres = distance / 1000.0
+    for radii, colour, label in (
+        (threats.detection_radius, style.RADAR, "radar's sphere over the path"),
+        (threats.kill_radius, style.MISSILE, "missile's sphere over the path"),
+    ):
+        missile = colour == style.MISSILE
+        away = np.maximum(np.maximum(low - threats.position[:, :2], threats.position[:, :2] - high), 0.0)
+        for k in np.flatnonzero((radii > 0.0) & (np.hypot(*away.T) <= radii)):
+            lower, upper = sphere_cuts(threats.position[k], float(radii[k]), points)
+            over = np.isfinite(upper)
+            if not over.any():
+                continue
+            axes.fill_between(
+                kilometres, lower, upper, color=colour, alpha=0.22 if missile else 0.05, linewidth=0, zorder=2
+            )
+            look: dict[str, Any] = {
+                "linewidth": 1.1,
+                "linestyle": "-" if missile else _DASHES,
+                "color": colour,
+                "zorder": 2.2,
+            }
+            axes.plot(kilometres, upper, **look)
+            axes.plot(kilometres, lower, **look)
+            for edge in np.flatnonzero(np.diff(over.astype(np.int8))) + 1:
+                at = kilometres[edge if over[edge] else edge - 1]
+                which = edge if over[edge] else edge - 1
+                axes.plot([at, at], [lower[which], upper[which]], **look)
+            highest = int(np.nanargmax(upper))
+            middle = float(np.median(kilometres[over])) if not missile else float(kilometres[highest])
+            names[threats.names[k]] = (threats.names[k], middle, float(upper[highest]))
+            if not handles or handles[-1].get_label() != label:
+                handles.append(
+                    Patch(facecolor="#f7d2bd", edgecolor=colour, label=label)
+                    if missile
+                    else Patch(facecolor="#eef6f3", edgecolor=colour, linestyle=_DASHES, label=label)
+                )
+    return handles, list(names.values())

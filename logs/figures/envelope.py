@@ -1,0 +1,106 @@
+"""The envelope and what was asked of it: climb and descent over airspeed, and bank over airspeed."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from aircraft.envelope import Envelope
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.figures.elements import style
+from world.geometry import leg_slopes
+
+Floats = NDArray[np.float64]
+
+_HEIGHT, _TOP, _BOTTOM = 4.9, 0.62, 1.2
+_MOST_DOTS = 4000
+
+
+def draw_envelope(setup: FlightSetup, track: Track | None) -> Figure:
+    """Two panels over true airspeed (m/s): path angle through the air with the trims' limits, and bank with its limit.
+
+    Limits at the lowest and highest height of the route.  Dots: the flight, one each fraction of a second; a pull-up
+    or a gust may stand outside for a moment, a leg may not.  Rings: the legs as planned.
+    """
+    with style.clean_style():
+        figure = style.new_figure(_HEIGHT)
+        base, tall = _BOTTOM / _HEIGHT, 1.0 - (_TOP + _BOTTOM) / _HEIGHT
+        slope_axes = figure.add_axes((0.08, base, 0.5, tall))
+        bank_axes = figure.add_axes((0.66, base, 0.32, tall))
+        _limits(slope_axes, setup)
+        _planned(slope_axes, setup)
+        bank = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
+        bank_axes.axhline(bank, color=style.MISSILE, linewidth=1.6, label="bank limit of the plan")
+        aircraft = float(np.degrees(setup.envelope.max_bank))
+        if abs(aircraft - bank) > 0.1:
+            bank_axes.axhline(
+                aircraft, color=style.MISSILE, linewidth=1.2, linestyle=(0, (4, 2)), label="the aircraft's"
+            )
+        if track is not None and len(track):
+            _flown(slope_axes, bank_axes, track)
+        for axes, label in ((slope_axes, "path angle through the air (°)"), (bank_axes, "bank, either side (°)")):
+            axes.set_xlabel("true airspeed (m/s)")
+            axes.set_ylabel(label)
+            axes.grid(color="#e4e4e4", linewidth=0.5)
+            axes.set_axisbelow(True)
+        bank_axes.set_ylim(bottom=0.0)
+        _range(slope_axes, bank_axes, setup.envelope)
+        name = style.shorten(setup.scenario.name, 60)
+        slope_axes.set_title(
+            f"{name}: the {style.shorten(setup.aircraft, 20)}'s envelope and this flight", fontweight="bold"
+        )
+        where: dict[str, Any] = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0}
+        slope_axes.legend(bbox_to_anchor=(0.0, -0.17), **where)
+        bank_axes.legend(bbox_to_anchor=(0.0, -0.17), loc="upper left", borderaxespad=0.0)
+    return figure
+
+
+def _limits(axes: Any, setup: FlightSetup) -> None:
+    envelope, up = setup.envelope, setup.route.waypoints[:, 2]
+    speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
+    heights = sorted({round(float(up.min())), round(float(up.max()))})
+    for amsl, dashes in zip(heights, ("-", (0, (5, 2))), strict=False):
+        angles = np.degrees([envelope.air_angles(float(speed), float(amsl)) for speed in speeds])
+        axes.plot(
+            speeds,
+            angles[:, 0],
+            linestyle=dashes,
+            color=style.MISSILE,
+            linewidth=1.8,
+            label=f"steepest climb at {amsl} m",
+        )
+        axes.plot(
+            speeds,
+            -angles[:, 1],
+            linestyle=dashes,
+            color=style.BLUE,
+            linewidth=1.8,
+            label=f"steepest descent at {amsl} m",
+        )
+    axes.axhline(0.0, color="#777777", linewidth=0.7)
+
+
+def _planned(axes: Any, setup: FlightSetup) -> None:
+    slopes = np.degrees(leg_slopes(setup.route.waypoints))
+    ring: dict[str, Any] = {"mfc": style.PLAN, "mec": "black", "mew": 0.8, "markersize": 7.0, "zorder": 5}
+    axes.plot(setup.route.airspeed, slopes, "o", label="legs as planned (over the ground)", **ring)
+
+
+def _flown(slope_axes: Any, bank_axes: Any, track: Track) -> None:
+    rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_DOTS)).astype(np.intp))
+    air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
+    angle = np.degrees(np.arctan2(air[:, 2], np.hypot(air[:, 0], air[:, 1])))
+    speed = track.airspeed[rows].astype(np.float64)
+    bank = np.degrees(np.abs(track.attitude[rows, 0].astype(np.float64)))
+    look: dict[str, Any] = {"markersize": 2.2, "alpha": 0.28, "color": style.FLOWN, "markeredgewidth": 0, "zorder": 3}
+    good = np.isfinite(speed) & np.isfinite(angle) & np.isfinite(bank)
+    slope_axes.plot(speed[good], angle[good], "o", label="flown, moment by moment", **look)
+    bank_axes.plot(speed[good], bank[good], "o", label="flown, moment by moment", **look)
+
+
+def _range(slope_axes: Any, bank_axes: Any, envelope: Envelope) -> None:
+    low, high = float(envelope.airspeed[0]), float(envelope.airspeed[-1])
+    for axes in (slope_axes, bank_axes):
+        axes.set_xlim(low - 0.5, high + 0.5)

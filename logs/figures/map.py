@@ -1,0 +1,276 @@
+"""The map: terrain, threats, the planned path and the flown track from above."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib import patheffects
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter, MultipleLocator
+from numpy.typing import NDArray
+
+from flight.simulation.track import Track
+from logs.figures.elements import style
+from logs.figures.elements.failures import Failures, failures, paths_differ
+from logs.figures.elements.ground import draw_ground
+from logs.figures.elements.labels import LabelPlacer
+from logs.figures.elements.legend import draw_compass, draw_legend, failing_handles
+from logs.figures.elements.threats import draw_threat_circles
+from logs.verdict.findings import Verdict
+from world.scenario import Scenario
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+
+# Inches: the map's own room, and what stands around it.
+_LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55
+_RIGHT_COLUMN = 8.72
+_LEAST_HEIGHT = 3.6
+# Height over width of the map: a longer or flatter area is drawn with ground around it.
+_ASPECTS = (0.4, 1.25)
+# Beyond these numbers, labels would be a grey mat: names of threats go, waypoints are numbered in steps.
+_MOST_NAMES, _MOST_NUMBERS, _MOST_DOTS = 80, 40, 80
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """The rectangle that the map shows, m."""
+
+    east: tuple[float, float]
+    north: tuple[float, float]
+
+    @property
+    def aspect(self) -> float:
+        """Height over width."""
+        return (self.north[1] - self.north[0]) / (self.east[1] - self.east[0])
+
+
+def draw_map(
+    scenario: Scenario,
+    *,
+    plan_waypoints: Floats | None,
+    route_waypoints: Floats | None,
+    track: Track | None,
+    verdict: Verdict | None,
+) -> Figure:
+    """Top view, north up, equal scales, axes in km from the scenario's origin.
+
+    plan_waypoints: (p, 3) m or None; route_waypoints: (w, 3) m as flown, or None for a plan alone.  The route is
+    numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn beside it.
+    Missiles are drawn as the sphere's circle (line) and as its cut at the height of the path nearest to it (fill).
+    """
+    route = route_waypoints if route_waypoints is not None else plan_waypoints
+    with style.clean_style():
+        view = _view(scenario, route, track)
+        figure, axes, legend_top = _frame(view, scenario, track is not None)
+        around = draw_ground(figure, axes, scenario.terrain, _RIGHT_COLUMN, _TOP)
+        around += _area(axes, scenario)
+        around += draw_threat_circles(axes, scenario.threats, route)
+        placer = LabelPlacer(axes)
+        failed = failures(verdict, len(route) if route is not None else 0)
+        handles: list[Any] = []
+        if route is not None:
+            handles += _paths(axes, route, plan_waypoints, placer)
+        if track is not None and len(track):
+            handles += _flown(axes, track, placer)
+        if route is not None:
+            handles += _failing_lines(axes, route, failed)
+        handles += _ends(axes, scenario, route, placer)
+        if route is not None:
+            _number_waypoints(scenario, route, failed, placer)
+            _fail_labels(route, failed, placer)
+        _name_threats(axes, scenario.threats, placer)
+        draw_compass(figure, scenario, _RIGHT_COLUMN)
+        draw_legend(figure, handles + around, _LEFT, legend_top)
+    return figure
+
+
+def _view(scenario: Scenario, route: Floats | None, track: Track | None) -> View:
+    """Area of the scenario, widened to what lies outside it, with a rim, inside the allowed aspects."""
+    points = [scenario.bounds.T, scenario.start[None, :2], scenario.destination[None, :2]]
+    if route is not None:
+        points.append(route[:, :2])
+    if track is not None:
+        points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
+    together = np.vstack(points)
+    low, high = together.min(axis=0), together.max(axis=0)
+    rim = 0.015 * float((high - low).max())
+    low, high = low - rim, high + rim
+    width, height = (high - low).tolist()
+    grown = np.array([max(width, height / _ASPECTS[1]), max(height, width * _ASPECTS[0])])
+    middle = 0.5 * (low + high)
+    low, high = middle - 0.5 * grown, middle + 0.5 * grown
+    return View((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+
+
+def _frame(view: View, scenario: Scenario, flown: bool) -> tuple[Figure, Any, float]:
+    """Figure, axes, and the height (inches) under which the legend stands."""
+    height = _MAP_WIDTH * view.aspect
+    room = max(height, _LEAST_HEIGHT)
+    legend_room = 1.0
+    total = _TOP + room + _BOTTOM + legend_room
+    figure = style.new_figure(total)
+    base = legend_room + _BOTTOM + 0.5 * (room - height)
+    axes = figure.add_axes((_LEFT / style.WIDTH, base / total, _MAP_WIDTH / style.WIDTH, height / total))
+    axes.set(xlim=view.east, ylim=view.north, aspect="equal", facecolor="#f4f4f4")
+    step = style.nice_step(max(np.ptp(view.east), np.ptp(view.north)), 14)
+    kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
+        axis.set_major_formatter(kilometres)
+    origin = scenario.origin
+    axes.set_xlabel(f"east of {origin.lat_deg:.4f}°, {origin.lon_deg:.4f}° (km)")
+    axes.set_ylabel("north (km)")
+    axes.set_title(
+        f"{style.shorten(scenario.name, 60)}: {'plan and flight' if flown else 'plan'} from above", fontweight="bold"
+    )
+    return figure, axes, (legend_room - 0.02) / total
+
+
+def _area(axes: Any, scenario: Scenario) -> list[Any]:
+    """Edge of the scenario's area; bounds made around an external mission limit nothing and are not drawn."""
+    if scenario.external:
+        return []
+    look: dict[str, Any] = {"linewidth": 0.9, "linestyle": (0, (8, 3))}
+    corner = (float(scenario.bounds[0, 0]), float(scenario.bounds[1, 0]))
+    width, height = (float(np.ptp(side)) for side in scenario.bounds)
+    axes.add_patch(Rectangle(corner, width, height, fill=False, edgecolor="#555555", zorder=2.5, **look))
+    return [Line2D([], [], color="#555555", label="edge of the area", **look)]
+
+
+def _paths(axes: Any, route: Floats, plan: Floats | None, placer: LabelPlacer) -> list[Any]:
+    handles = []
+    halo = [patheffects.Stroke(linewidth=4.8, foreground="white", alpha=0.8), patheffects.Normal()]
+    differs = plan is not None and paths_differ(plan, route, 1.0)
+    if differs and plan is not None:
+        line = axes.plot(
+            plan[:, 0], plan[:, 1], "-.", color="#555555", linewidth=1.2, zorder=4.9, label="plan as searched"
+        )
+        handles.append(line[0])
+    label = "route of the mission" if plan is None or differs else "planned path"
+    line = axes.plot(
+        route[:, 0], route[:, 1], color=style.PLAN, linewidth=3.6, solid_joinstyle="round", zorder=5, path_effects=halo
+    )
+    line[0].set_label(label)
+    placer.avoid(route[:, 0], route[:, 1])
+    inner = route[1:-1]
+    axes.plot(
+        inner[:, 0],
+        inner[:, 1],
+        "o",
+        color="white",
+        markeredgecolor=style.BLUE,
+        markersize=4.2 if len(route) <= _MOST_DOTS else 1.5,
+        markeredgewidth=1.0 if len(route) <= _MOST_DOTS else 0.5,
+        zorder=7,
+    )
+    marker = Line2D(
+        [],
+        [],
+        marker="o",
+        linestyle="",
+        color="white",
+        markeredgecolor=style.BLUE,
+        markersize=4.2,
+        label="waypoint, numbered",
+    )
+    return [line[0], *handles, marker]
+
+
+def _flown(axes: Any, track: Track, placer: LabelPlacer) -> list[Any]:
+    rows = track.position[:: max(1, len(track) // 6000)]
+    rows = np.vstack([rows, track.position[-1:]])
+    line = axes.plot(rows[:, 0], rows[:, 1], color=style.FLOWN, linewidth=1.0, zorder=6, label="flown track")
+    placer.avoid(rows[:, 0], rows[:, 1])
+    return [line[0]]
+
+
+def _failing_lines(axes: Any, route: Floats, failed: Failures) -> list[Any]:
+    """Draw a broad band under each failing leg and a ring about each failing waypoint."""
+    for leg in failed.legs:
+        run = np.hypot(*(route[leg + 1, :2] - route[leg, :2]))
+        # A leg too short to see shows as a blot.
+        short = run < 0.02 * np.ptp(axes.get_xlim())
+        axes.plot(
+            route[leg : leg + 2, 0],
+            route[leg : leg + 2, 1],
+            color=style.FAIL,
+            linewidth=10.0,
+            alpha=0.9,
+            zorder=4.8,
+            solid_capstyle="round" if short else "butt",
+        )
+    for waypoint in failed.waypoints:
+        axes.plot(
+            *route[waypoint, :2],
+            "o",
+            markersize=12,
+            markerfacecolor="none",
+            markeredgecolor=style.FAIL,
+            markeredgewidth=2.2,
+            zorder=7.5,
+        )
+    return failing_handles(failed)
+
+
+def _ends(axes: Any, scenario: Scenario, route: Floats | None, placer: LabelPlacer) -> list[Any]:
+    """Start and destination; the route's first and last number stand in their labels where they coincide."""
+    handles = []
+    for point, row, marker, size, name in (
+        (scenario.start, 0, "^", 9.0, "start"),
+        (scenario.destination, -1, "*", 13.0, "destination"),
+    ):
+        look: dict[str, Any] = {
+            "markersize": size,
+            "markerfacecolor": "#F0E442",
+            "markeredgecolor": "black",
+            "markeredgewidth": 1.0,
+        }
+        handles += axes.plot(*point[:2], marker, zorder=8, linestyle="", label=name, **look)
+        text = f"{row % len(route)} {name}" if route is not None and _same(route[row], point) else name
+        placer.place(text, float(point[0]), float(point[1]), size=8.0, gap=12.0, fontweight="bold")
+    return handles
+
+
+def _same(a: Floats, b: Floats) -> bool:
+    """Two points lie within 50 m on the ground: one marker stands for both."""
+    return float(np.hypot(*(a[:2] - b[:2]))) < 50.0
+
+
+def _number_waypoints(scenario: Scenario, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+    step = max(1, -(-len(route) // _MOST_NUMBERS))
+    last = len(route) - 1
+    hidden = {k for k, end in ((0, scenario.start), (last, scenario.destination)) if _same(route[k], end)}
+    for number in range(len(route)):
+        if number not in hidden and (number % step == 0 or number in failed.waypoints):
+            east, north = float(route[number, 0]), float(route[number, 1])
+            placer.place(str(number), east, north, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
+
+
+def _fail_labels(route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+    """Say what fails, in words, beside the first dozen of the failing places."""
+    middles = 0.5 * (route[:-1] + route[1:])
+    places = [(f"leg {k}: {', '.join(rules)}", middles[k]) for k, rules in failed.legs.items()]
+    places += [(f"waypoint {k}: {', '.join(rules)}", route[k]) for k, rules in failed.waypoints.items()]
+    frame: dict[str, Any] = {
+        "boxstyle": "round,pad=0.2",
+        "facecolor": "white",
+        "edgecolor": style.FAIL,
+        "linewidth": 0.9,
+    }
+    for text, point in places[:12]:
+        placer.place(text, float(point[0]), float(point[1]), size=7.0, gap=16.0, color=style.FAIL, bbox=frame)
+
+
+def _name_threats(axes: Any, threats: Threats, placer: LabelPlacer) -> None:
+    if len(threats) > _MOST_NAMES:
+        return
+    size = 6.0 if len(threats) <= 30 else 5.0
+    for name, point in zip(threats.names, threats.position, strict=True):
+        inside = (
+            axes.get_xlim()[0] < point[0] < axes.get_xlim()[1] and axes.get_ylim()[0] < point[1] < axes.get_ylim()[1]
+        )
+        if inside:
+            placer.place(style.shorten(name, 20), float(point[0]), float(point[1]), size=size, gap=4.0, optional=True)

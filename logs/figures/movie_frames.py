@@ -1,0 +1,126 @@
+"""A flight as a film: the map, the aircraft on it with its trail, and its numbers, frame by frame.
+
+The same log and rate give the same frames, whatever the clock.  The map is drawn once; a frame adds what moves.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.markers import MarkerStyle
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.figures.elements import style
+from logs.figures.map import draw_map
+from logs.verdict.measures.leg_numbers import with_legs
+
+Floats = NDArray[np.float64]
+Pixels = NDArray[np.uint8]
+
+RATE = 12  # frames a second
+_DPI = 100.0
+# The trail of an hour has more points than a screen.
+_TRAIL = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class Film:
+    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown."""
+
+    setup: FlightSetup
+    track: Track
+    start: float
+    end: float
+    speed: float
+
+    def __len__(self) -> int:
+        """How many frames there are: the first shows the start, the last the end."""
+        return max(1, math.ceil((self.end - self.start) * RATE / self.speed - 1e-9)) + 1
+
+    def times(self) -> Floats:
+        """Flight time of each frame, s."""
+        return np.minimum(self.end, self.start + np.arange(len(self)) * self.speed / RATE)
+
+    def frames(self) -> Iterator[Pixels]:
+        """Each frame as (height, width, 3); both even, as video formats want them."""
+        setup, track = self.setup, with_legs(self.setup, self.track)
+        figure = draw_map(
+            setup.scenario, plan_waypoints=None, route_waypoints=setup.route.waypoints, track=None, verdict=None
+        )
+        axes = figure.axes[0]
+        figure.set_dpi(_DPI)
+        canvas = FigureCanvasAgg(figure)
+        with style.clean_style():
+            axes.set_title(f"{style.shorten(setup.scenario.name, 60)}: the flight", fontweight="bold")
+            canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
+            ground = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]  # nor here
+            moving = _Moving(figure, axes, setup, track)
+            for time in self.times():
+                canvas.restore_region(ground)  # type: ignore[no-untyped-call]  # nor here
+                moving.show(float(time))
+                shown: Pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]  # nor here
+                yield shown[: len(shown) // 2 * 2, : shown.shape[1] // 2 * 2].copy()
+
+
+class _Moving:
+    """What moves over the map: trail, aircraft, numbers."""
+
+    def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
+        self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
+        look: dict[str, Any] = {"animated": True, "zorder": 9}
+        (self._trail,) = axes.plot([], [], color=style.FLOWN, linewidth=1.6, **look)
+        (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color="#B0408A", **look)
+        self._words = figure.text(
+            0.02, 0.018, "", family="monospace", fontsize=9.5, va="bottom", animated=True,
+            bbox={"facecolor": "white", "edgecolor": "#bbbbbb", "pad": 4.0},
+        )  # fmt: skip
+        position = track.position
+        terrain = setup.scenario.terrain
+        ground = np.full(len(position), math.nan)
+        if terrain is not None:
+            ground = np.asarray(terrain.height(position[:, 0], position[:, 1]))
+        self._above = position[:, 2] - ground
+        self._step = max(1, len(position) // _TRAIL)
+
+    def show(self, time: float) -> None:
+        """Draw the newest row at or before ``time`` (s), and what was flown up to it."""
+        track = self._track
+        k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
+        rows = np.append(np.arange(0, k, self._step), k)
+        place = track.position[rows]
+        self._trail.set_data(place[:, 0], place[:, 1])
+        yaw = float(track.attitude[k, 2])
+        turned = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
+        self._aircraft.set_marker(MarkerStyle(_PLANE, transform=turned))
+        self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
+        self._words.set_text(self._line(k))
+        for artist in (self._trail, self._aircraft):
+            self._axes.draw_artist(artist)
+        self._figure.draw_artist(self._words)
+
+    def _line(self, k: int) -> str:
+        track = self._track
+        parts = [
+            f"{float(track.time[k]):7.1f} s",
+            f"leg {int(track.leg[k])} of {self._setup.route.legs}",
+            f"{_n(float(track.airspeed[k]), 1)} m/s",
+            f"{_n(float(track.position[k, 2]), 0)} m AMSL",
+            f"{_n(float(self._above[k]), 0)} m above ground",
+            f"bank {_n(math.degrees(float(track.attitude[k, 0])), 0)}°",
+        ]
+        return "   ".join(parts)
+
+
+def _n(value: float, digits: int) -> str:
+    return f"{value:.{digits}f}" if math.isfinite(value) else "?"
+
+
+# Nose, right wing, tail, left wing: an arrowhead that points north.
+_PLANE = [(0.0, 1.0), (0.7, -0.8), (0.0, -0.35), (-0.7, -0.8), (0.0, 1.0)]

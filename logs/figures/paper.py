@@ -1,0 +1,189 @@
+"""Figures of the paper's experiment: paths of many runs, one path of each encoding, convergence over generations."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
+from numpy.typing import NDArray
+
+from logs.figures.elements import style
+from logs.figures.elements.ground import draw_ground
+from logs.figures.elements.labels import LabelPlacer
+from logs.figures.elements.legend import draw_legend
+from logs.figures.elements.threats import draw_threat_circles
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Inches: as the map's.
+_LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND = 0.72, 7.72, 0.5, 0.55, 0.85
+_COLUMN = 8.72
+# One look for each algorithm of a figure, told apart without colour too.
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": style.BLUE, "linestyle": "-"},
+    {"color": style.FAIL, "linestyle": (0, (5, 1.5))},
+    {"color": style.INK, "linestyle": (0, (1.2, 1.2))},
+)
+_MARKERS = ("o", "s", "^")
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """One path: waypoints (w, 3) m, its length ratio, and whether it is safe on the paper's points."""
+
+    waypoints: Floats
+    length_ratio: float
+    safe: bool
+
+
+def draw_paths(scenario: Scenario, algorithm: str, lines: Sequence[Line]) -> Figure:
+    """All runs of one algorithm over contours, missile and radar circles (the paper's Figs. 5-8)."""
+    safe = sum(line.safe for line in lines)
+    title = f"{scenario.name}: {len(lines)} runs of {algorithm}, {safe} safe"
+    with style.clean_style():
+        figure, axes, around = _map(scenario, title)
+        handles: list[Any] = []
+        for good, look, word in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
+            chosen = [line for line in lines if line.safe == good]
+            for line in chosen:
+                axes.plot(*line.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
+                axes.plot(*line.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
+            if chosen:
+                ratios = [line.length_ratio for line in chosen]
+                span = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
+                text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {word}\nPLR {span}"
+                handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
+        handles += _ends(axes, scenario, [line.waypoints for line in lines])
+        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+    return figure
+
+
+def draw_encodings(scenario: Scenario, chosen: Mapping[str, Line], seed: int) -> Figure:
+    """One path of each encoding over the same map (the paper's Figs. 9-12)."""
+    with style.clean_style():
+        figure, axes, around = _map(scenario, f"{scenario.name}: one path of each encoding, seed {seed}")
+        handles = []
+        for (name, line), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
+            axes.plot(
+                *line.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **look
+            )
+            text = f"{name}\n{'safe' if line.safe else 'not safe'}, PLR {line.length_ratio:.3f}"
+            handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
+        handles += _ends(axes, scenario, [line.waypoints for line in chosen.values()])
+        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+    return figure
+
+
+def _map(scenario: Scenario, title: str) -> tuple[Figure, Any, list[Any]]:
+    """Ground and threats; returns figure, axes and the legend's entries for them."""
+    low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
+    rim = 0.02 * float((high - low).max())
+    tall = _MAP_WIDTH * float((high[1] - low[1] + 2 * rim) / (high[0] - low[0] + 2 * rim))
+    total = _TOP + tall + _BOTTOM + _LEGEND
+    figure = style.new_figure(total)
+    base = (_LEGEND + _BOTTOM) / total
+    axes = figure.add_axes((_LEFT / style.WIDTH, base, _MAP_WIDTH / style.WIDTH, tall / total))
+    axes.set(xlim=(low[0] - rim, high[0] + rim), ylim=(low[1] - rim, high[1] + rim), aspect="equal")
+    kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
+    step = style.nice_step(float((high - low).max()), 12)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
+        axis.set_major_formatter(kilometres)
+    axes.set(xlabel="east (km)", ylabel="north (km)")
+    axes.set_title(title, fontweight="bold")
+    around = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
+    drawn = draw_threat_circles(axes, scenario.threats, None)
+    # Seen from above, whatever a path's height: a path inside a circle may pass over the sphere.
+    for handle in drawn:
+        handle.set_label(
+            "missile: circle of its sphere" if isinstance(handle, Patch) else "radar: circle of its sphere"
+        )
+    return figure, axes, around + drawn
+
+
+def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
+    """Start and destination, labelled clear of the paths."""
+    placer = LabelPlacer(axes)
+    for path in paths:
+        placer.avoid(path[:, 0], path[:, 1])
+    handles: list[Any] = []
+    for point, marker, size, name in (
+        (scenario.start, "^", 9.0, "start"),
+        (scenario.destination, "*", 13.0, "destination"),
+    ):
+        look: dict[str, Any] = {"markersize": size, "markerfacecolor": "#F0E442", "markeredgecolor": "black"}
+        handles += axes.plot(*point[:2], marker, zorder=8, linestyle="", label=name, **look)
+        placer.place(name, float(point[0]), float(point[1]), size=8.0, gap=12.0, fontweight="bold")
+    return handles
+
+
+def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
+    """Over generations: how many runs hold a safe path, and the length ratio of the safe ones.
+
+    histories: for each number of threats and each algorithm the runs' (g, 3) length ratio, kill exposure and
+    violations of the best path yet.
+    """
+    count = len(histories)
+    with style.clean_style():
+        figure = style.new_figure(6.0)
+        grid = figure.add_gridspec(
+            2, count, left=0.075, right=0.985, top=0.9, bottom=0.15, wspace=0.28 if count > 1 else 0.2, hspace=0.16
+        )
+        names: list[str] = []
+        for column, (threats, groups) in enumerate(histories.items()):
+            upper = figure.add_subplot(grid[0, column])
+            lower = figure.add_subplot(grid[1, column], sharex=upper)
+            for (name, runs), look in zip(groups.items(), _LOOKS, strict=False):
+                _converge(upper, lower, runs, look)
+                names = names if name in names else [*names, name]
+            most = max(len(runs) for runs in groups.values())
+            upper.set(ylim=(-0.04 * most, 1.06 * most), title=f"{threats} threats")
+            upper.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
+            upper.tick_params(labelbottom=False)
+            lower.set(xlabel="generation")
+            for axes in (upper, lower):
+                axes.grid(linewidth=0.4, color="#dddddd")
+                axes.set_axisbelow(True)
+            if not lower.lines:
+                lower.set_yticks([])
+                lower.text(
+                    0.5, 0.5, "no run holds\na safe path", transform=lower.transAxes, ha="center", color=style.QUIET
+                )
+            if column == 0:
+                upper.set_ylabel("runs that hold a safe path")
+                lower.set_ylabel("length ratio of the safe ones")
+        figure.text(0.012, 0.965, "Convergence over generations", fontsize=11, fontweight="bold")
+        handles: list[Any] = [
+            Line2D([], [], linewidth=1.8, label=name, **look) for name, look in zip(names, _LOOKS, strict=False)
+        ]
+        handles.append(Patch(facecolor="#cccccc", label="below: line = median, band = shortest to longest"))
+        figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.065, 0.005), ncols=4)
+    return figure
+
+
+def _converge(upper: Any, lower: Any, runs: Sequence[Floats], look: Mapping[str, Any]) -> None:
+    """One algorithm on one problem; a run that ended early keeps its last value."""
+    length = max(len(run) for run in runs)
+    stacked = np.stack([np.vstack([run, np.repeat(run[-1:], length - len(run), axis=0)]) for run in runs])
+    safe = (stacked[..., 2] == 0.0) & (stacked[..., 1] == 0.0)
+    generation = np.arange(length)
+    upper.plot(generation, safe.sum(axis=0), linewidth=1.6, **look)
+    ratios = np.where(safe, stacked[..., 0], np.nan)
+    known = safe.any(axis=0)
+    if not known.any():
+        return
+    columns = ratios[:, known]
+    lower.fill_between(
+        generation[known],
+        np.nanmin(columns, axis=0),
+        np.nanmax(columns, axis=0),
+        color=look["color"],
+        alpha=0.13,
+        linewidth=0,
+    )
+    lower.plot(generation[known], np.nanmedian(columns, axis=0), linewidth=1.6, **look)

@@ -1,0 +1,234 @@
+"""The profile: terrain, plan, flight and threats in the vertical plane along the path."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import MultipleLocator
+from numpy.typing import NDArray
+
+from flight.simulation.track import Track
+from logs.figures.elements import style
+from logs.figures.elements.failures import Failures, failures, route_distance, route_samples, track_distance
+from logs.figures.elements.labels import LabelPlacer
+from logs.figures.elements.legend import draw_legend, failing_handles
+from logs.figures.elements.threats import draw_threat_cuts
+from logs.verdict.findings import Verdict
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+_HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 6.0, 0.78, 0.25, 0.5, 1.45
+_GROUND, _BAND = "#cdbf9f", "#E69F00"
+_MOST_NUMBERS, _MOST_NAMES, _MOST_DOTS = 40, 24, 80
+
+
+def draw_profile(
+    scenario: Scenario,
+    *,
+    plan_waypoints: Floats | None,
+    route_waypoints: Floats | None,
+    track: Track | None,
+    verdict: Verdict | None,
+) -> Figure:
+    """Heights (m AMSL) over the distance along the route (km).
+
+    The route is route_waypoints (w, 3), or plan_waypoints where there is none; without either, the straight line
+    from start to destination.  The ground and the spheres' cuts are those under and about the route; flown heights
+    stand at the flight's progress along it, which never falls.
+    """
+    route = route_waypoints if route_waypoints is not None else plan_waypoints
+    straight = route is None
+    if route is None:
+        route = np.vstack([scenario.start, scenario.destination])
+    with style.clean_style():
+        figure = style.new_figure(_HEIGHT)
+        axes = figure.add_axes(
+            (
+                _LEFT / style.WIDTH,
+                _BOTTOM / _HEIGHT,
+                1.0 - (_LEFT + _RIGHT) / style.WIDTH,
+                1.0 - (_TOP + _BOTTOM) / _HEIGHT,
+            )
+        )
+        at = route_distance(route)
+        distance, points = route_samples(route, max(float(at[-1]) / 3000.0, 1.0))
+        ground = _ground_under(scenario, points)
+        _limits(axes, scenario, route, track, ground, float(at[-1]))
+        handles = _ground(axes, scenario, distance, ground)
+        threat_handles, names = draw_threat_cuts(axes, scenario.threats, distance, points)
+        lines = [] if straight else _plan(axes, at, route)
+        placer = LabelPlacer(axes)
+        placer.avoid(at / 1000.0, route[:, 2])
+        if track is not None and len(track):
+            lines += _flown(axes, route, track, placer)
+        failed = failures(verdict, len(route))
+        lines += _failing(axes, at, route, failed)
+        lines += _ceiling(axes, scenario)
+        if not straight:
+            _numbers(axes, at, route, failed, placer)
+        _name_threats(axes, names, placer)
+        _fail_labels(at, route, failed, placer)
+        _words(figure, axes, scenario, straight)
+        draw_legend(figure, lines + handles + threat_handles, _LEFT, (_BOTTOM - 0.58) / _HEIGHT)
+    return figure
+
+
+def _ground_under(scenario: Scenario, points: Floats) -> Floats | None:
+    """Terrain height (s,) under the points, None where there is none at all."""
+    if scenario.terrain is None:
+        return None
+    heights = scenario.terrain.height(points[:, 0], points[:, 1])
+    return heights if np.isfinite(heights).any() else None
+
+
+def _limits(
+    axes: Any, scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None, length: float
+) -> None:
+    """Show all of ground, plan and flight, and the ceiling if that does not press them flat."""
+    heights = [route[:, 2]]
+    if ground is not None:
+        heights.append(ground)
+    if track is not None:
+        heights.append(track.position[:, 2])
+    together = np.concatenate(heights)
+    together = together[np.isfinite(together)]
+    low, high = float(together.min()), float(together.max())
+    span = max(high - low, 50.0)
+    if high < scenario.ceiling <= high + 1.2 * span:
+        high = scenario.ceiling
+        span = high - low
+    axes.set_ylim(low - 0.12 * span, high + 0.14 * span)
+    axes.set_xlim(0.0, max(length, 1.0) / 1000.0)
+    axes.xaxis.set_major_locator(MultipleLocator(style.nice_step(max(length, 1.0) / 1000.0, 14)))
+
+
+def _ground(axes: Any, scenario: Scenario, distance: Floats, ground: Floats | None) -> list[Any]:
+    """Fill the ground, and the band above it that the path must stay out of."""
+    if ground is None:
+        return []
+    at = distance / 1000.0
+    bottom = axes.get_ylim()[0]
+    axes.fill_between(at, bottom, ground, color=_GROUND, linewidth=0, zorder=3)
+    axes.plot(at, ground, color="#6b5a3a", linewidth=0.9, zorder=3.2)
+    handles = [Patch(facecolor=_GROUND, edgecolor="#6b5a3a", label="terrain under the path")]
+    required = scenario.limits.min_clearance_m
+    if required > 0.0:
+        look: dict[str, Any] = {"facecolor": "#f8dfa6", "edgecolor": _BAND, "hatch": "////", "linewidth": 0.0}
+        axes.fill_between(at, ground, ground + required, zorder=2.8, **look)
+        label = f"required clearance, {required:g} m"
+        handles.append(Patch(facecolor="#f8dfa6", edgecolor=_BAND, hatch="////", linewidth=0.0, label=label))
+    return handles
+
+
+def _plan(axes: Any, at: Floats, route: Floats) -> list[Any]:
+    kilometres = at / 1000.0
+    line = axes.plot(kilometres, route[:, 2], color=style.PLAN, linewidth=3.6, zorder=5, label="planned heights")
+    look: dict[str, Any] = {
+        "color": "white",
+        "markeredgecolor": style.BLUE,
+        "markersize": 4.2 if len(route) <= _MOST_DOTS else 1.5,
+    }
+    axes.plot(kilometres, route[:, 2], "o", zorder=7, clip_on=False, **look)
+    axes.vlines(kilometres, axes.get_ylim()[0], route[:, 2], color="#777777", linewidth=0.4, alpha=0.6, zorder=3.5)
+    marker = Line2D([], [], marker="o", linestyle="", label="waypoint, numbered", **look)
+    return [line[0], marker]
+
+
+def _flown(axes: Any, route: Floats, track: Track, placer: LabelPlacer) -> list[Any]:
+    heights = track.position[:, 2]
+    rows = style.outline_rows(heights, 1500)
+    progress = track_distance(route, track)[rows] / 1000.0
+    line = axes.plot(progress, heights[rows], color=style.FLOWN, linewidth=1.1, zorder=6, label="flown heights")
+    placer.avoid(progress, heights[rows])
+    return [line[0]]
+
+
+def _failing(axes: Any, at: Floats, route: Floats, failed: Failures) -> list[Any]:
+    """Draw a broad band under each failing leg's heights, a strip below the ground, a ring about failing waypoints."""
+    kilometres = at / 1000.0
+    low, high = axes.get_ylim()
+    for leg in failed.legs:
+        ends = kilometres[leg : leg + 2]
+        axes.plot(
+            ends, route[leg : leg + 2, 2], color=style.FAIL, linewidth=9.0, alpha=0.9, zorder=4.8, solid_capstyle="butt"
+        )
+        axes.fill_between(ends, low, low + 0.025 * (high - low), color=style.FAIL, linewidth=0, zorder=8)
+    for waypoint in failed.waypoints:
+        place = (kilometres[waypoint], route[waypoint, 2])
+        axes.plot(*place, "o", markersize=12, mfc="none", mec=style.FAIL, mew=2.2, zorder=7.5, clip_on=False)
+    return failing_handles(failed)
+
+
+def _ceiling(axes: Any, scenario: Scenario) -> list[Any]:
+    """Ceiling and floor as lines, or as words in the legend where they lie outside the picture."""
+    handles: list[Any] = []
+    if scenario.external:
+        return handles
+    low, high = axes.get_ylim()
+    look: dict[str, Any] = {"color": "#444444", "linewidth": 1.2, "linestyle": (0, (6, 2, 1, 2))}
+    if low < scenario.ceiling < high:
+        axes.axhline(scenario.ceiling, zorder=4, **look)
+        handles.append(Line2D([], [], label=f"ceiling, {scenario.ceiling:.0f} m AMSL", **look))
+    else:
+        handles.append(Line2D([], [], linestyle="", label=f"ceiling {scenario.ceiling:.0f} m AMSL, off the picture"))
+    if low < scenario.floor < high:
+        axes.axhline(scenario.floor, zorder=4, **{**look, "linestyle": (0, (2, 2))})
+        handles.append(
+            Line2D([], [], label=f"floor, {scenario.floor:.0f} m AMSL", **{**look, "linestyle": (0, (2, 2))})
+        )
+    return handles
+
+
+def _numbers(axes: Any, at: Floats, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+    step = max(1, -(-len(route) // _MOST_NUMBERS))
+    for number in range(len(route)):
+        if number % step == 0 or number in failed.waypoints or number == len(route) - 1:
+            place = (float(at[number]) / 1000.0, float(route[number, 2]))
+            placer.place(str(number), *place, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
+
+
+def _name_threats(axes: Any, names: list[tuple[str, float, float]], placer: LabelPlacer) -> None:
+    """Write each sphere's name over its summit, or under the upper edge of the picture where it reaches that."""
+    low, high = axes.get_ylim()
+    top = high - 0.03 * (high - low)
+    for name, where, summit in names[:_MOST_NAMES]:
+        placer.place(
+            style.shorten(name, 20),
+            where,
+            min(top, summit + 0.02 * (high - low)),
+            size=6.5,
+            gap=2.0,
+            prefer=(0, 0),
+            optional=True,
+        )
+
+
+def _fail_labels(at: Floats, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+    places = [
+        (f"leg {k}: {', '.join(rules)}", 0.5 * (at[k] + at[k + 1]), 0.5 * (route[k, 2] + route[k + 1, 2]))
+        for k, rules in failed.legs.items()
+    ]
+    places += [(f"waypoint {k}: {', '.join(rules)}", at[k], route[k, 2]) for k, rules in failed.waypoints.items()]
+    frame: dict[str, Any] = {
+        "boxstyle": "round,pad=0.2",
+        "facecolor": "white",
+        "edgecolor": style.FAIL,
+        "linewidth": 0.9,
+    }
+    for text, where, amsl in places[:12]:
+        placer.place(text, float(where) / 1000.0, float(amsl), size=7.0, gap=18.0, color=style.FAIL, bbox=frame)
+
+
+def _words(figure: Figure, axes: Any, scenario: Scenario, straight: bool) -> None:
+    frame = axes.get_window_extent()
+    across = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
+    stretch = across / (np.ptp(axes.get_ylim()) / frame.height)
+    path = "the straight line from start to destination" if straight else "the planned path"
+    axes.set_xlabel(f"distance along {path} (km); heights are drawn {stretch:.2g} times larger than distances")
+    axes.set_ylabel("height (m AMSL)")
+    title = f"{style.shorten(scenario.name, 60)}: heights along the path"
+    axes.set_title(title if scenario.terrain is not None else f"{title} (no terrain was given)", fontweight="bold")
+    axes.grid(axis="y", color="#dddddd", linewidth=0.5, zorder=0)

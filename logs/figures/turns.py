@@ -1,0 +1,127 @@
+"""Turn by turn and leg by leg: planned, flown and limit of each finding that has a place on the route."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from logs.figures.elements import style
+from logs.figures.elements.legend import draw_legend
+from logs.verdict.findings import Finding, Verdict
+
+_PLACE = re.compile(r"(?:waypoint|leg) (\d+)")
+_LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 0.25, 0.6, 0.85, 1.55, 0.62
+_NUMBERED = 45
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceValue:
+    """What a finding says of one waypoint or leg, in its unit; NaN for what it does not say."""
+
+    number: int
+    planned: float
+    flown: float
+    limit: float
+    ok: bool | None
+
+
+_PANELS = (
+    ("turn", "waypoint", "turn\n(°)"),
+    ("slope", "leg", "slope\n(°)"),
+    ("clearance", "leg", "least height above\nground (m)"),
+    ("waypoint", "waypoint", "passed at\n(m)"),
+)
+
+
+def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
+    """List a rule's findings by the number of their waypoint or leg; those of the whole flight are left out."""
+    found = []
+    for finding in findings:
+        place = _PLACE.match(finding.where)
+        if finding.rule == rule and place is not None:
+            planned, flown, limit = (
+                math.nan if value is None else value for value in (finding.planned, finding.flown, finding.limit)
+            )
+            found.append(PlaceValue(int(place.group(1)), planned, flown, limit, finding.ok))
+    return sorted(found, key=lambda value: value.number)
+
+
+def draw_turns(name: str, verdict: Verdict) -> Figure:
+    """Panels of turns, slopes, clearances and waypoints: bars for the plan, dots for the flight, dashes for limits.
+
+    What fails is ringed and its number is written in the same colour.
+    """
+    shown = [(*panel, values) for panel in _PANELS if (values := place_values(verdict.findings, panel[0]))]
+    total = _TOP + _BOTTOM + max(1, len(shown)) * _PANEL + max(0, len(shown) - 1) * _GAP
+    with style.clean_style():
+        figure = style.new_figure(total)
+        for row, (rule, place, title, values) in enumerate(shown):
+            base = _BOTTOM + (len(shown) - 1 - row) * (_PANEL + _GAP)
+            frame = (_LEFT / style.WIDTH, base / total, 1 - (_LEFT + _RIGHT) / style.WIDTH, _PANEL / total)
+            axes = figure.add_axes(frame)
+            _bars(axes, values, rule)
+            axes.set_ylabel(title)
+            axes.set_xlabel(place, labelpad=1.0)
+        words = f"{style.shorten(name, 60)}: turn by turn, leg by leg"
+        figure.text(_LEFT / style.WIDTH, 1 - 0.28 / total, words, fontsize=11, fontweight="bold", va="center")
+        draw_legend(figure, _handles(any(v.ok is False for *_, values in shown for v in values)), _LEFT, 0.3 / total)
+    return figure
+
+
+def _bars(axes: Any, values: list[PlaceValue], rule: str) -> None:
+    numbers = [value.number for value in values]
+    small = 3.0 if len(values) > _NUMBERED else 5.5
+    axes.bar(numbers, [value.planned for value in values], width=0.62, color=style.PLAN, zorder=2)
+    axes.plot(numbers, [value.flown for value in values], "o", color=style.FLOWN, markersize=small, zorder=4)
+    axes.hlines(
+        [value.limit for value in values],
+        [number - 0.42 for number in numbers],
+        [number + 0.42 for number in numbers],
+        color=style.MISSILE, linewidth=2.0, zorder=3,
+    )  # fmt: skip
+    failed = [value for value in values if value.ok is False]
+    tops = [value.flown if math.isfinite(value.flown) else value.planned for value in failed]
+    ring: dict[str, Any] = {"mfc": "none", "mec": style.FAIL, "mew": 2.0, "markersize": small + 7.0, "zorder": 5}
+    axes.plot([value.number for value in failed], tops, "o", **ring)
+    axes.axhline(0.0, color="#777777", linewidth=0.7, zorder=1)
+    step = -(-len(values) // _NUMBERED)
+    ticks = sorted({*numbers[::step], *(value.number for value in failed[:_NUMBERED])})
+    axes.set_xticks(ticks)
+    for label, number in zip(axes.get_xticklabels(), ticks, strict=True):
+        if any(value.number == number for value in failed):
+            label.set(color=style.FAIL, fontweight="bold")
+    axes.set_xlim(numbers[0] - 0.8, numbers[-1] + 0.8)
+    axes.grid(axis="y", color="#e4e4e4", linewidth=0.5)
+    axes.set_axisbelow(True)
+    _zoom(axes, values, rule)
+
+
+def _zoom(axes: Any, values: list[PlaceValue], rule: str) -> None:
+    """Cut far clearances and far limits off, so that what is near a limit shows."""
+    near = [abs(v) for value in values for v in (value.planned, value.flown) if math.isfinite(v)]
+    limits = [abs(value.limit) for value in values if math.isfinite(value.limit)]
+    if rule == "clearance" and limits and near:
+        axes.set_ylim(0.0, max(min(max(near), 12.0 * max(limits)), 1.5 * max(limits), 1.1 * min(near)))
+    elif rule == "turn" and near and limits and max(limits) > 4.0 * max(near):
+        axes.set_ylim(
+            0.0, max(1.3 * max(near), 1.1 * min(limits)) if min(limits) < 4.0 * max(near) else 1.3 * max(near)
+        )
+        axes.annotate(
+            f"limits from {min(limits):.0f}°", (1.0, 1.0), (0, 3), xycoords="axes fraction",
+            textcoords="offset points", ha="right", fontsize=7, color=style.MISSILE,
+        )  # fmt: skip
+
+
+def _handles(failing: bool) -> list[Any]:
+    ring: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 9, "mfc": "none", "markeredgewidth": 2.0}
+    handles: list[Any] = [
+        Patch(color=style.PLAN, label="planned"),
+        Line2D([], [], marker="o", linestyle="", color=style.FLOWN, markersize=5.5, label="flown"),
+        Line2D([], [], color=style.MISSILE, linewidth=2.0, label="limit"),
+    ]
+    return [*handles, Line2D([], [], color=style.FAIL, label="fails", **ring)] if failing else handles

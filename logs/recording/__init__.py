@@ -1,0 +1,1 @@
+"""Flights as MCAP files: written, read, recovered."""

@@ -1,0 +1,74 @@
+"""The messages of a log as they were written, for those who show them elsewhere."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from google.protobuf.message import DecodeError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+from mcap.records import Message as MessageRecord
+
+from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks, records, stream
+
+
+@dataclass(frozen=True, slots=True)
+class LogChannel:
+    """A topic of a log: encoding of its messages, and their schema's name, encoding and data."""
+
+    topic: str
+    encoding: str
+    schema: str
+    schema_encoding: str
+    schema_data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class LogMessage:
+    """One message; log_time in ns since 1970."""
+
+    channel: LogChannel
+    log_time: int
+    data: bytes
+
+
+def log_messages(path: Path) -> Iterator[LogMessage]:
+    """Give the messages of a log in the order of the file, up to its first damage.  Raises OSError."""
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, LogChannel] = {}
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        for data in read_chunks(file, Container()):
+            try:
+                yield from _messages(data, schemas, channels)
+            except (*PARSE_ERRORS, DecodeError, KeyError):
+                return
+
+
+def log_channels(path: Path) -> list[LogChannel]:
+    """List the channels that the first chunk of a log declares: all that a `logs.recording.recorder.Recorder` uses."""
+    channels: dict[int, LogChannel] = {}
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        for data in read_chunks(file, Container()):
+            for _ in _messages(data, {}, channels):
+                pass
+            break
+    return list(channels.values())
+
+
+def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
+    for opcode, _, content in records(data):
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream(content))
+            schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(stream(content))
+            if channel.id not in channels:
+                known = schemas[channel.schema_id]
+                channels[channel.id] = LogChannel(
+                    channel.topic, channel.message_encoding, known.name, known.encoding, known.data
+                )
+        elif opcode == Opcode.MESSAGE:
+            message = MessageRecord.read(stream(content), len(content))
+            yield LogMessage(channels[message.channel_id], message.log_time, message.data)

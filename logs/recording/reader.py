@@ -1,0 +1,252 @@
+"""The reader: a flight log as the data that was recorded, checked and rebuilt from the log alone.
+
+A recorded verdict is given as what the log says, for comparison; nothing here or after it believes one.
+"""
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from google.protobuf.message import DecodeError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Schema
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.foxglove_scene import LEVELS
+from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks, stream
+from logs.recording.recorder import LONGEST, RECOVERY, RESULT, VERDICT
+from logs.recording.setup_attachments import SETUP, unpack_setup
+from logs.recording.state_channel import (
+    EPOCH_NS,
+    EVENT_TOPIC,
+    LOG_NAME,
+    MESSAGE_HEADER,
+    RECORD,
+    RECORD_HEADER,
+    STATE_NAME,
+    STATE_TOPIC,
+    RowMatcher,
+    Rows,
+    decode_rows,
+    join_rows,
+    parse_row,
+    state_class,
+)
+from world.errors import LogError
+
+_HEAD = struct.Struct("<BQ")
+_MESSAGE = struct.Struct("<HIQQ")
+_LEVEL_NAMES = {number: name for name, number in LEVELS.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class LogEvent:
+    """One line of the log: time in s (to the nanosecond), what happened, and its level.
+
+    level: of `logs.recording.foxglove_scene.LEVELS`.
+    """
+
+    time: float
+    text: str
+    level: str
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLog:
+    """A flight, as recorded.
+
+    source: the file's name, for messages.  ended: how the flight ended, None where the recording did not get so far.
+    recorded_verdict: the verdict as written then, None if there is none; never to be trusted.  versions: of the
+    packages that flew it.  complete: nothing is missing or damaged; problem says what is.  end_time: s, the last row.
+    """
+
+    source: str
+    setup: FlightSetup
+    track: Track
+    events: tuple[LogEvent, ...]
+    ended: str | None
+    recorded_verdict: dict[str, Any] | None
+    versions: dict[str, str]
+    complete: bool
+    problem: str
+    end_time: float
+
+
+class _Messages:
+    """Collects state rows and events from the bytes of chunks."""
+
+    def __init__(self) -> None:
+        self.parts: list[Rows] = []
+        self.events: list[LogEvent] = []
+        self.chunks = 0
+        self._schemas: dict[int, str] = {0: ""}
+        self._channels: dict[int, tuple[str, str]] = {}
+        self._matcher: RowMatcher | None = None
+        self._state_channel = -1
+        self._parser = state_class()
+
+    def add(self, data: bytes) -> None:
+        """Take the records of one chunk.  Raises one of `PARSE_ERRORS` or DecodeError."""
+        self.chunks += 1
+        at = 0
+        while at < len(data):
+            opcode, length = _HEAD.unpack_from(data, at)
+            start = at + RECORD_HEADER
+            end = start + length
+            if end > len(data):
+                raise ValueError("a record reaches beyond its chunk")
+            if opcode == 0:
+                raise ValueError("a record of no kind")
+            if opcode == Opcode.MESSAGE:
+                at = self._message(data, at, start, end)
+                continue
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream(data[start:end]))
+                self._schemas[schema.id] = schema.name
+            elif opcode == Opcode.CHANNEL:
+                self._channel(Channel.read(stream(data[start:end])))
+            at = end
+
+    def _channel(self, channel: Channel) -> None:
+        if channel.id in self._channels:
+            return
+        self._channels[channel.id] = (channel.topic, self._schemas.get(channel.schema_id, ""))
+        if self._channels[channel.id] == (STATE_TOPIC, STATE_NAME):
+            if self._matcher is not None:
+                raise ValueError("two state channels")
+            self._state_channel = channel.id
+            self._matcher = RowMatcher(channel.id)
+
+    def _message(self, data: bytes, at: int, start: int, end: int) -> int:
+        """Take the message at ``at``, or the run of state rows that begins there; return where to go on."""
+        channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
+        if channel == self._state_channel and self._matcher is not None:
+            run = self._matcher.run(data, at)
+            if len(run):
+                self.parts.append(run)
+                return at + len(run) * RECORD.itemsize
+            self.parts.append(parse_row(data[start + MESSAGE_HEADER : end], self._parser))
+        elif self._channels.get(channel) == (EVENT_TOPIC, LOG_NAME):
+            message = Log.FromString(data[start + MESSAGE_HEADER : end])
+            # The difference in whole ns first: a float holds no ns since 1970.
+            time = (log_time - EPOCH_NS) / 1e9
+            self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))
+        return end
+
+    def rows(self) -> Rows:
+        """All state rows in the order of the file, (t,) of `RECORD`."""
+        return join_rows(self.parts)
+
+
+def read_log(path: Path) -> FlightLog:
+    """Read a flight log; a damaged or unfinished one is given up to its damage, with ``complete`` False.
+
+    Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
+    holds no whole second of flight.
+    """
+    found = Container()
+    messages = _Messages()
+    try:
+        if path.exists() and not path.is_file():
+            raise LogError(f"{path}: not a file: a flight log (.mcap) is expected")
+        with path.open("rb") as file:
+            _check_magic(file.read(len(MAGIC)), path)
+            for data in read_chunks(file, found):
+                try:
+                    messages.add(data)
+                except (*PARSE_ERRORS, DecodeError):
+                    found.problem = f"chunk {messages.chunks} holds records that cannot be read"
+                    break
+    except OSError as error:
+        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+    if not messages.chunks:
+        raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}")
+    if SETUP not in found.attachments and found.problem:
+        raise LogError(f"{path}: holds no setup: {found.problem}")
+    stored = unpack_setup(found.attachments, str(path))
+    rows, fault = _good_rows(messages.rows(), len(stored.setup.route.waypoints))
+    if not len(rows):
+        raise LogError(f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}")
+    ended, wrong = _result(found.attachments, len(rows))
+    verdict, garbled = _verdict(found.attachments)
+    problem = fault or found.problem or _recovery(found.attachments) or wrong or garbled
+    track = decode_rows(rows)
+    return FlightLog(
+        source=str(path),
+        setup=stored.setup,
+        track=track,
+        events=tuple(sorted(messages.events, key=lambda event: event.time)),
+        ended=ended,
+        recorded_verdict=verdict,
+        versions=stored.versions,
+        complete=not problem,
+        problem=problem,
+        end_time=float(track.time[-1]),
+    )
+
+
+def _check_magic(magic: bytes, path: Path) -> None:
+    if not magic:
+        raise LogError(f"{path}: empty: a flight log (.mcap) is expected")
+    if magic != MAGIC:
+        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected")
+
+
+def _good_rows(rows: Rows, waypoints: int) -> tuple[Rows, str]:
+    """Cut the rows before the first that cannot follow the one before it; and say what is wrong with that one."""
+    state = rows["state"]
+    time = state["time_s"]
+    good = np.isfinite(time) & (time >= 0.0) & (time < LONGEST)
+    good[1:] &= time[1:] > time[:-1]
+    numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
+    legs = (state["leg_index"] >= 0) & (state["leg_index"] < waypoints)
+    for test, words in (
+        (numbered, "rows are missing"),
+        (good, "time does not increase"),
+        (legs, "the leg does not exist"),
+    ):
+        if not test.all():
+            first = int(np.argmin(test & numbered & good & legs))
+            return rows[:first], f"{words} at state message {first}"
+    return rows, ""
+
+
+def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
+    """How the flight ended, and what is wrong with that."""
+    if RESULT not in attachments:
+        return None, "the recording stopped before the flight had ended"
+    data = _object(attachments[RESULT])
+    ended = data.get("ended")
+    if not isinstance(ended, str):
+        return None, f"{RESULT} does not say how the flight ended"
+    if data.get("rows") != rows:
+        return ended, f"{rows} of {data.get('rows')} rows are there"
+    return ended, ""
+
+
+def _recovery(attachments: dict[str, bytes]) -> str:
+    """What was lost before the log was made whole again; empty for a log that never was damaged."""
+    if RECOVERY not in attachments:
+        return ""
+    lost = _object(attachments[RECOVERY]).get("lost")
+    return f"recovered: {lost}" if isinstance(lost, str) and lost else "recovered, and it is not said what was lost"
+
+
+def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
+    if VERDICT not in attachments:
+        return None, ""
+    verdict = _object(attachments[VERDICT])
+    return (verdict, "") if verdict else (None, f"{VERDICT} is not a JSON object")
+
+
+def _object(data: bytes) -> dict[str, Any]:
+    try:
+        found = json.loads(data)
+    except (ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}

@@ -1,0 +1,62 @@
+"""Making an unfinished or damaged log whole: what can be read of it, as a file that any MCAP reader opens.
+
+The new log says that it is a recovered one and what was lost, so that it reads as incomplete for ever.
+"""
+
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
+from logs.recording.mcap_writer import ContainerWriter
+from logs.recording.reader import FlightLog, read_log
+from logs.recording.recorder import PROFILE, RECOVERY, RESULT, VERDICT
+from logs.recording.setup_attachments import MEDIA_TYPES
+
+RECOVERY_SCHEMA = "planfly.recovery/1"
+
+
+@dataclass(frozen=True, slots=True)
+class Recovered:
+    """A log made whole: its bytes, and the flight that it holds."""
+
+    data: bytes
+    log: FlightLog
+
+
+def recover_log(path: Path) -> Recovered | None:
+    """Rebuild a log up to its first damage; None for one that is complete.
+
+    Every chunk and attachment before the damage is kept as it was.  How the flight ended and a verdict are kept out:
+    they would speak of rows that may be gone.  Raises LogError as `read_log` does.
+    """
+    log = read_log(path)
+    if log.complete:
+        return None
+    found, chunks = _whole_chunks(path)
+    out = io.BytesIO()
+    writer = ContainerWriter(out, PROFILE)
+    for name, data in found.attachments.items():
+        if name not in (RESULT, VERDICT, RECOVERY):
+            media, stamp = found.media[name]
+            writer.attach(name, media, data, stamp)
+    for chunk in chunks:
+        try:
+            writer.copy(chunk)
+        except PARSE_ERRORS:
+            # Where the reader stopped, too.
+            break
+    lost = log.problem.removeprefix("recovered: ")
+    note = {"schema": RECOVERY_SCHEMA, "lost": lost, "rows": len(log.track), "end_time_s": log.end_time}
+    text = (json.dumps(note, indent=1) + "\n").encode()
+    writer.attach(RECOVERY, MEDIA_TYPES[".json"], text, writer.last_time)
+    writer.finish()
+    return Recovered(out.getvalue(), log)
+
+
+def _whole_chunks(path: Path) -> tuple[Container, list[bytes]]:
+    found = Container()
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        return found, list(read_chunks(file, found))

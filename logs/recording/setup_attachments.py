@@ -1,0 +1,229 @@
+"""A `FlightSetup` as the named pieces of bytes that a log carries, and back.
+
+`setup.json` lists every other piece with its SHA-256, so that none can be missing or altered unseen.  Numbers are
+written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
+"""
+
+import functools
+import hashlib
+import json
+import math
+import platform
+from dataclasses import dataclass
+from importlib import metadata
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError
+
+from flight.simulation.flight_setup import FlightSetup
+from logs.recording.setup_schema import (
+    EnvelopeFile,
+    Finite,
+    MissionFile,
+    RouteFile,
+    SetupModel,
+    envelope_file,
+    mission_file,
+    read_envelope,
+    read_mission,
+    read_route,
+    route_file,
+)
+from logs.recording.terrain_attachment import NAME as TERRAIN
+from logs.recording.terrain_attachment import pack_terrain, unpack_terrain
+from planner.plan import Plan, parse_plan, plan_json
+from world.errors import LogError, PlanflyError
+from world.scenario import Scenario, from_spec
+from world.scenario_file import Guidance, Navigation, first_error
+from world.terrain import Terrain
+
+SCHEMA = "planfly.log/1"
+SETUP, SCENARIO, PLAN, MISSION = "setup.json", "scenario.json", "plan.json", "mission.waypoints"
+MEDIA_TYPES = {".json": "application/json", ".waypoints": "text/plain", ".heights": "application/octet-stream"}
+_PACKAGES = (
+    "planfly",
+    "jsbsim",
+    "numpy",
+    "numba",
+    "scipy",
+    "pydantic",
+    "pymavlink",
+    "pyproj",
+    "rasterio",
+    "mcap",
+    "zstandard",
+    "protobuf",
+    "foxglove-schemas-protobuf",
+)
+
+
+class _Setup(SetupModel):
+    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{SCHEMA}$")] = SCHEMA
+    aircraft: str
+    airspeed_mps: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+    max_bank_rad: Annotated[float, Field(gt=0.0, lt=math.pi / 2)]
+    battery_wh: Finite
+    seed: Annotated[int, Field(ge=0)]
+    foreign: bool
+    guidance: Guidance
+    nav: Navigation
+    guidance_hz: Literal[30, 60]
+    mission: MissionFile
+    route: RouteFile
+    envelope: EnvelopeFile
+    versions: dict[str, str]
+    sha256: dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class StoredSetup:
+    """What the pieces gave: the setup, and the versions of the packages that flew it."""
+
+    setup: FlightSetup
+    versions: dict[str, str]
+
+
+@functools.cache
+def _versions() -> tuple[tuple[str, str], ...]:
+    return tuple(_find_versions().items())
+
+
+def package_versions() -> dict[str, str]:
+    """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed."""
+    return dict(_versions())
+
+
+def _find_versions() -> dict[str, str]:
+    found = {"python": platform.python_version()}
+    for name in _PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
+    """All that a log needs of a setup, by name, `SETUP` first; the same setup always gives the same bytes."""
+    pieces = {
+        SCENARIO: _json(setup.scenario.to_json()),
+        MISSION: setup.mission_text.encode(),
+    }
+    if setup.plan is not None:
+        pieces[PLAN] = plan_json(setup.plan).encode()
+    if setup.scenario.terrain is not None:
+        pieces |= pack_terrain(setup.scenario.terrain)
+    file = _Setup(
+        aircraft=setup.aircraft,
+        airspeed_mps=setup.airspeed,
+        max_bank_rad=setup.max_bank,
+        battery_wh=setup.battery,
+        seed=setup.seed,
+        foreign=setup.scenario.external,
+        guidance=setup.guidance,
+        nav=setup.nav,
+        guidance_hz=setup.guidance_hz,
+        mission=mission_file(setup.mission),
+        route=route_file(setup.route),
+        envelope=envelope_file(setup.envelope),
+        versions=package_versions(),
+        sha256={name: hashlib.sha256(data).hexdigest() for name, data in pieces.items()},
+    )
+    return {SETUP: _json(file.model_dump(by_alias=True)), **pieces}
+
+
+def unpack_setup(pieces: dict[str, bytes], source: str) -> StoredSetup:
+    """Make the setup again; no file other than the log is opened.
+
+    pieces: the log's attachments by name.  source: names the log in messages.  Raises LogError with one line.
+    """
+    if SETUP not in pieces:
+        raise LogError(f"{source}: no {SETUP}: not a planfly flight log, or cut off before its first second")
+    try:
+        file = _Setup.model_validate_json(pieces[SETUP])
+    except ValidationError as error:
+        raise LogError(f"{source}: {SETUP}: {first_error(error)}") from error
+    for name, digest in file.sha256.items():
+        if name not in pieces:
+            raise LogError(f"{source}: {name}: missing; {SETUP} lists it")
+        if hashlib.sha256(pieces[name]).hexdigest() != digest:
+            raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP}")
+    listed = {name: pieces[name] for name in file.sha256}
+    terrain = unpack_terrain(listed, source) if TERRAIN in listed else None
+    scenario = _scenario(listed, source, terrain, file.foreign)
+    setup = FlightSetup(
+        scenario=scenario,
+        mission=read_mission(file.mission),
+        mission_text=_text(listed, MISSION, source),
+        route=read_route(file.route, f"{source}: {SETUP}"),
+        envelope=read_envelope(file.envelope, f"{source}: {SETUP}"),
+        aircraft=file.aircraft,
+        airspeed=file.airspeed_mps,
+        max_bank=file.max_bank_rad,
+        battery=file.battery_wh,
+        seed=file.seed,
+        plan=_plan(listed, source, terrain) if PLAN in listed else None,
+        guidance=file.guidance,
+        nav=file.nav,
+        guidance_hz=file.guidance_hz,
+    )
+    return StoredSetup(setup, file.versions)
+
+
+def _json(data: Any) -> bytes:
+    return (json.dumps(_spelt(data), indent=1, allow_nan=False) + "\n").encode()
+
+
+def _spelt(data: Any) -> Any:
+    """Spell non-finite numbers as strings, which JSON can hold."""
+    if isinstance(data, float) and not math.isfinite(data):
+        return str(float(data))
+    if isinstance(data, dict):
+        return {key: _spelt(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_spelt(value) for value in data]
+    return data
+
+
+def _text(pieces: dict[str, bytes], name: str, source: str) -> str:
+    try:
+        return pieces[name].decode()
+    except KeyError:
+        raise LogError(f"{source}: {name}: missing") from None
+    except UnicodeDecodeError as error:
+        raise LogError(f"{source}: {name}: not a text in UTF-8 (byte {error.start})") from error
+
+
+def _scenario(pieces: dict[str, bytes], source: str, terrain: Terrain | None, foreign: bool) -> Scenario:
+    where = f"{source}: {SCENARIO}"
+    try:
+        spec = json.loads(_text(pieces, SCENARIO, source))
+    except (ValueError, RecursionError) as error:
+        raise LogError(f"{where}: not valid JSON: {error}") from error
+    _refuse_outside_terrain(spec, terrain, where)
+    try:
+        return from_spec(spec, where, ground=terrain, external=foreign)
+    except PlanflyError as error:
+        raise LogError(str(error)) from error
+
+
+def _plan(pieces: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
+    where = f"{source}: {PLAN}"
+    text = _text(pieces, PLAN, source)
+    try:
+        data = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise LogError(f"{where}: not valid JSON: {error}") from error
+    _refuse_outside_terrain(data.get("scenario") if isinstance(data, dict) else None, terrain, where)
+    try:
+        return parse_plan(text, where, ground=terrain)
+    except PlanflyError as error:
+        raise LogError(str(error)) from error
+
+
+def _refuse_outside_terrain(spec: Any, terrain: Terrain | None, where: str) -> None:
+    """Refuse a log that would make its reader open the elevation file that it names."""
+    table = spec.get("terrain") if isinstance(spec, dict) else None
+    kind = table.get("kind") if isinstance(table, dict) else None
+    if terrain is None and kind != "none":
+        raise LogError(f"{where}: terrain.kind: {kind!r}: the log holds no {TERRAIN}")

@@ -1,0 +1,228 @@
+"""The parts of a `FlightSetup` that have no file of their own, as models of `setup.json`: mission, route, envelope.
+
+Numbers are written as Python's repr, which reads back to the same float.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from aircraft.envelope import Envelope
+from flight.mission.items import Home, Mission, MissionItem
+from flight.mission.route import Route
+from world.errors import LogError
+
+Floats = NDArray[np.float64]
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Column = list[float]
+Table = list[list[float]]
+
+
+class SetupModel(BaseModel):
+    """A table of `setup.json`: unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class _Item(SetupModel):
+    seq: int
+    command: int
+    frame: int
+    params: Annotated[list[float], Field(min_length=4, max_length=4)]
+    lat_deg: float
+    lon_deg: float
+    alt_m: float
+    autocontinue: bool
+
+
+class _Home(SetupModel):
+    lat_deg: float
+    lon_deg: float
+    amsl_m: float
+
+
+class MissionFile(SetupModel):
+    """A `Mission`."""
+
+    home: _Home | None
+    items: list[_Item]
+    fences: list[_Item]
+    rally: list[_Item]
+    cruise_speed_mps: float | None
+    warnings: list[str]
+    source: str
+
+
+class RouteFile(SetupModel):
+    """A `Route`."""
+
+    waypoints_east_north_amsl_m: Annotated[
+        list[Annotated[list[Finite], Field(min_length=3, max_length=3)]], Field(min_length=1)
+    ]
+    airspeed_mps: list[Finite]
+    acceptance_m: Column
+    fly_over: list[bool]
+    items: list[int]
+    started: str
+    notes: list[str]
+    arcs_m: Column = []
+
+
+class EnvelopeFile(SetupModel):
+    """An `Envelope`."""
+
+    aircraft: str
+    model_hash: str
+    motor_braking: bool
+    airspeed_mps: Annotated[list[Finite], Field(min_length=1)]
+    amsl_m: Annotated[list[Finite], Field(min_length=1)]
+    climb_rad: Table
+    descent_rad: Table
+    level_speed_min_mps: Column
+    level_speed_max_mps: Column
+    max_bank_rad: Finite
+    power_idle_w: Table = []
+    power_level_w: Table = []
+    power_full_w: Table = []
+    battery_v: Finite = 0.0
+
+
+def _item_file(item: MissionItem) -> _Item:
+    return _Item(
+        seq=item.seq,
+        command=item.command,
+        frame=item.frame,
+        params=list(item.params),
+        lat_deg=item.lat_deg,
+        lon_deg=item.lon_deg,
+        alt_m=item.alt,
+        autocontinue=item.autocontinue,
+    )
+
+
+def _item(file: _Item) -> MissionItem:
+    p1, p2, p3, p4 = file.params
+    return MissionItem(
+        file.seq, file.command, file.frame, (p1, p2, p3, p4), file.lat_deg, file.lon_deg, file.alt_m, file.autocontinue
+    )
+
+
+def mission_file(mission: Mission) -> MissionFile:
+    """Return a mission as a table."""
+    home = mission.home
+    return MissionFile(
+        home=None if home is None else _Home(lat_deg=home.lat_deg, lon_deg=home.lon_deg, amsl_m=home.alt),
+        items=[_item_file(item) for item in mission.items],
+        fences=[_item_file(item) for item in mission.fences],
+        rally=[_item_file(item) for item in mission.rally],
+        cruise_speed_mps=mission.cruise_speed,
+        warnings=list(mission.warnings),
+        source=mission.source,
+    )
+
+
+def read_mission(file: MissionFile) -> Mission:
+    """Return the mission of a table."""
+    return Mission(
+        home=None if file.home is None else Home(file.home.lat_deg, file.home.lon_deg, file.home.amsl_m),
+        items=tuple(_item(item) for item in file.items),
+        fences=tuple(_item(item) for item in file.fences),
+        rally=tuple(_item(item) for item in file.rally),
+        cruise_speed=file.cruise_speed_mps,
+        warnings=tuple(file.warnings),
+        source=file.source,
+    )
+
+
+def route_file(route: Route) -> RouteFile:
+    """Return a route as a table."""
+    return RouteFile(
+        waypoints_east_north_amsl_m=route.waypoints.tolist(),
+        airspeed_mps=route.airspeed.tolist(),
+        acceptance_m=route.acceptance.tolist(),
+        fly_over=route.fly_over.tolist(),
+        items=route.items.tolist(),
+        started=route.started,
+        notes=list(route.notes),
+        arcs_m=route.arcs.tolist(),
+    )
+
+
+def read_route(file: RouteFile, source: str) -> Route:
+    """Return the route of a table.  Raises LogError for arrays that do not fit each other."""
+    count = len(file.waypoints_east_north_amsl_m)
+    wanted = {"airspeed_mps": count - 1, "acceptance_m": count, "fly_over": count, "items": count}
+    if file.arcs_m:
+        wanted["arcs_m"] = count
+    for name, length in wanted.items():
+        if len(getattr(file, name)) != length:
+            raise LogError(f"{source}: route.{name}: {len(getattr(file, name))} values: {length} are expected")
+    return Route(
+        waypoints=np.array(file.waypoints_east_north_amsl_m, dtype=np.float64),
+        airspeed=np.array(file.airspeed_mps, dtype=np.float64),
+        acceptance=np.array(file.acceptance_m, dtype=np.float64),
+        fly_over=np.array(file.fly_over, dtype=np.bool_),
+        items=np.array(file.items, dtype=np.int64),
+        started=file.started,
+        notes=tuple(file.notes),
+        arcs=np.array(file.arcs_m, dtype=np.float64),
+    )
+
+
+def envelope_file(envelope: Envelope) -> EnvelopeFile:
+    """Return an envelope as a table."""
+    return EnvelopeFile(
+        aircraft=envelope.aircraft,
+        model_hash=envelope.model_hash,
+        motor_braking=envelope.motor_braking,
+        airspeed_mps=envelope.airspeed.tolist(),
+        amsl_m=envelope.amsl.tolist(),
+        climb_rad=envelope.climb.tolist(),
+        descent_rad=envelope.descent.tolist(),
+        level_speed_min_mps=envelope.level_speed_min.tolist(),
+        level_speed_max_mps=envelope.level_speed_max.tolist(),
+        max_bank_rad=envelope.max_bank,
+        power_idle_w=envelope.power_idle.tolist(),
+        power_level_w=envelope.power_level.tolist(),
+        power_full_w=envelope.power_full.tolist(),
+        battery_v=envelope.volts,
+    )
+
+
+def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
+    """Return the envelope of a table.  Raises LogError for arrays that do not fit each other, or axes out of order."""
+    speeds, heights = len(file.airspeed_mps), len(file.amsl_m)
+
+    def table(name: str, shape: tuple[int, ...]) -> Floats:
+        values = getattr(file, name)
+        lengths = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
+        if lengths != list(shape):
+            raise LogError(f"{source}: envelope.{name}: shape {lengths}: {list(shape)} is expected")
+        return np.array(values, dtype=np.float64)
+
+    def power(name: str) -> Floats:
+        # A log of before there was any has none.
+        return table(name, (speeds, heights)) if file.power_level_w else np.zeros((0, 0))
+
+    for name in ("airspeed_mps", "amsl_m"):
+        if (np.diff(getattr(file, name)) <= 0.0).any():
+            raise LogError(f"{source}: envelope.{name}: not increasing")
+    return Envelope(
+        aircraft=file.aircraft,
+        model_hash=file.model_hash,
+        motor_braking=file.motor_braking,
+        airspeed=table("airspeed_mps", (speeds,)),
+        amsl=table("amsl_m", (heights,)),
+        climb=table("climb_rad", (speeds, heights)),
+        descent=table("descent_rad", (speeds, heights)),
+        level_speed_min=table("level_speed_min_mps", (heights,)),
+        level_speed_max=table("level_speed_max_mps", (heights,)),
+        max_bank=file.max_bank_rad,
+        power_idle=power("power_idle_w"),
+        power_level=power("power_level_w"),
+        power_full=power("power_full_w"),
+        volts=file.battery_v,
+    )

@@ -1,0 +1,246 @@
+"""The `/state` channel: its protobuf schema, and numpy's view of its bytes.
+
+Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
+messages are one structured array.  Any protobuf parser reads them.  The schema is built here, so that no protoc is
+needed.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+from numpy.typing import NDArray
+
+from flight.simulation.track import COLUMNS, Track
+from world.kernels import compiled
+
+if TYPE_CHECKING:
+    from google.protobuf.descriptor import Descriptor, FileDescriptor
+    from google.protobuf.message import Message
+
+Bytes = NDArray[np.uint8]
+Rows = NDArray[np.void]
+
+# log_time of simulation time 0: 2000-01-01T00:00:00Z in ns since 1970.  Not 0, which MCAP reads as "no messages".
+EPOCH_NS = 946_684_800_000_000_000
+SECOND_NS = 1_000_000_000
+
+STATE_NAME = "planfly.State"
+LOG_NAME = "foxglove.Log"
+STATE_TOPIC = "/state"
+EVENT_TOPIC = "/log"
+
+# Field of `Track`: the names of its columns in the message, each with its unit.
+_NAMES = {
+    "time": ("time_s",),
+    "position": ("east_m", "north_m", "up_amsl_m"),
+    "velocity": ("velocity_east_mps", "velocity_north_mps", "velocity_up_mps"),
+    "attitude": ("roll_rad", "pitch_rad", "yaw_rad"),
+    "rates": ("roll_rate_rad_per_s", "pitch_rate_rad_per_s", "yaw_rate_rad_per_s"),
+    "airspeed": ("airspeed_mps",),
+    "flow": ("alpha_rad", "beta_rad"),
+    "controls": ("elevator_rad", "aileron_rad", "rudder_rad", "throttle_fraction"),
+    "commands": (
+        "elevator_command_rad",
+        "aileron_command_rad",
+        "rudder_command_rad",
+        "throttle_command_fraction",
+    ),
+    "wind": ("wind_east_mps", "wind_north_mps", "wind_up_mps"),
+    "load_factor": ("load_factor_g",),
+    "current": ("battery_current_a",),
+    "energy": ("energy_used_wh",),
+    "leg": ("leg_index",),
+    "cross_track": ("cross_track_m",),
+    "height_error": ("height_error_m",),
+    "speed_command": ("speed_command_mps",),
+    "clearance": ("clearance_seen_m",),
+}
+_DOUBLES = ("time", "position")
+_TYPE = descriptor_pb2.FieldDescriptorProto
+_KINDS = {
+    "<f8": (_TYPE.TYPE_DOUBLE, 1),
+    "<f4": (_TYPE.TYPE_FLOAT, 5),
+    "<i4": (_TYPE.TYPE_SFIXED32, 5),
+    "<u4": (_TYPE.TYPE_FIXED32, 5),
+}
+
+
+def _fields() -> list[tuple[str, str, str, int]]:
+    """(name, numpy type, field of Track, column) of each message field after `row`, in order."""
+    found = []
+    for field, names in _NAMES.items():
+        kind = "<f8" if field in _DOUBLES else "<i4" if field == "leg" else "<f4"
+        found += [(name, kind, field, column) for column, name in enumerate(names)]
+    return found
+
+
+FIELDS = _fields()
+_MESSAGE_FIELDS = [("row", "<u4"), *((name, kind) for name, kind, _, _ in FIELDS)]
+
+
+def _file() -> descriptor_pb2.FileDescriptorProto:
+    file = descriptor_pb2.FileDescriptorProto(name="planfly/State.proto", package="planfly", syntax="proto3")
+    message = file.message_type.add(name="State")
+    for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
+        message.field.add(name=name, number=number, type=_KINDS[kind][0], label=_TYPE.LABEL_OPTIONAL)
+    return file
+
+
+def _layout() -> tuple[np.dtype[np.void], dict[str, int]]:
+    """Lay the message out as a packed structured type: a tag before each value; and the tags."""
+    parts: list[tuple[str, str]] = []
+    tags: dict[str, int] = {}
+    for number, (name, kind) in enumerate(_MESSAGE_FIELDS, 1):
+        tag = number << 3 | _KINDS[kind][1]
+        # From field 16 on the tag is a varint of two bytes, low seven bits first.
+        tags[f"tag_{name}"] = tag if tag < 128 else (tag & 127 | 128) | (tag >> 7) << 8
+        parts += [(f"tag_{name}", "u1" if tag < 128 else "<u2"), (name, kind)]
+    return np.dtype(parts), tags
+
+
+STATE_FILE = _file()
+STATE, _TAGS = _layout()
+# One MCAP message record of this channel, header included.
+RECORD = np.dtype(
+    [
+        ("opcode", "u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time", "<u8"),
+        ("publish_time", "<u8"),
+        ("state", STATE),
+    ]
+)
+RECORD_HEADER = 9
+MESSAGE_HEADER = RECORD.itemsize - RECORD_HEADER - STATE.itemsize
+MESSAGE_OPCODE = 5
+
+
+def state_class() -> "type[Message]":
+    """Make the protobuf class of a state message, in a pool of its own."""
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(STATE_FILE)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(STATE_NAME))
+
+
+def state_schema() -> bytes:
+    """Return the FileDescriptorSet of the state message, as MCAP embeds it."""
+    return descriptor_pb2.FileDescriptorSet(file=[STATE_FILE]).SerializeToString(deterministic=True)
+
+
+def schema_of(descriptor: "Descriptor") -> bytes:
+    """Return the FileDescriptorSet of any message, each file after the files that it imports."""
+    files: dict[str, FileDescriptor] = {}
+
+    def visit(file: "FileDescriptor") -> None:
+        if file.name not in files:
+            for needed in file.dependencies:
+                visit(needed)
+            files[file.name] = file
+
+    visit(descriptor.file)
+    out = descriptor_pb2.FileDescriptorSet()
+    for file in files.values():
+        file.CopyToProto(out.file.add())
+    return out.SerializeToString(deterministic=True)
+
+
+def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
+    """log_time of each simulation time (s): ns since 1970, time 0 being `EPOCH_NS`."""
+    return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
+
+
+def _template() -> Rows:
+    row: Rows = np.zeros(1, dtype=RECORD)
+    row["opcode"] = MESSAGE_OPCODE
+    row["length"] = MESSAGE_HEADER + STATE.itemsize
+    for name, tag in _TAGS.items():
+        row["state"][name] = tag
+    return row
+
+
+_TEMPLATE = _template()
+
+
+def encode_rows(rows: NDArray[np.float64], first_row: int, channel: int) -> Rows:
+    """Encode flown rows as MCAP message records (t,) of `RECORD`.
+
+    rows: (t, columns) in the order of `flight.simulation.track.COLUMNS`.
+
+    first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
+    """
+    stamps = times_ns(rows[:, 0])
+    records: Rows = np.repeat(_TEMPLATE, len(stamps))
+    numbers = np.arange(first_row, first_row + len(stamps)).astype(np.uint32)
+    records["channel"] = channel
+    records["sequence"] = numbers
+    records["log_time"] = stamps
+    records["publish_time"] = stamps
+    state = records["state"]
+    state["row"] = numbers
+    with np.errstate(over="ignore", invalid="ignore"):
+        for column, (name, _, _, _) in enumerate(FIELDS):
+            state[name] = rows[:, column]
+    return records
+
+
+def join_rows(parts: list[Rows]) -> Rows:
+    """Join arrays of `RECORD`; as bytes, since numpy compares structured types name by name."""
+    if not parts:
+        return np.zeros(0, dtype=RECORD)
+    return np.concatenate([part.view(np.uint8) for part in parts]).view(RECORD)
+
+
+def decode_rows(records: Rows) -> Track:
+    """Return the track in an array (t,) of `RECORD`."""
+    rows = records["state"]
+    columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in COLUMNS}
+    for name, _, field, _ in FIELDS:
+        columns[field].append(rows[name])
+    return Track(*(parts[0] if len(parts) == 1 else np.stack(parts, axis=1) for parts in columns.values()))  # type: ignore[arg-type]  # one array a field, typed by Track
+
+
+def parse_row(data: bytes, parser: "type[Message]") -> Rows:
+    """One message in any layout that protobuf allows, (1,) of `RECORD`.
+
+    Raises google.protobuf.message.DecodeError.
+    """
+    message = parser.FromString(data)
+    record = _TEMPLATE.copy()
+    for name, _ in _MESSAGE_FIELDS:
+        record["state"][name] = getattr(message, name)
+    return record
+
+
+@compiled
+def _alike(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
+    """How many of the first rows have just the expected bytes in these columns."""
+    for row in range(len(raw)):
+        for k in range(len(columns)):
+            if raw[row, columns[k]] != expected[k]:
+                return row
+    return len(raw)
+
+
+class RowMatcher:
+    """Finds runs of state messages of the known layout in a chunk's bytes."""
+
+    def __init__(self, channel: int) -> None:
+        """channel: the MCAP channel of the state messages in this file."""
+        sample = _TEMPLATE.copy()
+        sample["channel"] = channel
+        fixed: Rows = np.zeros(1, dtype=RECORD)
+        fixed["opcode"], fixed["length"], fixed["channel"] = 0xFF, 0xFFFF_FFFF_FFFF_FFFF, 0xFFFF
+        for name, tag in _TAGS.items():
+            fixed["state"][name] = 0xFF if tag < 256 else 0xFFFF
+        self._columns = np.flatnonzero(fixed.view(np.uint8))
+        self._expected = sample.view(np.uint8)[self._columns]
+
+    def run(self, data: bytes, offset: int) -> Rows:
+        """Return the records from ``offset`` on that have the layout and follow each other, (n,) of `RECORD`."""
+        count = (len(data) - offset) // RECORD.itemsize
+        raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
+        found = _alike(raw, self._columns, self._expected)
+        return raw[:found].reshape(-1).view(RECORD)

@@ -1,0 +1,168 @@
+"""The instruments: what a flight shows at one moment, as lines of text for a terminal.
+
+A frame is a function of the log and the time alone: the same log and time give the same lines, whatever the clock of
+whoever shows them did.
+"""
+
+import bisect
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.control_limits import control_limits
+from logs.recording.reader import FlightLog
+from logs.replay.timeline import TimelineEntry, timeline, waypoint_name
+from logs.verdict.measures.leg_numbers import with_legs
+
+Floats = NDArray[np.float64]
+
+LEAST_WIDTH = 64
+# All of a frame, and the line below it, fit a terminal of 24 lines.
+_HORIZON_ROWS, _HORIZON_COLUMNS = 7, 25
+_DEGREES_A_ROW = 5.0
+_NEWS = 3  # entries of the timeline at the foot
+
+
+@dataclass(frozen=True, slots=True)
+class Instruments:
+    """A log made ready for frames: its timeline and the ground under each row, (t,) m, NaN where unknown."""
+
+    log: FlightLog
+    entries: tuple[TimelineEntry, ...]
+    ground: Floats
+    limits: tuple[tuple[str, float], ...]
+
+    def frame(self, time: float, *, width: int = 80) -> list[str]:
+        """Lines of at most ``width`` columns (at least `LEAST_WIDTH`) for the newest row at or before ``time`` (s).
+
+        Before the first row, that row is shown.
+        """
+        wide = max(LEAST_WIDTH, width)
+        log = self.log
+        k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
+        left, right = self._horizon(k), self._numbers(k)
+        room = max(len(left), len(right))
+        left += [" " * (_HORIZON_COLUMNS + 2)] * (room - len(left))
+        right += [""] * (room - len(right))
+        lines = self._head(k, wide)
+        lines += [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
+        lines += ["", *self._controls(k), self._threats(k), *self._news(float(log.track.time[k]))]
+        return [line[:wide].rstrip() for line in lines]
+
+    def _head(self, k: int, wide: int) -> list[str]:
+        log, track = self.log, self.log.track
+        now, end = float(track.time[k]), log.end_time
+        title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
+        clock = f"{now:8.1f} of {end:.1f} s"
+        done = round((wide - 2) * (now - float(track.time[0])) / max(end - float(track.time[0]), 1e-9))
+        bar = "[" + "=" * done + " " * (wide - 2 - done) + "]"
+        leg = int(track.leg[k])
+        route = log.setup.route
+        step = route.waypoints[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
+        ahead = f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)}, {_m(float(np.hypot(*step)))} to go"
+        if leg >= route.legs:
+            ahead = "behind the last waypoint"
+        spare = max(1, wide - len(clock))
+        return [_printable(title)[: spare - 1].ljust(spare) + clock, bar, ahead]
+
+    def _horizon(self, k: int) -> list[str]:
+        """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the middle."""
+        roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
+        rows = []
+        for row in range(_HORIZON_ROWS):
+            cells = []
+            for column in range(_HORIZON_COLUMNS):
+                across = (column - _HORIZON_COLUMNS // 2) / 2.0  # a letter is twice as high as wide
+                up = _HORIZON_ROWS // 2 - row
+                # Height of this cell over the horizon, in rows, turned by the roll.
+                over = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
+                cells.append("-" if abs(over) <= 0.5 else " " if over > 0.0 else ":")
+            rows.append(cells)
+        middle = rows[_HORIZON_ROWS // 2]
+        for offset, mark in ((-5, "="), (-4, "="), (-3, "="), (0, "o"), (3, "="), (4, "="), (5, "=")):
+            middle[_HORIZON_COLUMNS // 2 + offset] = mark
+        edge = "+" + "-" * _HORIZON_COLUMNS + "+"
+        return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
+
+    def _numbers(self, k: int) -> list[str]:
+        track, setup = self.log.track, self.log.setup
+        east, north, up = (float(value) for value in track.velocity[k])
+        roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
+        amsl = float(track.position[k, 2])
+        above = amsl - float(self.ground[k])
+        wind_east, wind_north = float(track.wind[k, 0]), float(track.wind[k, 1])
+        used = float(track.energy[k])
+        return [
+            f"airspeed     {_n(float(track.airspeed[k]), 1)} m/s, wanted {_n(float(track.speed_command[k]), 1)}",
+            f"ground speed {_n(math.hypot(east, north), 1)} m/s, climb {_n(up, 1, '+')} m/s",
+            f"height       {_m(amsl)} AMSL, {_m(above) if math.isfinite(above) else 'not known'} above ground",
+            f"course       {_course(math.degrees(math.atan2(east, north)))}, heading {_course(yaw)}",
+            f"roll, pitch  {_n(roll, 1, '+')}°, {_n(pitch, 1, '+')}°, {_n(float(track.load_factor[k]), 2)} g",
+            f"off the path {_n(float(track.cross_track[k]), 1, '+')} m right, "
+            f"{_n(float(track.height_error[k]), 1, '+')} m high",
+            f"wind         {_n(math.hypot(wind_east, wind_north), 1)} m/s from "
+            f"{_course(math.degrees(math.atan2(-wind_east, -wind_north)))}",
+            f"battery      {_n(used, 1)} of {_n(setup.battery, 0)} Wh used, {_n(float(track.current[k]), 1)} A",
+        ]
+
+    def _controls(self, k: int) -> list[str]:
+        """One bar a control: where it stands (O) between its limits, and what was asked (|)."""
+        lines = []
+        for column, (name, limit) in enumerate(self.limits):
+            stands, asked = float(self.log.track.controls[k, column]), float(self.log.track.commands[k, column])
+            throttle = name == "throttle"
+            full = limit if math.isfinite(limit) else math.radians(30.0)
+            cells = list("." * 31)
+            if not throttle:
+                cells[15] = "+"
+            for value, mark in ((asked, "|"), (stands, "O")):
+                if math.isfinite(value):
+                    share = value if throttle else 0.5 + 0.5 * value / full
+                    cells[round(30 * min(max(share, 0.0), 1.0))] = mark
+            shown = f"{_n(100.0 * stands, 0)} %" if throttle else f"{_n(math.degrees(stands), 1, '+')}°"
+            held = "  AT ITS LIMIT" if (asked >= 1.0 if throttle else abs(asked) >= full) else ""
+            lines.append(f"{name:<9} [{''.join(cells)}] {shown}{held}")
+        return lines
+
+    def _threats(self, k: int) -> str:
+        threats, place = self.log.setup.scenario.threats, self.log.track.position[k]
+        away = np.sqrt(((threats.position - place) ** 2).sum(axis=1))
+        within = [
+            f"{reach} {threats.names[m]} at {_m(float(away[m]))}"
+            for reach, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
+            for m in np.flatnonzero((radii > 0.0) & (away <= radii)).tolist()
+        ]
+        return _printable("within reach of: " + "; ".join(within) if within else "within no unit's reach")
+
+    def _news(self, now: float) -> list[str]:
+        newest = bisect.bisect_right([entry.time for entry in self.entries], now + 1e-9)
+        return [f"{entry.time:8.1f} s  {entry.text}" for entry in self.entries[max(0, newest - _NEWS) : newest]]
+
+
+def make_instruments(log: FlightLog) -> Instruments:
+    """Make a log ready for frames; its legs are worked out anew."""
+    log = replace(log, track=with_legs(log.setup, log.track))
+    terrain = log.setup.scenario.terrain
+    position = log.track.position
+    ground = np.full(len(log.track), math.nan)
+    if terrain is not None:
+        ground = np.asarray(terrain.height(position[:, 0], position[:, 1]), dtype=np.float64)
+    return Instruments(log, tuple(timeline(log)), ground, tuple(control_limits(log.setup.aircraft)))
+
+
+def _printable(text: str) -> str:
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _n(value: float, digits: int, sign: str = "") -> str:
+    return f"{value:{sign}.{digits}f}" if math.isfinite(value) else "?"
+
+
+def _m(value: float) -> str:
+    return f"{_n(value, 0)} m"
+
+
+def _course(degrees: float) -> str:
+    return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

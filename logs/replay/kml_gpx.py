@@ -1,0 +1,114 @@
+"""Plan and track for maps: KML (OGC 12-007) and GPX 1.1.
+
+GPX is made with gpxpy (Apache-2.0).  KML is written with the standard library: the Python packages that write it are
+LGPL (simplekml, fastkml) or no longer kept up.
+"""
+
+import math
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import gpxpy.gpx
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from world.frames import to_geo
+
+Floats = NDArray[np.float64]
+
+KML = "http://www.opengis.net/kml/2.2"
+# Seconds between points of a track in a map file.
+EVERY = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class MapLine:
+    """A line on the map: (n,) degrees, and metres above mean sea level; marks: a name for each point, or none."""
+
+    name: str
+    lat_deg: Floats
+    lon_deg: Floats
+    amsl: Floats
+    marks: tuple[str, ...] = ()
+
+
+def plan_line(setup: FlightSetup) -> MapLine:
+    """Route of a setup, its waypoints named as in a verdict."""
+    points, items = setup.route.waypoints, setup.route.items
+    lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
+    marks = tuple(f"{k} (item {item})" if item >= 0 else str(k) for k, item in enumerate(items))
+    return MapLine(f"{setup.scenario.name} plan", np.asarray(lat), np.asarray(lon), points[:, 2], marks)
+
+
+def track_line(setup: FlightSetup, track: Track) -> MapLine:
+    """Flown track, thinned to a point each `EVERY` seconds and the last, rows without a position left out."""
+    good = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
+    slots = np.floor(track.time[good] / EVERY + 1e-9)
+    keep = np.concatenate([[True], np.diff(slots) > 0.0])[: good.size]
+    keep[-1:] = True
+    position = track.position[good[keep]]
+    lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
+    return MapLine(f"{setup.scenario.name} flown", np.asarray(lat), np.asarray(lon), position[:, 2])
+
+
+def kml_text(title: str, lines: list[MapLine]) -> str:
+    """KML document: a line each, heights absolute, and a placemark for each named point."""
+    ElementTree.register_namespace("", KML)
+    root = ElementTree.Element(f"{{{KML}}}kml")
+    document = _under(root, "Document")
+    _under(document, "name", title)
+    for line in lines:
+        folder = _under(document, "Folder")
+        _under(folder, "name", line.name)
+        mark = _under(folder, "Placemark")
+        _under(mark, "name", line.name)
+        string = _under(mark, "LineString")
+        _under(string, "altitudeMode", "absolute")
+        _under(string, "coordinates", " ".join(_place(line, k) for k in range(len(line.lat_deg))))
+        for k, name in enumerate(line.marks):
+            mark = _under(folder, "Placemark")
+            _under(mark, "name", name)
+            point = _under(mark, "Point")
+            _under(point, "altitudeMode", "absolute")
+            _under(point, "coordinates", _place(line, k))
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _under(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
+    element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
+    element.text = "".join(ch for ch in text if ch.isprintable() or ch == " ") if text else None
+    return element
+
+
+def _place(line: MapLine, k: int) -> str:
+    return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
+
+
+def gpx_text(title: str, lines: list[MapLine]) -> str:
+    """GPX document: a line with named points is a route, any other a track."""
+    gpx = gpxpy.gpx.GPX()
+    gpx.creator = "planfly"
+    gpx.name = "".join(ch for ch in title if ch.isprintable())
+    for line in lines:
+        rows = [
+            (round(float(lat), 8), round(float(lon), 8), round(float(up), 3))
+            for lat, lon, up in zip(line.lat_deg, line.lon_deg, line.amsl, strict=True)
+            if math.isfinite(lat + lon + up)
+        ]
+        if line.marks:
+            route = gpxpy.gpx.GPXRoute(name=line.name)
+            route.points = [
+                gpxpy.gpx.GPXRoutePoint(lat, lon, elevation=up, name=name)
+                for (lat, lon, up), name in zip(rows, line.marks, strict=True)
+            ]
+            gpx.routes.append(route)
+        else:
+            track = gpxpy.gpx.GPXTrack(name=line.name)
+            track.segments.append(
+                gpxpy.gpx.GPXTrackSegment([gpxpy.gpx.GPXTrackPoint(a, b, elevation=c) for a, b, c in rows])
+            )
+            gpx.tracks.append(track)
+    return str(gpx.to_xml(version="1.1")) + "\n"

@@ -1,0 +1,100 @@
+"""What stands beside each picture of the report: heading, alternative text and caption."""
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from flight.simulation.flight_setup import FlightSetup
+
+
+@dataclass(frozen=True, slots=True)
+class ReportPicture:
+    """One picture of the page.
+
+    identifier: of its section.  title: its heading.  alternative: its text for who cannot see it.  caption: how to read
+    it.  data: its address in the page.
+    """
+
+    identifier: str
+    title: str
+    alternative: str
+    caption: str
+    data: str
+
+
+def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, bytes]) -> list[ReportPicture]:
+    """List the page's pictures in its order; what was not drawn is left out.
+
+    pictures: PNG bytes by file name.
+    """
+    return [
+        ReportPicture(
+            name, *words, "data:image/png;base64," + base64.b64encode(pictures[f"{name}.png"]).decode("ascii")
+        )
+        for name, words in _words(setup, flown).items()
+        if f"{name}.png" in pictures
+    ]
+
+
+def _words(setup: FlightSetup, flown: bool) -> dict[str, tuple[str, str, str]]:
+    legs, threats = setup.route.legs, len(setup.scenario.threats)
+    ground = "shaded terrain" if setup.scenario.terrain is not None else "no terrain"
+    track = " and the flown track" if flown else ""
+    heights = "planned and flown heights" if flown else "planned heights"
+    progress = "Flown heights stand at the flight's progress along the planned path. " if flown else ""
+    return {
+        "map": (
+            "Map",
+            f"Map, north up: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
+            "The broad line is the plan, the thin line on it the flight. Where they part, at corners, the aircraft "
+            "flies an arc inside the waypoint."
+            if flown
+            else "Nothing was flown: the line is the plan.",
+        ),
+        "profile": (
+            "Profile",
+            f"Heights along the path: terrain, required clearance, {heights}, the ceiling, and the missile and radar "
+            "spheres that stand over the path.",
+            f"{progress}A sphere is cut where the path runs through its column of air; the path is within reach only "
+            "where its line lies inside the cut.",
+        ),
+        "scene": (
+            "3-D view",
+            f"View from aside: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
+            "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
+            "What a ridge hides shows faintly.",
+        ),
+        "turns": (
+            "Turn by turn, leg by leg",
+            "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground and waypoint.",
+            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's. Ringed: fails.",
+        ),
+        "time": (
+            "Over time",
+            "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground.",
+            "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
+            "above ground is computed from track and terrain.",
+        ),
+        "exposure": (
+            "Exposure",
+            "Plots along the flown distance: strength and sum of the exposure to missiles and to radars.",
+            "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
+            "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time.",
+        ),
+        "controls": (
+            "Controls",
+            "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits.",
+            "Shaded: the command stands at the control's limit, and the aircraft can give no more.",
+        ),
+        "energy": (
+            "Energy",
+            "Plots over time: battery energy used, power, current, and the aircraft's energy as a height.",
+            "Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for.",
+        ),
+        "envelope": (
+            "Envelope",
+            "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit.",
+            "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
+            "outside for a moment, in a gust or a pull-up; a leg may not.",
+        ),
+    }

@@ -1,0 +1,182 @@
+"""Two flights side by side: what each did, and the difference, from their logs alone."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import KDTree
+
+from flight.simulation.control_limits import control_limits, held_at_limit
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.reader import FlightLog
+from logs.report.text import NOTHING, number
+from logs.verdict.findings import RULES, Verdict
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.along_track import segment_clearances
+from logs.verdict.measures.path_sweeps import path_spheres
+from world.geometry import path_length
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One quantity of both flights; NaN where a flight has none.  unit: "" for a count."""
+
+    name: str
+    unit: str
+    first: float
+    second: float
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Two flights with their names and verdicts, and what differs."""
+
+    logs: tuple[FlightLog, FlightLog]
+    names: tuple[str, str]
+    verdicts: tuple[Verdict, Verdict]
+    differences: tuple[Difference, ...]
+    notes: tuple[str, ...]
+
+
+def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
+    """Judge and measure both flights alike.
+
+    names: shown for each; where they are the same, (first) and (second) tell them apart.
+    """
+    if names[0] == names[1]:
+        names = (f"{names[0]} (first)", f"{names[1]} (second)")
+    verdicts = (_judge(first), _judge(second))
+    measures = [
+        _measure(log.setup, log.track) | _margins(verdict)
+        for log, verdict in zip((first, second), verdicts, strict=True)
+    ]
+    keys = list(dict.fromkeys([*measures[0], *measures[1]]))
+    found = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
+    return Comparison((first, second), names, verdicts, tuple(found), tuple(_notes(first, second)))
+
+
+def _judge(log: FlightLog) -> Verdict:
+    return judge_flight(log.setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
+
+
+def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
+    """Measure a flight: (name, unit) and value."""
+    good = np.isfinite(track.position).all(axis=1)
+    position, time = np.ascontiguousarray(track.position[good]), np.ascontiguousarray(track.time[good])
+    found = {
+        ("time in the air", "s"): float(track.time[-1] - track.time[0]),
+        ("distance flown", "m"): float(path_length(position)) if len(position) > 1 else math.nan,
+        ("energy used", "Wh"): float(track.energy[-1]),
+        ("mean airspeed", "m/s"): _of(np.mean, track.airspeed),
+        ("highest", "m AMSL"): _of(np.max, position[:, 2]),
+        ("largest bank", "deg"): math.degrees(_of(np.max, np.abs(track.attitude[:, 0]))),
+        ("largest load factor", "g"): _of(np.max, track.load_factor),
+        ("largest cross-track", "m"): _of(np.max, np.abs(track.cross_track)),
+        ("typical cross-track (rms)", "m"): math.sqrt(_of(np.mean, track.cross_track.astype(np.float64) ** 2)),
+        ("largest height error", "m"): _of(np.max, np.abs(track.height_error)),
+    }
+    if setup.scenario.terrain is not None and len(position) > 1:
+        found["least height above ground", "m"] = _of(np.min, segment_clearances(setup.scenario.terrain, position)[0])
+    threats = setup.scenario.threats
+    if len(threats) and len(position) > 1:
+        for name, radii, scales in (
+            ("all missiles", threats.kill_radius, threats.kill_scale),
+            ("all radars", threats.detection_radius, threats.detection_scale),
+        ):
+            met = path_spheres(position, time, threats.position, radii, scales)
+            found[f"time within reach, sum over {name}", "s"] = float(met[:, 0].sum())
+            found[f"exposure, sum over {name}", "s"] = float(met[:, 1].sum())
+    lasts = np.append(np.diff(track.time), 0.0)
+    for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
+        if math.isfinite(limit):
+            held = held_at_limit(track, k, 0.0 if name == "throttle" else -limit, limit)
+            found[f"{name} at its limit", "s"] = float(lasts[held].sum())
+    return found
+
+
+def _of(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
+    """Apply a reduction to the values that are numbers; NaN where there are none."""
+    finite = values[np.isfinite(values)].astype(np.float64)
+    return float(reduce(finite)) if finite.size else math.nan
+
+
+def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
+    """How many findings fail, and each rule's tightest margin."""
+    found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
+    for rule in RULES:
+        mine = [
+            item for item in verdict.findings if item.rule == rule and item.ok is not None and item.margin is not None
+        ]
+        if mine:
+            found[f"tightest margin: {rule}", mine[0].unit] = min(float(item.margin or 0.0) for item in mine)
+    return found
+
+
+def _notes(first: FlightLog, second: FlightLog) -> list[str]:
+    """Say what the two flights do not share, and how far apart their tracks are."""
+    a, b = first.setup, second.setup
+    notes = []
+    for name, left, right in (
+        ("scenario", a.scenario.name, b.scenario.name),
+        ("aircraft", a.aircraft, b.aircraft),
+        ("seed", str(a.seed), str(b.seed)),
+        ("mission", a.mission_text, b.mission_text),
+        ("wind", _wind(a), _wind(b)),
+        ("guidance", a.guidance, b.guidance),
+        ("navigation", a.nav, b.nav),
+    ):
+        if left != right:
+            notes.append(f"{name}: differs" if name == "mission" else f"{name}: {left} and {right}")
+    if a.scenario.origin == b.scenario.origin:
+        there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
+        if len(there) and len(here):
+            away = KDTree(there).query(here)[0]
+            notes.append(
+                f"tracks: {number(float(away.mean()))} m apart on average, {number(float(away.max()))} m at most"
+            )
+    else:
+        notes.append("map origins differ: the tracks are not laid over each other")
+    return notes
+
+
+def _wind(setup: FlightSetup) -> str:
+    wind = setup.scenario.wind
+    source = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
+    return f"{wind.speed:g} m/s{source}, turbulence {wind.turbulence}"
+
+
+def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
+    """List quantity, unit, first, second, second less first, as text."""
+    first, second = (_word(verdict) for verdict in comparison.verdicts)
+    rows: list[tuple[str, ...]] = [("verdict", "", first, second, "")]
+    for item in comparison.differences:
+        digits = None if item.unit else 0
+        change = number(item.second - item.first, signed=True, digits=digits)
+        both = (number(value, digits=digits) for value in (item.first, item.second))
+        rows.append((item.name, item.unit, *both, change))
+    return rows
+
+
+def _word(verdict: Verdict) -> str:
+    return "flyable" if verdict.flyable else "not flyable" if verdict.complete else "incomplete"
+
+
+def difference_lines(comparison: Comparison) -> list[str]:
+    """Set the table of differences for a terminal."""
+    head = ("", "", *(name[-24:] for name in comparison.names), "difference")
+    rows = [head, *difference_rows(comparison)]
+    rows = [(f"{name} ({unit})" if unit else name, *rest) for name, unit, *rest in rows]
+    wide = [max(len(row[k]) for row in rows) for k in range(4)]
+    lines = [
+        "  ".join(
+            [row[0].ljust(wide[0]), *(cell.rjust(size) for cell, size in zip(row[1:], wide[1:], strict=True))]
+        ).rstrip()
+        for row in rows
+    ]
+    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: not known"])]

@@ -1,0 +1,64 @@
+"""The comparison of two flights as pictures and a page."""
+
+import base64
+from pathlib import Path
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_overlay
+from logs.figures.elements.style import png_bytes, svg_bytes
+from logs.report.compare import Comparison, difference_rows
+from world.atomic_files import write_whole
+
+_WORDS = {
+    "compare-map.png": "Both flights from above, over the first one's map",
+    "compare-profile.png": "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
+}
+
+
+def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
+    """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, made if it is missing.
+
+    svg: the pictures as SVG, too.  Returns the paths written.  Raises OSError.
+    """
+    first, second = (
+        NamedFlight(name, log.setup, log.track) for name, log in zip(comparison.names, comparison.logs, strict=True)
+    )
+    figures = {"compare-profile": draw_overlay((first, second))}
+    if first.setup.scenario.origin == second.setup.scenario.origin:
+        figures = {"compare-map": draw_both_on_map((first, second)), **figures}
+    files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
+    page = _page(comparison, files)
+    if svg:
+        files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
+    files["compare.html"] = page.encode("utf-8")
+    out_dir.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        write_whole(out_dir / name, data)
+    return [out_dir / name for name in files]
+
+
+def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
+    """The page, its pictures inside."""
+    pictures = [
+        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _WORDS[name])
+        for name, data in files.items()
+    ]
+    verdicts = [
+        (name, verdict.flyable, (verdict.summary.splitlines() or [""])[0])
+        for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
+    ]
+    environment = Environment(
+        loader=PackageLoader("logs.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("compare.html").render(
+        names=comparison.names,
+        verdicts=verdicts,
+        rows=difference_rows(comparison),
+        notes=comparison.notes,
+        pictures=pictures,
+    )

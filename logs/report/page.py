@@ -1,0 +1,142 @@
+"""The report of a flight: one HTML page that needs nothing else, and its pictures as files.
+
+The page holds its pictures, its style and one script, that of the 3-D view, which its policy names by hash; it asks
+no network for anything, and without the script a still picture stands in the view's place.
+"""
+
+import base64
+import hashlib
+from collections.abc import Mapping, Sequence
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.figures.elements.failures import failures
+from logs.figures.elements.scene_data import scene_json
+from logs.report import tables
+from logs.report.captions import report_pictures
+from logs.report.text import badge_of, count_sentence, finding_rows, rule_rows
+from logs.verdict.findings import Verdict
+from logs.verdict.measures.leg_numbers import with_legs
+from world.atomic_files import write_whole
+
+if TYPE_CHECKING:
+    from logs.recording.reader import LogEvent
+
+
+def write_report(
+    out_dir: Path,
+    setup: FlightSetup,
+    track: Track | None,
+    verdict: Verdict,
+    *,
+    ended: str | None,
+    versions: Mapping[str, str],
+    command: str,
+    events: Sequence["LogEvent"] = (),
+    svg: bool = False,
+) -> list[Path]:
+    """Write the figures and ``report.html`` into a folder, made if it is missing.
+
+    The figures are those of `logs.figures.draw_all.FIGURE_FILES`.
+
+    svg: the figures as SVG, too.
+
+    Everything is drawn before the first file is written; each file is written whole or not at all.
+    Returns the paths written.  Raises OSError.
+    """
+    from logs.figures.draw_all import FIGURE_FILES, draw_pictures
+
+    track = None if track is None or not len(track) else with_legs(setup, track)
+    pictures = draw_pictures(setup, track, verdict, svg=svg)
+    page = _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
+    out_dir.mkdir(parents=True, exist_ok=True)
+    files = {name: data for name, data in pictures.items() if name.partition(".")[0] in FIGURE_FILES}
+    files["report.html"] = page.encode("utf-8")
+    for name, data in files.items():
+        write_whole(out_dir / name, data)
+    return [out_dir / name for name in files]
+
+
+def report_html(
+    setup: FlightSetup,
+    track: Track | None,
+    verdict: Verdict,
+    *,
+    ended: str | None,
+    versions: Mapping[str, str],
+    command: str,
+    events: Sequence["LogEvent"] = (),
+) -> str:
+    """Make the page.
+
+    track: None for a plan that was not flown.  ended: how the flight ended, in the log's words; None where unknown.
+    versions: of planfly and what it stands on.  command: the command line that makes the same flight again.
+    events: the log's lines, shown with their times.
+    """
+    from logs.figures.draw_all import draw_pictures
+
+    track = None if track is None or not len(track) else with_legs(setup, track)
+    pictures = draw_pictures(setup, track, verdict)
+    return _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
+
+
+def _page(
+    setup: FlightSetup,
+    track: Track | None,
+    verdict: Verdict,
+    pictures: Mapping[str, bytes],
+    *,
+    ended: str | None,
+    versions: Mapping[str, str],
+    command: str,
+    events: Sequence["LogEvent"] = (),
+) -> str:
+    failed = failures(verdict, len(setup.route.waypoints))
+    rows = finding_rows(verdict.findings)
+    environment = Environment(
+        loader=PackageLoader("logs.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    script = "\n" + _script()
+    return environment.get_template("report.html").render(
+        name=setup.scenario.name,
+        badge=badge_of(verdict),
+        summary=verdict.summary.splitlines() or [""],
+        flown=track is not None,
+        failing=[row for row in rows if row.state == "fail"],
+        counts=count_sentence(rows),
+        flight_line=tables.flight_sentence(setup, track),
+        rules=rule_rows(verdict.findings),
+        findings=rows,
+        notes=[note for note in tables.notes_of(setup) if note not in verdict.summary],
+        pictures=report_pictures(setup, track is not None, pictures),
+        leg_columns=tables.LEG_COLUMNS,
+        legs=tables.leg_rows(setup, track, frozenset(failed.legs)),
+        passage_columns=tables.PASSAGE_COLUMNS,
+        passages=tables.passage_rows(setup, track),
+        saturation=tables.saturation_rows(setup, track),
+        scenario=tables.scenario_facts(setup),
+        flight=tables.flight_facts(setup, track, ended or ""),
+        events=tables.event_rows(events),
+        more_events=max(0, len(events) - tables.MOST_EVENTS),
+        energy=tables.energy_facts(setup, track),
+        command=command,
+        origin=tables.origin_facts(setup, versions),
+        # Both are made safe for where they stand: the scene by `scene_json`, the script is ours.
+        scene=Markup(scene_json(setup, track, failed)),
+        script=Markup(script),
+        script_hash=base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii"),
+    )
+
+
+def _script() -> str:
+    return resources.files("logs.report").joinpath("templates", "view3d.js").read_text(encoding="utf-8")

@@ -1,0 +1,225 @@
+"""The flown side of every finding: the usable rows of a track, and which of them belong to which leg.
+
+Only time, position, velocity, attitude, airspeed, throttle, wind, current and energy are read.  The columns that
+guidance keeps of itself (leg, cross-track, height error, clearance) are not: a verdict is not to rest on them.
+"""
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.track import Track
+from logs.verdict.measures.path_sweeps import path_clearance
+from logs.verdict.measures.route_demands import RouteDemands
+from world.kernels import compiled
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+# A waypoint further than this from the track draws no row to itself, m.
+REACH = 500.0
+# Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
+_CELLS = 40_000_000
+# Rows are thinned to no less than this many seconds for the assignment.
+_CHORD = 0.25
+# No position or speed of ours is larger; what is, is garbage.
+_FARTHEST, _FASTEST = 1e7, 1e4
+
+
+@dataclass(frozen=True, slots=True)
+class AlignedTrack:
+    """A track laid beside a route.
+
+    track: its usable rows.  bad_rows: how many had no finite, plausible numbers or no later time than the row
+    before; first_bad: their first time, s (NaN where there is none).  rows: (w,) the row nearest to each waypoint's
+    apex, never decreasing; the last row for a waypoint that the flight did not get to.  distance: (w,) m from
+    there to the apex.  passed: (w,) bool, the flight went by.  course: (t,) rad over the ground, unwrapped.
+    distance_run: (t,) m along the ground track.  low, low_at: (t - 1,) least height above ground between a row and the
+    next, m, and the fraction of the way where it is; NaN off the known terrain, and without any.
+    """
+
+    track: Track
+    bad_rows: int
+    first_bad: float
+    rows: Rows
+    distance: Floats
+    passed: NDArray[np.bool_]
+    course: Floats
+    distance_run: Floats
+    low: Floats
+    low_at: Floats
+
+    def leg_rows(self, leg: int) -> slice:
+        """Rows between a leg's two waypoints, both included."""
+        return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
+
+    def flew(self, leg: int) -> bool:
+        """Whether any of a leg was flown."""
+        return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
+
+    def tick(self) -> float:
+        """Usual time between rows, s."""
+        return float(np.median(np.diff(self.track.time)))
+
+    def around(self, first: int, last: int, seconds: float) -> slice:
+        """Rows first..last and those within ``seconds`` of them."""
+        time = self.track.time
+        start = int(np.searchsorted(time, time[first] - seconds))
+        return slice(start, int(np.searchsorted(time, time[last] + seconds, side="right")))
+
+
+def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
+    """Lay a track beside a route; None where it has fewer than two usable rows."""
+    good = _usable(track)
+    if int(good.sum()) < 2:
+        return None
+    if good.all():
+        clean, first_bad = track, math.nan
+    else:
+        first_bad = float(track.time[int(np.argmin(good))])
+        clean = Track(*(getattr(track, item.name)[good] for item in fields(track)))
+    apexes = shape.apexes()
+    rows, distance = _assign(clean, apexes)
+    last = len(clean) - 1
+    passed = (rows < last) | (distance <= shape.cut + 10.0)
+    passed = np.logical_and.accumulate(passed)
+    step = np.diff(clean.position[:, :2], axis=0)
+    course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
+    ground = shape.setup.scenario.terrain
+    low, low_at = np.full(last, math.nan), np.zeros(last)
+    if ground is not None:
+        low, low_at = path_clearance(ground.heights, ground.to_pixel.packed, clean.position)
+    return AlignedTrack(
+        track=clean,
+        bad_rows=int(good.size - good.sum()),
+        first_bad=first_bad,
+        rows=rows,
+        distance=distance,
+        passed=passed,
+        course=np.append(course, course[-1]),
+        distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]),
+        low=low,
+        low_at=low_at,
+    )
+
+
+def along_across(shape: RouteDemands, leg: int, position: Floats) -> tuple[Floats, Floats]:
+    """Distance along a leg from its start and to the right of its line, m, of positions (n, 3)."""
+    east, north = position[:, 0] - shape.points[leg, 0], position[:, 1] - shape.points[leg, 1]
+    ux, uy = math.sin(shape.courses[leg]), math.cos(shape.courses[leg])
+    return east * ux + north * uy, east * uy - north * ux
+
+
+def approaches(position: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """Least horizontal distance of each segment of a track from a place, m, and the fraction where that is.
+
+    position: (n, 3).  place: (2,) or (3,).  Returns (n - 1,) twice.
+    """
+    start = position[:-1, :2]
+    step = position[1:, :2] - start
+    away = place[:2] - start
+    length2 = np.maximum((step * step).sum(axis=1), 1e-12)
+    fraction = np.clip((step * away).sum(axis=1) / length2, 0.0, 1.0)
+    rest = away - fraction[:, None] * step
+    return np.hypot(rest[:, 0], rest[:, 1]), fraction
+
+
+def _usable(track: Track) -> NDArray[np.bool_]:
+    """Rows with finite, plausible numbers, later than every usable row before them."""
+    good = np.isfinite(track.time)
+    for name in ("airspeed", "current", "energy"):
+        good &= np.isfinite(getattr(track, name))
+    for name, largest in (
+        ("position", _FARTHEST),
+        ("velocity", _FASTEST),
+        ("attitude", 1e3),
+        ("controls", 1e3),
+        ("wind", 1e3),
+    ):
+        # A NaN is not within any bound.
+        good &= (np.abs(getattr(track, name)) <= largest).all(axis=1)
+    time = np.where(good, track.time, -math.inf)
+    before = np.concatenate([[-math.inf], np.maximum.accumulate(time)[:-1]]) if time.size else time
+    return np.asarray(good & (time > before))
+
+
+def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
+    """Row of each waypoint's passage: the assignment in time order with the least sum of squared distances."""
+    position, count, last = track.position, len(apexes), len(track) - 1
+    tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
+    step = max(1, int(_CHORD / tick), -(-len(track) * count // _CELLS))
+    chords, capped = _align(position, apexes, step, REACH)
+    rows = np.zeros(count, dtype=np.int64)
+    distance = np.zeros(count)
+    # Missed waypoints lie between their neighbours; those after the last one met lie at the end.
+    met = np.flatnonzero(~capped)
+    final = int(met[-1]) if met.size else -1
+    low = 0
+    for i in range(count):
+        if i > final and i > 0:
+            start, stop = last, last
+        elif capped[i]:
+            after = met[met > i]
+            start, stop = low, min(last, (int(chords[after[0]]) + 1) * step) if after.size else last
+        else:
+            start, stop = max(low, (int(chords[i]) - 1) * step), min(last, (int(chords[i]) + 2) * step)
+        start, stop = min(start, last), max(min(start, last), stop)
+        off = position[start : stop + 1] - apexes[i]
+        away = np.sqrt((off * off).sum(axis=1))
+        nearest = int(np.argmin(away))
+        rows[i], distance[i] = start + nearest, away[nearest]
+        low = int(rows[i])
+    return rows, distance
+
+
+@compiled
+def _align(
+    position: Floats, marks: Floats, step: int, reach: float
+) -> tuple[Rows, NDArray[np.bool_]]:  # pragma: no cover - compiled
+    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, reach)^2.
+
+    By dynamic programming; of equal assignments the earliest.  Also which marks are out of reach of their chord.
+    """
+    last = position.shape[0] - 1
+    chords = (last + step - 1) // step
+    count = marks.shape[0]
+    best = np.zeros(chords)
+    fresh = np.zeros((count, chords), dtype=np.uint8)
+    for i in range(count):
+        lowest = math.inf
+        for j in range(chords):
+            a, b = j * step, min(last, (j + 1) * step)
+            length2 = 0.0
+            along = 0.0
+            start2 = 0.0
+            for k in range(3):
+                leg = position[b, k] - position[a, k]
+                out = marks[i, k] - position[a, k]
+                length2 += leg * leg
+                along += leg * out
+                start2 += out * out
+            f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
+            away2 = max(0.0, start2 - 2.0 * f * along + f * f * length2)
+            total = best[j] + min(away2, reach * reach)
+            if total < lowest:
+                lowest = total
+                fresh[i, j] = 1
+            best[j] = lowest
+    chosen = np.zeros(count, dtype=np.int64)
+    capped = np.zeros(count, dtype=np.bool_)
+    j = chords - 1
+    for i in range(count - 1, -1, -1):
+        while fresh[i, j] == 0:
+            j -= 1
+        chosen[i] = j
+        nearest2 = math.inf
+        for row in range(j * step, min(last, (j + 1) * step) + 1):
+            away2 = 0.0
+            for k in range(3):
+                away2 += (marks[i, k] - position[row, k]) ** 2
+            nearest2 = min(nearest2, away2)
+        capped[i] = nearest2 >= reach * reach
+    return chosen, capped

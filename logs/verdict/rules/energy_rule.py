@@ -1,0 +1,88 @@
+"""The energy rule: what the flight takes from the battery or the tank, predicted and flown, against what it may."""
+
+import math
+
+import numpy as np
+
+from aircraft.envelope import ground_speed
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.rules.world_rules import planned_path
+
+# Reserve of the battery or the tank.
+RESERVE = 0.2
+
+
+def energy_findings(shape: RouteDemands, flown: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """One finding: the energy used against the battery less its reserve."""
+    setup = shape.setup
+    usable = (1.0 - RESERVE) * setup.battery
+    predicted, peak = predicted_energy(shape)
+    used, current = predicted, peak
+    if not geometric:
+        used = math.nan if flown is None else float(flown.track.energy.max())
+        current = math.nan if flown is None else float(flown.track.current.max())
+    if math.isnan(used):
+        reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
+    else:
+        reason = _said(shape, used, current) + (" by prediction" if geometric else "")
+        if not geometric and math.isfinite(predicted):
+            reason += f"; {predicted:.1f} Wh by prediction"
+        if used > usable:
+            reason += f"; {RESERVE:.0%} are to be left"
+    return [
+        make_finding(
+            "energy",
+            "flight",
+            ok=None if math.isnan(used) else used <= usable,
+            reason=reason,
+            planned=predicted,
+            flown=None if geometric else used,
+            limit=usable,
+            source="aircraft" if setup.scenario.flight.battery_wh is None else "scenario",
+            tolerance=0.0,
+            margin=usable - used,
+            unit="Wh",
+            method="power of steady flight on each leg over its time" if geometric else "power over time",
+        )
+    ]
+
+
+def _said(shape: RouteDemands, used: float, current: float) -> str:
+    """Energy used (Wh) and the peak current (A), or what an aircraft without a battery has instead."""
+    whole = shape.setup.battery
+    if shape.setup.envelope.power_level.size and not shape.setup.envelope.volts:
+        share = used / whole
+        return f"{used:.0f} Wh of {whole:.0f} Wh of fuel heat used, {share:.1%} of the fuel; no battery, so no current"
+    peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
+    return f"{used:.1f} Wh of {whole:.0f} Wh used{peak}"
+
+
+def predicted_energy(shape: RouteDemands) -> tuple[float, float]:
+    """Energy (Wh) and peak current (A) of steady flight along a route, NaN where the envelope knows no power.
+
+    Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
+    and gusts take beside that is a few per cent.
+    """
+    envelope, route = shape.setup.envelope, shape.setup.route
+    if not np.isfinite(shape.ground_speed).all():
+        return math.nan, math.nan
+    _, legs, times = planned_path(shape)
+    total, most = 0.0, 0.0
+    for leg, seconds in enumerate(np.bincount(legs, weights=np.diff(times), minlength=shape.legs)):
+        speed, up = float(route.airspeed[leg]), float(0.5 * (shape.points[leg, 2] + shape.points[leg + 1, 2]))
+        power = envelope.power(speed, up, air_angle(shape, leg, speed, up))
+        total += power * float(seconds) / 3600.0
+        most = max(most, power) if math.isfinite(power) else math.nan
+    return total, most / envelope.volts if envelope.volts else math.nan
+
+
+def air_angle(shape: RouteDemands, leg: int, speed: float, up: float) -> float:
+    """Path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
+    tail, cross = shape.setup.scenario.wind.along(float(shape.courses[leg]), up)
+    rise, angle = math.tan(float(shape.slopes[leg])), 0.0
+    for _ in range(4):
+        along = ground_speed(speed * math.cos(angle), tail, cross)
+        angle = math.asin(min(1.0, max(-1.0, rise * along / speed)))
+    return angle

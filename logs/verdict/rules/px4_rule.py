@@ -1,0 +1,245 @@
+"""The mission rule: what PX4's feasibility checker would refuse, by the names of its checks.
+
+After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the default
+parameters: NAV_ACC_RAD 10 m, FW_LND_ANG 5 degrees, MIS_DIST_1WP 10 km, MIS_TKO_LAND_REQ 0.  Where PX4 only warns, and
+where it refuses what ArduPilot flies, the finding says so and does not fail.  Latitude, longitude, frames and counts
+that are none were refused when the file was read.
+"""
+
+import itertools
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from flight.mission.fences import fence_problem
+from flight.mission.items import (
+    LANDINGS,
+    OVER_HOME,
+    OVER_TERRAIN,
+    PLACES,
+    TAKEOFFS,
+    Command,
+    Mission,
+    MissionItem,
+    command_name,
+)
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.findings import Finding, make_finding
+from world.frames import GeoOrigin, to_map
+
+C = Command
+ACCEPTANCE = 10.0
+LANDING_ANGLE = math.radians(5.0 + 0.1)
+FIRST_WAYPOINT = 10_000.0
+# MIS_DIST_WPS of the releases that had it.
+BETWEEN_WAYPOINTS = 900.0
+# A condition gate nearer than this to a waypoint, m, is at its place.
+GATE_APART = 0.05
+
+# Commands that PX4 takes in a mission, by number: idle, delay, condition gate, winch, gripper, cameras, gimbals.
+_PX4 = frozenset(
+    {0, 16, 17, 19, 20, 21, 22, 31, 84, 85, 93, 177, 178, 179, 183, 189, 195, 196, 197, 200, 201, 203, 204, 205, 206}
+    | {211, 214, 260, 530, 531, 532, 1000, 1001, 2000, 2001, 2003, 2500, 2501, 3000, 4501, 42600}
+)
+# Others that ArduPlane takes.
+_ARDUPLANE = frozenset(
+    {18, 30, 83, 92, 94, 112, 114, 115, 181, 182, 184, 186, 207, 208, 210, 212, 216, 218, 222, 223, 600, 601}
+)
+_MOST_SERVO, _MOST_PWM = 5, 2000.0
+
+
+def mission_findings(setup: FlightSetup) -> list[Finding]:
+    """One finding a check: the first item at fault, or that there is none."""
+    mission, origin = setup.mission, setup.scenario.origin
+    checks = (
+        ("checkMissionItemValidity", _validity(mission)),
+        ("checkTakeoff", _takeoff(mission)),
+        ("checkFixedWingLanding", _landing(mission)),
+        ("checkFixedWindLandApproach", _approach(mission, origin)),
+        ("checkTakeoffLandAvailable", _available(mission)),
+        ("checkDistanceToFirstWaypoint", _first_distance(mission, origin)),
+        ("checkDistancesBetweenWaypoints", _distances(mission, origin)),
+        ("checkIfBelowHomeAltitude", _below_home(mission)),
+        ("checkGeofence", _fence(setup)),
+    )
+    return [_finding(name, list(said)) for name, said in checks]
+
+
+# What a check says: the verdict on it, the item (None: the whole mission), and why.
+_Said = tuple[bool | None, int | None, str]
+
+
+def _finding(check: str, said: list[_Said]) -> Finding:
+    # A failure speaks first, then what could not be decided, then remarks.
+    said.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
+    ok, item, reason = said[0] if said else (True, None, "nothing to object to")
+    more = f" (+{len(said) - 1} more)" if len(said) > 1 else ""
+    return make_finding(
+        "mission",
+        "mission" if item is None else f"item {item}",
+        ok=ok,
+        reason=f"{reason}{more} (PX4 {check})",
+        source="PX4",
+        method="mission items",
+    )
+
+
+def _positions(mission: Mission) -> list[MissionItem]:
+    """Items that PX4 flies to."""
+    return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
+
+
+def _validity(mission: Mission) -> Iterator[_Said]:
+    for item in mission.items:
+        name = command_name(item.command)
+        if item.command not in _PX4:
+            known = item.command in _ARDUPLANE
+            yield None if known else False, item.seq, f"unsupported command {name}" + ("; ArduPlane takes it" * known)
+        elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
+            yield (
+                None,
+                item.seq,
+                f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
+            )
+        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= _MOST_SERVO:
+            yield False, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{_MOST_SERVO}"
+        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= _MOST_PWM:
+            yield False, item.seq, f"actuator value {item.params[1]:g} is out of bounds -{_MOST_PWM:g}..{_MOST_PWM:g}"
+    if mission.items and mission.items[0].command == C.NAV_LAND:
+        yield False, mission.items[0].seq, "starts with landing"
+
+
+def _over_home(mission: Mission, item: MissionItem) -> float:
+    """Height of an item over home, m; NaN where it is not known."""
+    if item.frame in OVER_HOME | OVER_TERRAIN:
+        return item.alt
+    return item.alt - mission.home.alt if mission.home is not None else math.nan
+
+
+def _takeoff(mission: Mission) -> Iterator[_Said]:
+    placed = False
+    for item in mission.items:
+        if item.command in TAKEOFFS:
+            height = _over_home(mission, item)
+            if height - 1.0 < ACCEPTANCE:
+                yield False, item.seq, f"takeoff altitude {height:.1f} m too low: at least {ACCEPTANCE + 1.0:.0f} m"
+            if placed:
+                yield False, item.seq, "takeoff is not the first waypoint item"
+        placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
+
+
+def _landing(mission: Mission) -> Iterator[_Said]:
+    commands = [item.command for item in mission.items]
+    starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
+    lands = [k for k, command in enumerate(commands) if command in LANDINGS]
+    seq = [item.seq for item in mission.items]
+    if len(starts) > 1:
+        yield False, seq[starts[1]], "more than one land start command"
+    if lands and lands[0] == 0:
+        yield False, seq[0], "starts with landing"
+    for k, command in enumerate(commands):
+        if command == C.NAV_RETURN_TO_LAUNCH and starts and starts[0] < k:
+            yield False, seq[k], "land start item before RTL item is not possible"
+    if starts and not any(land > starts[0] for land in lands):
+        yield False, seq[starts[0]], "invalid land start: no landing follows"
+
+
+def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+    for before, item in zip(mission.items, mission.items[1:], strict=False):
+        if item.command != C.NAV_LAND or before.command not in PLACES | TAKEOFFS or not before.has_position:
+            continue
+        rise = _over_home(mission, before) - _over_home(mission, item)
+        if math.isnan(rise):
+            yield None, item.seq, "the heights of landing and approach are not known over one another"
+            continue
+        if rise <= 0.0:
+            yield False, item.seq, "the approach waypoint must be above the landing point"
+            continue
+        run = _apart(before, item, origin)
+        if before.command == C.NAV_LOITER_TO_ALT:
+            radius = 0.0 if math.isnan(before.params[1]) else abs(before.params[1])
+            if run <= radius:
+                yield False, item.seq, "the landing point must be outside the orbit radius"
+                continue
+            run = math.sqrt(run * run - radius * radius)
+        elif before.command != C.NAV_WAYPOINT:
+            yield False, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
+            continue
+        angle = math.atan2(rise, run)
+        if angle > LANDING_ANGLE:
+            yield False, item.seq, f"the landing glide slope {math.degrees(angle):.1f}° is steeper than 5.0°"
+
+
+def _available(mission: Mission) -> Iterator[_Said]:
+    takeoff = any(item.command in TAKEOFFS for item in mission.items)
+    land = any(item.command in LANDINGS for item in mission.items)
+    has = [name for name, there in (("takeoff", takeoff), ("landing", land)) if there]
+    yield True, None, f"holds {' and '.join(has) or 'neither takeoff nor landing'}; MIS_TKO_LAND_REQ 0 asks for neither"
+
+
+def _apart(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> float:
+    east, north = to_map(origin, [a.lat_deg, b.lat_deg], [a.lon_deg, b.lon_deg])
+    return float(math.hypot(float(np.diff(east)[0]), float(np.diff(north)[0])))
+
+
+def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+    places = _positions(mission)
+    if mission.home is None or not places:
+        yield True, None, "no home, so no distance to the first waypoint"
+        return
+    home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
+    away = _apart(home, places[0], origin)
+    if not away < FIRST_WAYPOINT:
+        yield (
+            False,
+            places[0].seq,
+            f"first waypoint too far away: {away:.0f} m from home, maximum {FIRST_WAYPOINT:.0f} m",
+        )
+
+
+def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+    """A condition gate at the place of the waypoint before or after it."""
+    places = [
+        item
+        for item in mission.items
+        if item.has_position and (item.command in PLACES | TAKEOFFS | LANDINGS or item.command == C.CONDITION_GATE)
+    ]
+    for before, after in itertools.pairwise(places):
+        gates = C.CONDITION_GATE in (before.command, after.command)
+        if gates and _apart(before, after, origin) < GATE_APART:
+            yield False, after.seq, "distance between waypoint and gate too close"
+
+
+def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+    yield from _gates(mission, origin)
+    places = _positions(mission)
+    if len(places) < 2:
+        return
+    east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
+    runs = np.hypot(np.diff(east), np.diff(north))
+    k = int(np.argmax(runs))
+    if runs[k] > BETWEEN_WAYPOINTS:
+        reason = f"{runs[k]:.0f} m between waypoints; PX4 releases with MIS_DIST_WPS refuse more than"
+        yield True, places[k + 1].seq, f"{reason} {BETWEEN_WAYPOINTS:.0f} m by default, today's have no limit"
+
+
+def _below_home(mission: Mission) -> Iterator[_Said]:
+    for item in _positions(mission):
+        if item.frame in OVER_HOME and mission.home is None:
+            reason = "the file has no home, and heights over it: PX4 refuses them until the vehicle has one"
+            yield None, item.seq, reason
+            return
+        if _over_home(mission, item) < 0.0:
+            yield True, item.seq, f"waypoint {item.seq} below home: a warning"
+
+
+def _fence(setup: FlightSetup) -> Iterator[_Said]:
+    if not setup.mission.fences:
+        yield True, None, "the mission has no geofence"
+        return
+    origin, route = setup.scenario.origin, setup.route
+    for place, item in zip(route.waypoints, route.items, strict=True):
+        problem = fence_problem(setup.mission.fences, origin, float(place[0]), float(place[1]))
+        if problem is not None:
+            yield False, int(item) if item >= 0 else None, f"geofence violation: {problem}"

@@ -1,0 +1,150 @@
+"""The verdict in a sentence, and what a reader should know beside it."""
+
+from collections.abc import Sequence
+
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.findings import Finding, Prediction
+
+# Failed findings that the first line names.
+_NAMED = 4
+_UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
+_GUIDANCE = {
+    "path": "planfly's guidance on the fly-by path",
+    "l1": "L1 as ArduPlane flies it, along the legs",
+    "vector-field": "Beard and McLain's vector field on the fly-by path",
+}
+_NAV = {
+    "perfect": "exact",
+    "rtk": "with RTK's error (0.05 m on each axis)",
+    "gnss": "with GNSS's error (1.5 m on each axis)",
+}
+# What ends a flight, then what a plan may be mended by.
+_ORDER = (
+    "departure",
+    "completion",
+    "mission",
+    "slope",
+    "turn",
+    "loiter",
+    "clearance",
+    "threat",
+    "bounds",
+    "waypoint",
+    "speed",
+    "energy",
+)
+
+
+def headline(findings: Sequence[Finding], flyable: bool) -> str:
+    """First line: the answer, and what failed or was not judged."""
+    if flyable:
+        terrain = [item for item in findings if item.rule == "clearance" and item.ok is None]
+        if not terrain:
+            return "flyable"
+        whole = len(terrain) == sum(item.rule == "clearance" for item in findings)
+        return "flyable; terrain not judged" if whole else f"flyable; terrain not judged on {len(terrain)} legs"
+    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _ORDER.index(item.rule))
+    named = _spread(failed)
+    more = len(failed) - len(named)
+    return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+
+
+def _spread(failed: list[Finding]) -> list[Finding]:
+    """At most four findings: the worst of each rule before the second worst of any."""
+    margins = [0.0 if item.margin is None else item.margin for item in failed]
+    by_margin = sorted(range(len(failed)), key=margins.__getitem__)
+    seen: dict[str, int] = {}
+    place = {}
+    for k in by_margin:
+        place[k] = seen[failed[k].rule] = seen.get(failed[k].rule, 0) + 1
+    chosen = sorted(range(len(failed)), key=lambda k: (place[k], k))[:_NAMED]
+    return [failed[k] for k in sorted(chosen)]
+
+
+def _phrase(item: Finding) -> str:
+    """One failed finding in a few words."""
+    if item.rule in ("completion", "departure"):
+        return f"{item.rule} ({_clause(item.reason)})"
+    if item.rule == "waypoint":
+        return f"{item.where} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if _over(item) else "")
+    place = "" if item.where == "flight" else f" {'at' if item.where.startswith('waypoint') else 'on'} {item.where}"
+    if item.rule == "threat":
+        place = item.where if item.where.startswith("threat") else f"threat {item.where}"
+        return f"{place} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
+    return f"{item.rule}{place} ({_numbers(item)})"
+
+
+def _over(item: Finding) -> bool:
+    return item.flown is not None and item.limit is not None and item.flown > item.limit
+
+
+def _numbers(item: Finding) -> str:
+    """Worse of planned and flown against the limit, if that is what failed; else the reason's first clause."""
+    if item.limit is None or item.rule == "speed":
+        return _clause(item.reason)
+    values = [value for value in (item.flown, item.planned) if value is not None]
+    unit = _UNITS.get(item.unit, "")
+    if item.rule == "loiter" and item.planned is not None and item.planned < item.limit:
+        return f"radius {item.planned:.0f}{unit} < {item.limit:.0f}{unit}"
+    if item.rule in ("clearance", "bounds"):
+        low = min(values, default=None)
+        if item.flown is not None:
+            low = item.flown
+        return _clause(item.reason) if low is None else f"{low:.1f}{unit} < {item.limit:.1f}{unit}"
+    worst = max(values, key=abs, default=None)
+    if worst is None or abs(worst) <= abs(item.limit):
+        return _clause(item.reason)
+    return f"{worst:.1f}{unit} {'>' if worst > 0.0 else '<'} {item.limit:.1f}{unit}"
+
+
+def _clause(reason: str) -> str:
+    text = reason.split("; ")[0].split(" (")[0]
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def summary_text(
+    findings: Sequence[Finding], flyable: bool, setup: FlightSetup, level: str, prediction: Prediction | None = None
+) -> str:
+    """Write the summary: the answer; how the flight started; what was not judged; what is not flown as written."""
+    lines = [headline(findings, flyable)]
+    lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
+    silent: dict[str, str] = {}
+    for item in findings:
+        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
+            silent.setdefault(item.rule, item.reason)
+    lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    lines += _less_error(findings, setup)
+    if setup.route.notes:
+        lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
+    if level == "flown":
+        lines.append(f"Flown by: {_GUIDANCE[setup.guidance]}; navigation {_NAV[setup.nav]}")
+    if level == "geometric":
+        lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
+    if prediction is not None:
+        lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
+    return "\n".join(lines)
+
+
+def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
+    """The least clearance less the terrain's stated error, where one is stated."""
+    error = None if setup.scenario.terrain is None else setup.scenario.terrain.vertical_error
+    heights = [
+        item.planned if item.flown is None else item.flown
+        for item in findings
+        if item.rule == "clearance" and item.planned is not None
+    ]
+    if error is None or not heights:
+        return []
+    low, required = min(heights), setup.scenario.limits.min_clearance_m
+    return [
+        f"Terrain's stated error: {error:g} m; the least clearance is {low:.1f} m, {low - error:.1f} m less that error"
+        f" ({required:g} m are required)"
+    ]
+
+
+def _agreement(prediction: Prediction) -> str:
+    told = prediction.disagreements
+    if not told:
+        return "flight and geometry agree on every finding"
+    more = f", +{len(told) - _NAMED} more" if len(told) > _NAMED else ""
+    return "; ".join(told[:_NAMED]) + more

@@ -1,0 +1,170 @@
+"""``planfly aircraft``: what an aircraft is and can do, as a table and as pictures."""
+
+import argparse
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.progress import progress
+from planfly.terminal.targets import prepare_folder, refuse_folder
+from world.atomic_files import write_whole
+from world.errors import PlanflyError
+
+if TYPE_CHECKING:
+    from aircraft.catalog import Aircraft
+    from aircraft.envelope import Envelope
+    from flight.dynamics.characteristics import Mode, TrimRow
+
+_BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
+_TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
+# Wind of the ground slopes that are shown, m/s.
+_WIND = 10.0
+
+
+def aircraft(args: argparse.Namespace) -> int:
+    """``planfly aircraft [NAME]``."""
+    from aircraft.catalog import aircraft_names, find_aircraft, load_aircraft, model_hash
+    from world.scenario_file import names_folder
+
+    if args.name is None:
+        for name in aircraft_names():
+            known = load_aircraft(name)
+            print(f"{name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
+        return FLYABLE
+    try:
+        chosen = find_aircraft(str(Path(args.name).resolve()) if names_folder(args.name) else args.name)
+        identity = model_hash(chosen)
+    except ValueError as error:
+        raise PlanflyError(str(error)) from error
+    folder = Path(args.out) if args.out else Path("runs") / f"aircraft-{chosen.name}"
+    if args.out:
+        refuse_folder(folder, args.overwrite)
+    # Everything is worked out before anything is written.
+    pictures = _portray(chosen, identity, motor_braking=args.motor_braking)
+    prepare_folder(folder, tuple(pictures))
+    for name, data in pictures.items():
+        write_whole(folder / name, data)
+        print(f"picture   {folder / name}")
+    return FLYABLE
+
+
+def _portray(chosen: "Aircraft", identity: str, *, motor_braking: bool) -> dict[str, bytes]:
+    from flight.dynamics.characteristics import AMSL, modes_at, step_responses, trim_table
+    from flight.dynamics.envelope_tables import load_envelope
+    from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
+    from logs.figures.elements.style import png_bytes
+
+    with progress(f"trimming {chosen.name}"):
+        envelope = load_envelope(chosen, motor_braking=motor_braking)
+        trims = trim_table(chosen)
+        modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
+        cruise = modes_at(chosen, chosen.airspeed)
+        steps = step_responses(chosen)
+    print(f"{chosen.name}: {chosen.title}")
+    print(f"  model    {identity[:16]}")
+    _print_limits(chosen, envelope)
+    _print_trims(trims, AMSL)
+    _print_modes(cruise, chosen.airspeed, AMSL)
+    _print_envelope(chosen, envelope)
+    _print_turns(chosen)
+    with progress("drawing"):
+        return {
+            "envelope.png": png_bytes(draw_envelope(chosen, envelope)),
+            "trims.png": png_bytes(draw_trims(chosen, trims, modes)),
+            "steps.png": png_bytes(draw_steps(chosen, steps)),
+        }
+
+
+def _print_limits(chosen: "Aircraft", envelope: "Envelope") -> None:
+    slow, fast = envelope.level_speeds(0.0)
+    if chosen.battery_voltage > 0.0:
+        store = f"battery {chosen.battery_energy / 3600.0:g} Wh at {chosen.battery_voltage:g} V"
+    else:
+        store = f"fuel with {chosen.battery_energy / 3.6e9:.4g} MWh of heat; energy is the heat of the fuel burned"
+    braking = "the motor brakes" if envelope.motor_braking else "the motor does not brake"
+    if chosen.battery_voltage == 0.0:
+        braking = "descents with the throttle closed"
+    print(f"  mass     {chosen.mass:g} kg; wing {chosen.wing_area:g} m2, span {chosen.wing_span:g} m; {store}")
+    print(
+        f"  speed    cruise {chosen.airspeed:g} m/s, guidance uses {chosen.airspeed_min:g}..{chosen.airspeed_max:g};"
+        f" level flight at sea level {slow:.1f}..{fast:.1f} m/s"
+    )
+    print(
+        f"  limits   bank {_deg(chosen.max_bank):.0f}, pitch {_deg(chosen.max_pitch):.0f}, elevator"
+        f" {_deg(chosen.max_elevator):.0f}, aileron {_deg(chosen.max_aileron):.0f}, rudder"
+        f" {_deg(chosen.max_rudder):.0f} deg either way; {braking}"
+    )
+
+
+def _print_trims(trims: "tuple[TrimRow, ...]", amsl: float) -> None:
+    print(f"\nlevel flight at {amsl:.0f} m AMSL (endurance and range: still air, 80 % of what it carries)")
+    print("  airspeed   alpha  elevator  aileron  rudder  throttle    power  endurance   range")
+    print("       m/s     deg       deg      deg     deg         %       kW          h      km")
+    for row in trims:
+        trim = row.trim
+        print(
+            f"  {trim.airspeed:8.1f}{_deg(trim.alpha):8.2f}{_deg(trim.elevator):10.2f}{_deg(trim.aileron):9.2f}"
+            f"{_deg(trim.rudder):8.2f}{100.0 * trim.throttle:10.1f}{row.power / 1000.0:9.3f}"
+            f"{row.endurance / 3600.0:11.2f}{row.endurance * trim.airspeed / 1000.0:8.0f}"
+        )
+
+
+def _print_modes(modes: "tuple[Mode, ...]", airspeed: float, amsl: float) -> None:
+    print(f"\nmodes at {airspeed:g} m/s and {amsl:.0f} m AMSL, controls fixed")
+    print("  mode           root, 1/s             frequency  damping  half or double")
+    for mode in modes:
+        root = f"{mode.root.real:+.4f}" + (f" +-{mode.root.imag:.4f}j" if mode.root.imag else "")
+        kind = "to half" if mode.root.real < 0.0 else "to DOUBLE"
+        print(f"  {mode.name:<14} {root:<20} {mode.frequency:7.3f} rad/s{mode.damping:9.2f}{mode.time:9.2f} s {kind}")
+
+
+def _print_envelope(chosen: "Aircraft", envelope: "Envelope") -> None:
+    heights = [float(amsl) for amsl in envelope.amsl[::2]]
+    head = "".join(f"{amsl:>13.0f} m" for amsl in heights)
+    print("\nsteepest climb / descent to the air, deg, by airspeed and height AMSL ('-': no steady flight)")
+    print(f"  m/s  {head}")
+    for airspeed in envelope.airspeed.tolist():
+        cells = "".join(f"{_pair(*envelope.air_angles(airspeed, amsl)):>15}" for amsl in heights)
+        print(f"  {airspeed:5.1f}{cells}")
+    for title, pick in (("level, from", 0), ("level, to", 1)):
+        cells = "".join(f"{envelope.level_speeds(amsl)[pick]:11.1f} m/s" for amsl in heights)
+        print(f"  {title:<5}{cells[len(title) - 5 :]}")
+    print(f"\nsteepest climb / dive over the ground at {chosen.airspeed:g} m/s and 500 m, deg")
+    for title, tail, cross in (
+        ("calm", 0.0, 0.0),
+        (f"{_WIND:g} m/s tailwind", _WIND, 0.0),
+        (f"{_WIND:g} m/s headwind", -_WIND, 0.0),
+        (f"{_WIND:g} m/s crosswind", 0.0, _WIND),
+    ):
+        print(f"  {title:<18}{_pair(*envelope.slope_limits(chosen.airspeed, 500.0, tail, cross))}")
+
+
+def _print_turns(chosen: "Aircraft") -> None:
+    from aircraft.envelope import turn_radius
+
+    speeds = [chosen.airspeed_min, chosen.airspeed, chosen.airspeed_max]
+    print("\nturn radius, m, by ground speed and bank")
+    print("  m/s     " + "".join(f"{bank:>8.0f} deg" for bank in _BANKS_DEG))
+    for speed in (*speeds, chosen.airspeed + _WIND):
+        cells = "".join(f"{turn_radius(speed, math.radians(bank)):12.0f}" for bank in _BANKS_DEG)
+        print(f"  {speed:<8.1f}{cells}" + ("  (cruise in a 10 m/s tailwind)" if speed == speeds[1] + _WIND else ""))
+    bank = _deg(chosen.max_bank)
+    print(f"\nshortest leg between two equal turns, m, at {bank:.0f} deg of bank, by ground speed and turn")
+    print("  m/s     " + "".join(f"{turn:>8.0f} deg" for turn in _TURNS_DEG))
+    for speed in (*speeds, chosen.airspeed + _WIND):
+        radius = turn_radius(speed, chosen.max_bank)
+        print(
+            f"  {speed:<8.1f}" + "".join(f"{2.0 * radius * math.tan(math.radians(t) / 2.0):12.0f}" for t in _TURNS_DEG)
+        )
+
+
+def _deg(angle: float) -> float:
+    return math.degrees(angle)
+
+
+def _pair(climb: float, descent: float) -> str:
+    def one(angle: float) -> str:
+        return "-" if math.isnan(angle) else f"{_deg(angle):.1f}"
+
+    return f"{one(climb)} / {one(descent)}"

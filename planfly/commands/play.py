@@ -1,0 +1,102 @@
+"""``planfly replay --to``: a log played into a ground station, as if it were flown now."""
+
+import argparse
+import time
+
+import numpy as np
+
+from flight.live.downlink import INFO
+from flight.live.link import Link
+from flight.live.snapshot import Watcher
+from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, status_texts, telemetry_message
+from flight.mission.items import Home
+from flight.simulation.track import track_rows
+from logs.recording.reader import FlightLog
+from planfly.terminal.link_options import Stopped, link_access, stop_signals
+from world.errors import FlightError
+
+# Seconds to wait for a ground station unless told otherwise.
+_PATIENCE = 10.0
+
+
+def play(log: FlightLog, args: argparse.Namespace) -> None:
+    """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
+    link, wait = Link(link_access(args)), _PATIENCE if args.wait is None else args.wait
+    watcher = Watcher(log.setup)
+    track = log.track
+    rows = track_rows(track)
+    start = watcher.before_start(log.setup)
+    home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
+    status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
+    items = log.setup.route.items
+    status.total = int(max(items.max(), 0))
+    player = _Player(link, status)
+    try:
+        with stop_signals() as stopped:
+            player.wait(wait, stopped)
+            if not link.peers:
+                raise FlightError(f"--to {args.to}: no ground station has answered within {wait:g} s")
+            begun, k = time.monotonic(), 0
+            player.say(f"replay of {args.log} at {args.speed or 1.0:g}x")
+            while k < len(rows) - 1 and not stopped():
+                k = min(
+                    len(rows) - 1,
+                    int(np.searchsorted(track.time, (time.monotonic() - begun) * (args.speed or 1.0), side="right")),
+                )
+                moment = watcher.moment(rows[k])
+                if moment.finite:
+                    status.moment = moment
+                    status.current = max(0, int(items[min(int(moment.leg) + 1, len(items) - 1)]))
+                player.step(0.01)
+            if log.ended == "completed" and k == len(rows) - 1:
+                status.mission_state = COMPLETE
+            status.armed = status.flying = False
+            player.say(f"replay over: {log.ended or 'the log ends before the flight does'}")
+            player.rest(1.5, stopped)
+    finally:
+        link.close()
+
+
+class _Player:
+    """Telemetry of a log, without a vehicle behind it."""
+
+    def __init__(self, link: Link, status: Status) -> None:
+        self._link, self._status = link, status
+        self._born = time.monotonic()
+        self._hello = 0.0
+        self._texts = 0
+
+    def say(self, text: str) -> None:
+        """Tell the stations and the terminal."""
+        print(text, flush=True)
+        self._texts += 1
+        for peer in self._link.peers.values():
+            for piece in status_texts(text, INFO, self._texts):
+                self._link.send(piece, peer)
+
+    def wait(self, patience: float, stopped: Stopped) -> None:
+        """Call stations until one answers, or ``patience`` seconds are over."""
+        end = time.monotonic() + patience
+        while not self._link.peers and time.monotonic() < end and not stopped():
+            self.step(0.05)
+
+    def rest(self, seconds: float, stopped: Stopped) -> None:
+        """Go on telling the last moment."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not stopped():
+            self.step(0.02)
+
+    def step(self, nap: float) -> None:
+        """Read what stations say, send what is due, sleep a little."""
+        now = time.monotonic()
+        self._status.boot, self._status.wall = now - self._born, time.time()
+        self._link.receive()
+        if now >= self._hello:
+            self._hello = now + 1.0
+            self._link.hello(heartbeat(self._status))
+        for peer in self._link.peers.values():
+            for name, due in peer.due.items():
+                if now >= due:
+                    self._link.send(telemetry_message(name, self._status), peer)
+                    peer.due[name] = max(due + PERIODS[name], now - PERIODS[name])
+        time.sleep(nap)

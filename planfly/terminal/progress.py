@@ -1,0 +1,46 @@
+"""Progress: a bar on a terminal, plain lines elsewhere; on standard error, so that results can be piped."""
+
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from planfly.pipeline import Advance
+
+
+@contextmanager
+def progress(title: str) -> Iterator["Advance"]:
+    """Report a stage of work; the caller tells how much of how much is done, and a remark."""
+    if not sys.stderr.isatty():
+        yield from _lines(title)
+        return
+    from tqdm import tqdm
+
+    with tqdm(total=100, desc=title, bar_format="{desc:<22} {bar:30} {percentage:3.0f} %{postfix}", leave=True) as bar:
+
+        def advance(done: float, whole: float, remark: str = "") -> None:
+            share = 100.0 * done / whole if whole > 0 else 100.0
+            bar.update(max(0.0, min(100.0, share) - bar.n))
+            if remark:
+                bar.set_postfix_str(remark)
+
+        yield advance
+        bar.update(100 - bar.n)
+
+
+def _lines(title: str) -> Iterator["Advance"]:
+    """A line when work begins and one when it is done; none for input that is refused before it begins."""
+    started = time.monotonic()
+    last: str | None = None
+
+    def remember(_done: float, _whole: float, remark: str = "") -> None:
+        nonlocal last
+        if last is None:
+            print(f"{title} ...", file=sys.stderr, flush=True)
+        last = remark
+
+    yield remember
+    end = f": {last}" if last else ""
+    print(f"{title}: done in {time.monotonic() - started:.1f} s{end}", file=sys.stderr, flush=True)

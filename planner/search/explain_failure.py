@@ -1,0 +1,76 @@
+"""Why no path was found: what stands across the whole way, and what the search could not have tried."""
+
+import math
+
+import numpy as np
+
+from planner.evaluation.encoding import rotated_frame
+from planner.plan import Plan, Violation
+from planner.search.algorithms import ALGORITHMS
+from world.scenario import Scenario
+
+# Places looked at along and across the way.
+ALONG, ACROSS = 200, 400
+
+
+def what_blocks(plan: Plan) -> list[str]:
+    """Lines that say what is in the way of a plan that is not feasible, and what a search in its encoding cannot do."""
+    scenario = plan.scenario
+    lines = _walls(scenario)
+    if not lines:
+        missed = [item.name.lower() for item in Violation if plan.violations[item]]
+        if missed:
+            lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(missed)}")
+    chosen = ALGORITHMS.get(plan.algorithm)
+    if chosen is not None and chosen.encoding == "rotated":
+        lines.append(
+            "paths of the rotated frame only ever get nearer to the destination along the line to it; "
+            "a way that must turn back was not looked for"
+        )
+    return lines
+
+
+def _walls(scenario: Scenario) -> list[str]:
+    """Where, across the whole map, the ground leaves no height below the ceiling, or missiles cover every height."""
+    terrain = scenario.terrain
+    if terrain is None:
+        return []
+    frame = rotated_frame(scenario.start, scenario.destination)
+    reach = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
+    across = np.linspace(-reach, reach, ACROSS)
+    lines: list[str] = []
+    for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
+        places = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
+        inside = ((places >= scenario.bounds[:, 0]) & (places <= scenario.bounds[:, 1])).all(axis=1)
+        if not inside.any():
+            continue
+        places = places[inside]
+        lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
+        lowest = np.maximum(lowest, scenario.floor)
+        gaps = scenario.ceiling - lowest
+        if not (gaps > 0.0).any():
+            lines.append(
+                f"terrain closes the way {along:.0f} m from the start, across the whole map: its lowest place and the "
+                f"clearance take {np.nanmin(lowest):.0f} m, the ceiling is {scenario.ceiling:.0f} m"
+            )
+            break
+        if not _unguarded(scenario, places[gaps > 0.0], lowest[gaps > 0.0]):
+            lines.append(f"terrain and missiles together close the way {along:.0f} m from the start, at every height")
+            break
+    return lines
+
+
+def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bool:
+    """Whether some height at some of the places (n, 2) is in no missile's reach."""
+    threats = scenario.threats
+    armed = threats.kill_radius > 0.0
+    position, radius = threats.position[armed], threats.kill_radius[armed]
+    for share in np.linspace(0.0, 1.0, 9):
+        up = lowest + share * (scenario.ceiling - lowest)
+        free = np.ones(len(places), dtype=np.bool_)
+        for centre, reach in zip(position, radius, strict=True):
+            away = (places[:, 0] - centre[0]) ** 2 + (places[:, 1] - centre[1]) ** 2 + (up - centre[2]) ** 2
+            free &= away > reach * reach
+        if free.any():
+            return True
+    return math.isinf(scenario.ceiling)

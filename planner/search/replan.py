@@ -1,0 +1,90 @@
+"""Planning again in flight: what is flown stays, what lies ahead is planned anew past threats that have popped up."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from planner.evaluation.paper_scores import paper_scores
+from planner.evaluation.problem import make_problem
+from planner.plan import Plan
+from planner.search.plan_path import plan_path
+from planner.search.search_state import Progress, Stop
+from world.errors import MissionError
+from world.geometry import leg_courses, leg_runs
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Waypoints that the way ahead has, at least: with fewer there is no way round anything.
+FEWEST = 8
+
+
+def replan(
+    scenario: Scenario,
+    limits: Limits,
+    old: Plan,
+    leg: int,
+    *,
+    seed: int,
+    algorithm: str | None = None,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+) -> Plan:
+    """Plan anew from the waypoint at which leg `leg` of an old plan begins; legs before it are flown and stay.
+
+    scenario: with the threats known now (`world.scenario.with_threats`).  The turn at that waypoint counts from the
+    course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
+    The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
+    Raises MissionError for a leg that the old plan has not or that begins in a missile's reach, and for a plan of
+    another mission; ScenarioError as `plan_path`.
+    """
+    count = len(old.waypoints)
+    if not 0 <= leg < count - 1:
+        raise MissionError(f"{scenario.name}: leg {leg}: the plan has legs 0..{count - 2}")
+    same_mission(scenario, old)
+    _outside(scenario, old, leg)
+    rest = with_waypoints(old.waypoints[leg:], max(FEWEST, count - leg))
+    course = scenario.start_course if leg == 0 else float(leg_courses(old.waypoints)[leg - 1])
+    table = scenario.planner.model_copy(update={"waypoints": len(rest)})
+    ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
+    made = plan_path(ahead, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=rest)
+    waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])
+    counts, objectives = paper_scores(make_problem(scenario, limits).certified, waypoints[None])
+    return replace(
+        made, scenario=scenario, waypoints=waypoints, violations=counts[0], objectives=objectives[0], flown_legs=leg
+    )
+
+
+def same_mission(scenario: Scenario, old: Plan) -> None:
+    """Raise MissionError if a plan has not the scenario's ends."""
+    for name, planned, asked in (
+        ("start", old.waypoints[0], scenario.start),
+        ("destination", old.waypoints[-1], scenario.destination),
+    ):
+        away = math.dist(planned, asked)
+        if away > 1.0:
+            raise MissionError(f"{scenario.name}: {name}: {away:.0f} m from that of the plan; it is another mission's")
+
+
+def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
+    """Raise MissionError if a missile reaches the place that the new plan is to begin at."""
+    threats = scenario.threats
+    inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
+    unit = int(np.argmax(np.where(threats.kill_radius > 0.0, inside, -math.inf))) if len(inside) else -1
+    if unit >= 0 and threats.kill_radius[unit] > 0.0 and inside[unit] >= 0.0:
+        raise MissionError(
+            f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {inside[unit]:.0f} m inside the kill "
+            f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe"
+        )
+
+
+def with_waypoints(path: Floats, count: int) -> Floats:
+    """Split the longest legs of a path (w, 3) until it has `count` waypoints."""
+    points = [np.asarray(point, dtype=np.float64) for point in path]
+    while len(points) < count:
+        longest = int(np.argmax(leg_runs(np.array(points))))
+        points.insert(longest + 1, 0.5 * (points[longest] + points[longest + 1]))
+    return np.array(points)

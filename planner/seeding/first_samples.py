@@ -1,0 +1,73 @@
+"""First samples and the smooth basis of the rotated encoding.
+
+A waypoint's neighbours go the same way round an obstacle.  Independent marginals of each coordinate destroy that;
+independent marginals along the eigenvectors of the Brownian-bridge kernel, fixed at both ends, keep it.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.encoding import Encoding, Space
+
+Floats = NDArray[np.float64]
+
+# Share of a seeded first population that is drawn around the seeds.
+AROUND_SEEDS = 1.0
+# Spread around a seed, as a share of the free spread: log-uniform between these.
+NEAR, FAR = 0.003, 0.3
+
+
+def bridge_modes(inner: int) -> tuple[Floats, Floats]:
+    """Eigenvectors (inner, inner) and deviations (inner,) of the bridge kernel min(s, t) - s t at even steps.
+
+    In closed form: the kernel's inverse is the second difference, so the eigenvectors are sines.  Deviations are
+    relative to the first mode's.
+    """
+    k = np.arange(1, inner + 1)
+    modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
+    deviations = np.sin(np.pi / (2 * (inner + 1))) / np.sin(np.pi * k / (2 * (inner + 1)))
+    return modes, deviations
+
+
+def bridge_basis(inner: int) -> Floats:
+    """Orthogonal basis (3 inner, 3 inner): across and up in bridge modes, along as it is."""
+    modes, _ = bridge_modes(inner)
+    basis = np.zeros((3 * inner, 3 * inner))
+    basis[0::3, 0::3] = np.eye(inner)
+    basis[1::3, 1::3] = modes
+    basis[2::3, 2::3] = modes
+    return basis
+
+
+def first_samples(
+    space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
+) -> Floats:
+    """First population (n, d): the seeds and smooth paths around them; without seeds, about the straight line."""
+    inner = encoding.waypoints - 2
+    modes, deviations = bridge_modes(inner)
+    lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
+    spread = np.array([1.0, 0.25 * np.median(upper[:, 1] - lower[:, 1]), 0.25 * (space.up[1] - space.up[0])])
+    # A bridge mode's entries shrink with the number of waypoints; its middle should move by the spread.
+    spread[1:] *= np.sqrt((inner + 1) / 2.0)
+
+    def bridges(count: int) -> Floats:
+        """Smooth displacements (count, inner, 2) of across and up."""
+        weights = rng.normal(size=(count, inner, 2)) * deviations[:, None] * spread[1:]
+        return np.asarray(np.einsum("nka,ik->nia", weights, modes, optimize=False))
+
+    out = np.empty((population, inner, 3))
+    share = np.linspace(0.0, 1.0, inner + 2)[1:-1, None]
+    out[..., 0] = rng.uniform(lower[:, 0], upper[:, 0], (population, inner))
+    out[..., 1] = 0.0
+    heights = space.start[2] * (1.0 - share) + space.destination[2] * share
+    out[..., 2] = heights[:, 0] + rng.uniform(0.0, 1.0, (population, 1)) * np.maximum(0.0, space.up[1] - heights[:, 0])
+    out[..., 1:] += bridges(population)
+    if len(starts):
+        near = min(population, max(len(starts), int(AROUND_SEEDS * population)))
+        picked = starts[np.arange(near) % len(starts)].reshape(near, inner, 3)
+        scale = np.exp(rng.uniform(np.log(NEAR), np.log(FAR), (near, 1, 1)))
+        scale[: len(starts)] = 0.0
+        out[:near] = picked
+        out[:near, :, 1:] += scale * bridges(near)
+        out[:near, :, :1] += scale * rng.normal(size=(near, inner, 1)) * (upper[:, :1] - lower[:, :1])
+    return np.clip(out.reshape(population, -1), encoding.lower, encoding.upper)

@@ -1,0 +1,258 @@
+"""The mission protocol, without sockets: whole or nothing, one station at a time, on any link."""
+
+import os
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.mavlink_items import MissionType
+from flight.live.mission_server import CONFIRM, CONFIRMATIONS, LOCK, MOST_UPLOADED, PATIENCE, MissionServer, Station
+from tests.stations import Medium, Uploader, decode, item, many_items
+
+SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+ONE, TWO = Station("one", 255, 190), Station("two", 254, 190)
+
+
+def held(server: MissionServer, kind: MissionType = MissionType.MISSION) -> list[tuple[int, int, float]]:
+    return [(one.x, one.y, one.alt) for one in server.lists[kind]]
+
+
+def wanted(items: list) -> list[tuple[int, int, float]]:
+    return [(one.x, one.y, one.z) for one in items]
+
+
+def test_a_thousand_items_arrive_as_they_were_sent() -> None:
+    server, items = MissionServer(), many_items(1000)
+    one = Uploader(ONE, items)
+    Medium(server, [one]).run(60.0)
+    assert one.result == mavlink.MAV_MISSION_ACCEPTED
+    assert held(server) == wanted(items)
+    assert server.changed == {MissionType.MISSION}
+
+
+@pytest.mark.parametrize("seed", range(20 if SOAK else 2))
+def test_a_thousand_items_over_a_bad_link(seed: int) -> None:
+    """30 % lost, doubled and reordered each way: all or, until then, nothing."""
+    server, items, old = MissionServer(), many_items(1000, mark=seed), many_items(5, mark=99)
+    Medium(server, [Uploader(ONE, old)]).run(5.0)
+    one = Uploader(ONE, items)
+    medium = Medium(server, [one], 0.3, 0.3, (0.001, 0.04), seed, now=20.0)
+
+    def whole() -> None:
+        assert len(server.lists[MissionType.MISSION]) in (5, 1000)
+
+    medium.whole = whole
+    medium.run(400.0)
+    assert one.result == mavlink.MAV_MISSION_ACCEPTED
+    assert held(server) == wanted(items)
+    assert medium.sent > 4000
+
+
+@pytest.mark.parametrize("seed", range(100))
+def test_two_stations_at_once(seed: int) -> None:
+    """One wins and the other is denied, on a link that loses and reorders; never a mixture."""
+    server = MissionServer()
+    first, second = many_items(12, mark=1), many_items(12, mark=2)
+    one, two = Uploader(ONE, first), Uploader(TWO, second)
+    loss = 0.1 if seed % 2 else 0.0
+    Medium(server, [one, two], loss, loss, (0.001, 0.02), seed).run(60.0)
+    results = {one.result, two.result}
+    assert held(server) in (wanted(first), wanted(second))
+    if loss == 0.0:
+        assert results == {mavlink.MAV_MISSION_ACCEPTED, mavlink.MAV_MISSION_DENIED}
+        winner = first if one.result == mavlink.MAV_MISSION_ACCEPTED else second
+        assert held(server) == wanted(winner)
+    # On a bad link the denied one may start again after the first is done; then the last accepted is what is held.
+    assert mavlink.MAV_MISSION_ACCEPTED in results
+
+
+def send(server: MissionServer, message: object, who: Station, now: float) -> list:
+    return server.handle(decode(message, who.system, who.component), who, now)
+
+
+def test_half_an_upload_changes_nothing_and_the_lock_expires() -> None:
+    server = MissionServer()
+    Medium(server, [Uploader(ONE, many_items(3))]).run(5.0)
+    before = server.lists[MissionType.MISSION]
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 9, 0), ONE, 10.0)
+    send(server, item(0, 1, 1, 5.0), ONE, 10.0)
+    denied = send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), TWO, 10.0 + 0.9 * LOCK)
+    assert denied[0].message.type == mavlink.MAV_MISSION_DENIED
+    assert "system 255" in denied[0].text
+    assert server.lists[MissionType.MISSION] == before
+    taken = send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), TWO, 10.0 + 1.1 * LOCK)
+    assert taken[0].message.get_type() == "MISSION_REQUEST_INT"
+    assert server.tick(10.0 + 1.1 * LOCK + PATIENCE + 0.1)[0].message.type == mavlink.MAV_MISSION_OPERATION_CANCELLED
+    assert not server.busy
+    assert server.lists[MissionType.MISSION] == before
+
+
+def test_starting_over_mixes_nothing() -> None:
+    server = MissionServer()
+    count = mavlink.MAVLink_mission_count_message(1, 1, 4, 0)
+    send(server, count, ONE, 0.0)
+    for old in many_items(2, mark=5):
+        send(server, old, ONE, 0.1)
+    items = many_items(4, mark=6)
+    Medium(server, [Uploader(ONE, items)], now=0.2).run(5.0)
+    assert held(server) == wanted(items)
+
+
+def test_the_final_ack_is_repeated() -> None:
+    server, items = MissionServer(), many_items(3)
+    Medium(server, [Uploader(ONE, items)]).run(5.0)
+    again = send(server, items[-1], ONE, 6.0)
+    assert [reply.message.type for reply in again] == [mavlink.MAV_MISSION_ACCEPTED]
+    assert send(server, items[-1], TWO, 6.0) == []
+    assert send(server, items[0], ONE, 6.0) == []
+
+
+@pytest.mark.parametrize("seed", range(200))
+def test_a_station_that_only_waits_hears_of_the_end(seed: int) -> None:
+    """MAVSDK sends no item twice unasked: with its ACK lost it waits, and gives up after 2.5 s."""
+    server, items = MissionServer(), many_items(40)
+    one = Uploader(ONE, items, patience=0.5, mavsdk=True)
+    Medium(server, [one], 0.1, 0.0, (0.001, 0.02), seed).run(60.0)
+    assert one.result == mavlink.MAV_MISSION_ACCEPTED
+    assert held(server) == wanted(items)
+
+
+def upload(server: MissionServer, items: list, now: float, *, late: float = 0.0) -> None:
+    """Send a whole upload, each item so long after it was asked for."""
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, len(items), 0), ONE, now)
+    for one in items:
+        asked = now
+        while now < asked + late:
+            now += 0.005
+            server.tick(now)
+        send(server, one, ONE, now)
+
+
+def confirmations(server: MissionServer, now: float) -> int:
+    return sum(len(server.tick(now + 0.005 * k)) for k in range(1, 1000))
+
+
+def test_only_a_station_on_a_bad_link_that_is_silent_is_asked_again() -> None:
+    server, items = MissionServer(), many_items(3)
+    upload(server, items, 0.0)
+    assert confirmations(server, 0.0) == 0
+    upload(server, items, 10.0, late=0.06)
+    assert [reply.message.seq for reply in server.tick(11.0)] == [2]
+    assert server.tick(11.1) == []
+    send(server, mavlink.MAVLink_mission_request_list_message(1, 1, 0), ONE, 11.2)
+    assert confirmations(server, 11.2) == 0
+    upload(server, items, 20.0, late=0.06)
+    # Within the 2.5 s that MAVSDK waits.
+    assert confirmations(server, 20.2) == CONFIRMATIONS
+    assert CONFIRMATIONS * CONFIRM < 2.5
+
+
+def test_a_duplicate_of_the_last_item_gets_no_second_ack() -> None:
+    """MAVSDK would take it for its next upload's, and fail."""
+    server, items = MissionServer(), many_items(3)
+    upload(server, items, 0.0)
+    assert send(server, items[-1], ONE, 0.2) == []
+    assert len(send(server, items[-1], ONE, 0.4)) == 1
+    assert send(server, items[-1], ONE, 0.5) == []
+
+
+def test_a_slow_station_is_not_pressed() -> None:
+    """A stall of a second brings fewer requests than MAVSDK counts before it gives up; a slow link soon brings none."""
+    server = MissionServer()
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 9, 0), ONE, 0.0)
+    assert 2 <= sum(len(server.tick(0.005 * k)) for k in range(201)) <= 4
+    now, asked = 1.0, []
+    for one in many_items(8):
+        send(server, one, ONE, now)
+        asked.append(sum(len(server.tick(now + 0.005 * k)) for k in range(1, 50)))
+        now += 0.25
+    assert asked[1:] == [0] * 7
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.1, 0.2])
+def test_fence_and_mission_one_after_the_other_on_a_slow_link(delay: float) -> None:
+    server = MissionServer()
+    for kind, command in ((MissionType.FENCE, 5004), (MissionType.MISSION, 16), (MissionType.MISSION, 16)):
+        items = [item(k, 460_000_000 + k, 80_000_000, 50.0, command=command, kind=kind, p1=50.0) for k in range(5)]
+        one = Uploader(ONE, items, kind=kind, patience=0.5, mavsdk=True)
+        Medium(server, [one], delay=(delay, delay)).run(60.0)
+        assert one.result == mavlink.MAV_MISSION_ACCEPTED
+
+
+@pytest.mark.parametrize(
+    ("wrong", "kind", "result"),
+    [
+        (item(1, 910_000_000, 0, 5.0), 0, mavlink.MAV_MISSION_INVALID_PARAM5_X),
+        (item(1, 10, 1_810_000_000, 5.0), 0, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
+        (item(1, 10, 10, float("inf")), 0, mavlink.MAV_MISSION_INVALID),
+        (item(1, 10, 10, 5.0, frame=99), 0, mavlink.MAV_MISSION_INVALID),
+        (item(1, 10, 10, 5.0, command=5004, p1=50.0), 0, mavlink.MAV_MISSION_UNSUPPORTED),
+        (item(1, 10, 10, 5.0, kind=1), 1, mavlink.MAV_MISSION_UNSUPPORTED),
+        (item(1, 10, 10, 5.0, command=5004, kind=1, p1=-1.0), 1, mavlink.MAV_MISSION_INVALID),
+        (item(1, 10, 10, 5.0, kind=2), 2, mavlink.MAV_MISSION_UNSUPPORTED),
+    ],
+)
+def test_an_unsound_item_refuses_the_whole(wrong: object, kind: int, result: int) -> None:
+    good = {
+        0: item(0, 1, 1, 5.0),
+        1: item(0, 1, 1, 5.0, command=5004, kind=1, p1=9.0),
+        2: item(0, 1, 1, 5.0, command=5100, kind=2),
+    }
+    server = MissionServer()
+    one = Uploader(ONE, [good[kind], wrong], kind)
+    medium = Medium(server, [one])
+    medium.run(5.0)
+    assert one.result == result
+    assert server.lists[MissionType(kind)] == ()
+    assert "item 1" in medium.texts[0]
+    assert medium.texts[0].endswith("nothing changed")
+
+
+def test_three_lists_at_once_from_one_station() -> None:
+    server = MissionServer()
+    items = [
+        many_items(40),
+        [item(k, 10 + k, 20, 0.0, command=5004, kind=1, p1=50.0) for k in range(9)],
+        [item(k, 30 + k, 40, 80.0, command=5100, kind=2, frame=3) for k in range(3)],
+    ]
+    uploaders = [Uploader(ONE, one, kind) for kind, one in enumerate(items)]
+    Medium(server, uploaders, 0.1, 0.1, (0.001, 0.02)).run(60.0)
+    assert [one.result for one in uploaders] == [0, 0, 0]
+    assert [held(server, kind) for kind in MissionType] == [wanted(one) for one in items]
+
+
+def test_download_gives_the_integers_back() -> None:
+    server, items = MissionServer(), many_items(7)
+    Medium(server, [Uploader(ONE, items)]).run(5.0)
+    (count,) = send(server, mavlink.MAVLink_mission_request_list_message(1, 1, 0), TWO, 9.0)
+    assert count.message.count == 7
+    for k, one in enumerate(items):
+        (reply,) = send(server, mavlink.MAVLink_mission_request_int_message(1, 1, k, 0), TWO, 9.0)
+        assert (reply.message.seq, reply.message.x, reply.message.y, reply.message.z) == (k, one.x, one.y, one.z)
+        assert (reply.message.target_system, reply.message.frame) == (254, 0)
+    (beyond,) = send(server, mavlink.MAVLink_mission_request_int_message(1, 1, 7, 0), TWO, 9.0)
+    assert beyond.message.type == mavlink.MAV_MISSION_INVALID_SEQUENCE
+
+
+def test_clear_lock_size_and_floats() -> None:
+    server = MissionServer()
+    Medium(server, [Uploader(ONE, many_items(3))]).run(5.0)
+    server.locked = "in flight"
+    for message in (
+        mavlink.MAVLink_mission_clear_all_message(1, 1, 255),
+        mavlink.MAVLink_mission_count_message(1, 1, 2, 0),
+    ):
+        assert send(server, message, ONE, 9.0)[0].message.type == mavlink.MAV_MISSION_DENIED
+    assert (
+        send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 2), ONE, 9.0)[0].message.get_type().endswith("INT")
+    )
+    server.locked = ""
+    big = send(server, mavlink.MAVLink_mission_count_message(1, 1, MOST_UPLOADED + 1, 0), ONE, 20.0)
+    assert big[0].message.type == mavlink.MAV_MISSION_NO_SPACE
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), ONE, 30.0)
+    floats = mavlink.MAVLink_mission_item_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, 46.0, 8.0, 100.0, 0)
+    assert send(server, floats, ONE, 30.0)[0].message.type == mavlink.MAV_MISSION_UNSUPPORTED
+    assert len(server.lists[MissionType.MISSION]) == 3
+    assert send(server, mavlink.MAVLink_mission_clear_all_message(1, 1, 255), ONE, 40.0)[0].message.type == 0
+    assert server.lists == dict.fromkeys(MissionType, ())
+    assert send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 77), ONE, 41.0)[0].message.type == 3

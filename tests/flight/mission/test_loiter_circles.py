@@ -1,0 +1,237 @@
+"""Loiters: where a route joins a circle, goes around and leaves, by geometry and by flight."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aircraft.catalog import load_aircraft
+from flight.dynamics.envelope_tables import load_envelope
+from flight.guidance.fly_by_path import fly_by_path, sample_path
+from flight.mission.itinerary import UNLIMITED
+from flight.mission.route import Route
+from flight.mission.routing import make_route
+from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.simulate import simulate
+from logs.recording.reader import read_log
+from logs.recording.recorder import Recorder
+from logs.replay.timeline import timeline
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from tests.flight.mission.test_routing import ORIGIN, ground, mission, refusal, route, wp
+from world.frames import to_map
+from world.geometry import leg_slopes, signed_turns
+from world.scenario import from_spec
+from world.scenario_file import MAP_REACH
+
+TURN = 2.0 * math.pi
+
+
+def circled(flown: Route, item: int) -> tuple[float, float]:
+    """Signed angle (turns) that a route goes around at an item's corners, and their radius."""
+    turns = np.zeros(len(flown.waypoints))
+    turns[1:-1] = signed_turns(flown.waypoints)
+    at = (flown.items == item) & (flown.arcs > 0.0)
+    assert np.ptp(flown.arcs[at]) == 0.0
+    return float(turns[at].sum()) / TURN, float(flown.arcs[at][0])
+
+
+def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> FlightSetup:
+    """A mission over flat ground at 100 m, ready to fly."""
+    read = mission(*lines, home=home)
+    end = {"east_m": 0.0, "north_m": 0.0, "amsl_m": 400.0}
+    spec: dict[str, Any] = {
+        "name": "loiters",
+        "origin": {"lat_deg": ORIGIN.lat_deg, "lon_deg": ORIGIN.lon_deg},
+        "terrain": {"kind": "flat", "amsl_m": 100.0},
+        "area": {"east_m": [-6000, 6000], "north_m": [-6000, 6000], "ceiling_amsl_m": 3000.0},
+        "start": end,
+        "destination": end | {"east_m": 500.0},
+    }
+    scenario = from_spec(spec | tables, "loiters", external=True)
+    aircraft = load_aircraft("aerosonde")
+    bank = math.radians(30.0)
+    blank = Route(
+        np.array([[0.0, 0, 400], [500, 0, 400]]), np.array([25.0]), np.zeros(2), np.zeros(2, bool), np.arange(2), ""
+    )
+    envelope = load_envelope(aircraft)
+    setup = FlightSetup(scenario, read, "", blank, envelope, "aerosonde", 25.0, bank, 888.0, 1)
+    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, limits_of(setup)))
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.floats(-4000, 4000), st.floats(-4000, 4000), st.floats(-math.pi, math.pi), st.floats(400, 5000),
+    st.floats(15, 350), st.booleans(), st.sampled_from([0.0, 0.5, 1.0, 2.0, 3.7]),
+)  # fmt: skip
+def test_the_path_is_the_circle(
+    east: float, north: float, course: float, away: float, radius: float, left: bool, turns: float
+) -> None:
+    """Drawn from the corners: at least the turns asked for, at the radius, joined and left on tangents."""
+    out_e, out_n = east + away * math.sin(course), north + away * math.cos(course)
+    signed = -radius if left else radius
+    flown = route(wp(0, 9000), wp(east, north, command=18, p=f"{turns} 0 {signed} 0"), wp(out_e, out_n))
+    around, arc = circled(flown, 2)
+    assert math.copysign(1.0, around) == math.copysign(1.0, signed)
+    assert turns - 1e-6 <= abs(around) < turns + 1.0 + 1e-6
+    assert arc == pytest.approx(radius)
+    corners = flown.waypoints[flown.items == 2, :2]
+    step = abs(around) * TURN / len(corners)
+    assert step <= math.pi / 4.0 + 1e-6
+    middle = np.array([float(v) for v in to_map(ORIGIN, *place_of(east, north))])
+    # A polygon around the circle: its corners are as far out as its angle says, its sides touch.
+    reach = np.hypot(*(corners - middle).T)
+    assert reach == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
+    setup = replace(FLAT, route=flown)
+    drawn = sample_path(fly_by_path(flown, limits_of(setup)), 5.0)[:, :2]
+    near = np.hypot(*(drawn - middle).T)
+    # No point of the path is inside the circle, and the arcs lie on it.
+    assert near.min() > radius - 0.05
+    assert (np.abs(near - radius) < 0.05).sum() >= int(abs(around) * TURN * radius / 5.0) - 2
+
+
+def place_of(east: float, north: float) -> tuple[float, float]:
+    _, _, _, _, _, _, lat, lon, _ = wp(east, north).split()
+    return float(lat), float(lon)
+
+
+FLAT = setup_of(wp(0, 0), wp(0, 2000))
+
+
+def test_how_long() -> None:
+    timed = route(wp(0, 0), wp(0, 2000, command=19, p="90 0 200 0"), wp(3000, 2000))
+    assert 90.0 <= abs(circled(timed, 2)[0]) * TURN * 200.0 / 25.0 < 90.0 + TURN * 200.0 / 25.0
+    endless = route(wp(0, 0), wp(0, 2000, command=17, p="0 0 -150 0"), wp(3000, 2000))
+    assert endless.items[-1] == 2
+    assert circled(endless, 2)[0] * TURN * -150.0 == pytest.approx(UNLIMITED * 25.0)
+    assert any("item 2: NAV_LOITER_UNLIM: flown for 60 s; the mission ends there" in note for note in endless.notes)
+    assert any("item 3: never reached" in note for note in endless.notes)
+
+
+def test_to_height_spirals_within_the_envelope() -> None:
+    flown = setup_of(wp(0, 0), wp(0, 1500, 600, command=31, p="1 150 0 0"), wp(3000, 1500, 600)).route
+    at = flown.items == 2
+    assert flown.waypoints[at, 2][-1] == pytest.approx(900.0, abs=0.01)
+    assert (np.diff(flown.waypoints[:, 2]) >= -1e-9).all()
+    # 500 m at 60 % of what the aircraft climbs (13.7 degrees at 25 m/s and 500 m, less at 900 m).
+    assert 5.0 < math.degrees(leg_slopes(flown.waypoints).max()) < 0.6 * 13.7
+    down = setup_of(wp(0, 0, 700), wp(0, 1500, 100, command=31, p="1 -150 0 0"), wp(3000, 1500, 100)).route
+    assert math.degrees(leg_slopes(down.waypoints).min()) > -0.6 * 7.8
+    assert circled(down, 2)[0] < -1.0
+
+
+def test_its_own_radius() -> None:
+    """R = 625 / (9.80665 tan 30) = 110.39 m in calm air; a tenth over it in whole tens of metres is 130 m."""
+    lines = (wp(0, 0), wp(0, 2000, command=18, p="1 0 0 0"), wp(3000, 2000))
+    assert circled(setup_of(*lines).route, 2)[1] == 130.0
+    assert "item 2: loiter without a radius: flown with 130 m" in setup_of(*lines).route.notes
+    # (25 + 8)^2 / (9.80665 tan 30) = 192.3 m downwind.
+    assert circled(setup_of(*lines, wind={"speed_mps": 8.0, "from_deg": 0.0}).route, 2)[1] == 220.0
+
+
+def test_places_inside_a_circle() -> None:
+    over = route(wp(0, 0), wp(0, 2000), wp(0, 2000, command=18, p="1 0 120 0"), wp(10, 1990), wp(3000, 2000))
+    assert list(dict.fromkeys(over.items.tolist())) == [1, 3, 5]
+    assert [note.split(":")[0] for note in over.notes] == ["items 2, 4"]
+    start = route(wp(0, 0), wp(0, 0, command=18, p="1 0 120 0"), wp(3000, 2000))
+    assert "starts trimmed in the air on the circle of item 2" in start.started
+    assert math.hypot(*start.waypoints[0, :2]) == pytest.approx(120.0, abs=0.1)
+    two = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 120 0"), wp(0, 2050, command=19, p="30 0 -100 0"), wp(3000, 0))
+    assert any("item 3: its circle has no tangent" in note for note in two.notes)
+    assert circled(two, 3)[1] == 120.0
+    here = route(wp(0, 0), wp(0, 2000), "2 18 1 0 120 0 0 0 0", wp(3000, 2000))
+    assert list(dict.fromkeys(here.items.tolist())) == [1, 3, 4]
+    assert (here.waypoints[here.items == 3, 2] == 400.0).all()
+
+
+def test_a_jump_back_to_a_loiter() -> None:
+    flown = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 150 0"), wp(3000, 2000), "2 177 2 1 0 0 0 0 0")
+    assert circled(flown, 2)[0] > 2.0
+
+
+def test_refusals() -> None:
+    assert "item 2: loiter radius 30000 m" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1 0 30000 0"))
+    assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1e9 0 100 0"))
+    assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=19, p="3e38 0 100 0"))
+    many = [wp(0, 2000, command=18, p="900 0 100 0"), wp(0, 4000), wp(0, 2000, command=18, p="900 0 100 0")]
+    assert "more than 10,000 places" in refusal(wp(0, 0), *many)
+    assert MAP_REACH > 30_000.0
+
+
+@pytest.fixture(scope="module")
+def flight() -> tuple[FlightSetup, Any]:
+    setup = setup_of(
+        wp(-1500, -2000), wp(-1500, 0, command=18, p="2 0 150 0"), wp(0, 1500, 140, command=19, p="20 0 -160 0"),
+        "2 178 0 22 -1 0 0 0 0", wp(1500, 0, 260, command=31, p="1 0 0 0"), wp(1500, -1500, 260),
+        wp(0, -1500, 260, command=17, p="0 0 140 0"),
+    )  # fmt: skip
+    return setup, simulate(setup, load_aircraft("aerosonde"))
+
+
+def test_every_kind_of_loiter_is_flown(flight: tuple[FlightSetup, Any]) -> None:
+    setup, flown = flight
+    assert flown.ended == "completed"
+    verdict = judge_flight(setup, flown.track, flown.ended)
+    assert verdict.flyable, verdict.summary
+    loiters = [item for item in verdict.findings if item.rule == "loiter"]
+    assert [item.where.split(" (")[1] for item in loiters] == ["item 2)", "item 3)", "item 5)", "item 7)"]
+    for finding in loiters:
+        assert finding.planned is not None
+        assert finding.flown == pytest.approx(finding.planned, abs=1.0)
+        assert finding.margin is not None
+        assert finding.margin > 0.0
+    assert not any(item.rule in ("turn", "waypoint") and "item 2)" in item.where for item in verdict.findings)
+    # By the track alone: metres from the first circle's middle, and the angle flown around it.
+    middle = np.array([-1500.0, 0.0])
+    off = flown.track.position[:, :2] - middle
+    on = np.abs(np.hypot(*off.T) - 150.0) < 1.0
+    angle = np.unwrap(np.arctan2(off[on, 0], off[on, 1]))
+    assert angle[-1] - angle[0] >= 2.0 * TURN - 0.1
+    assert judge_geometry(setup).flyable
+
+
+def test_a_circle_tighter_than_the_wind_allows_fails() -> None:
+    """25 m/s + 6 m/s: R = 961 / (9.80665 tan 30) = 169.7 m downwind, so 140 m is no circle, and 111 m in calm is."""
+    lines = (wp(0, -2500), wp(0, 0, command=18, p="1 0 140 0"), wp(2500, 0))
+    assert judge_geometry(setup_of(*lines)).flyable
+    windy = setup_of(*lines, wind={"speed_mps": 6.0, "from_deg": 250.0})
+    verdict = judge_geometry(windy)
+    assert not verdict.flyable
+    (loiter,) = [item for item in verdict.findings if item.rule == "loiter"]
+    assert loiter.limit == pytest.approx(169.7, abs=0.5)
+    assert "needs 170 m in this wind" in loiter.reason
+    flown = simulate(windy, load_aircraft("aerosonde"))
+    assert not judge_flight(windy, flown.track, flown.ended).flyable
+
+
+def test_a_loiter_cut_short_is_not_complete(flight: tuple[FlightSetup, Any]) -> None:
+    setup, flown = flight
+    half = flown.track.rows(0, len(flown.track) // 4)
+    verdict = judge_flight(setup, half, "completed")
+    assert not verdict.flyable
+    assert not any(item.ok for item in verdict.findings if item.rule == "loiter")
+
+
+def test_terrain_and_relative_heights_of_loiters() -> None:
+    flown = route(wp(0, 0), wp(0, 2000, 250, command=18, frame=10, p="1 0 150 0"), wp(2500, 0), terrain=ground(320.0))
+    assert (flown.waypoints[flown.items == 2, 2] == 570.0).all()
+
+
+def test_a_replay_tells_a_loiter_in_one_line(flight: tuple[FlightSetup, Any], tmp_path: Path) -> None:
+    setup, flown = flight
+    with Recorder(tmp_path / "a.mcap", setup) as recorder:
+        recorder.write(flown.track)
+        recorder.finish(flown.ended, judge_flight(setup, flown.track, flown.ended))
+    log = read_log(tmp_path / "a.mcap")
+    assert (log.setup.route.arcs == setup.route.arcs).all()
+    texts = [entry.text for entry in timeline(log) if entry.kind == "leg"]
+    around = [text for text in texts if text.startswith("loiter of item")]
+    assert [text.split(":")[0] for text in around] == [f"loiter of item {item}" for item in (2, 3, 7)]
+    # Item 5 has its height on the way in and is left at once, on one arc.
+    assert len(texts) < 14
+    lowest = [entry.text for entry in timeline(log) if entry.kind == "ground"]
+    assert len(lowest) == len(texts)

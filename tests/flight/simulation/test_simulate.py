@@ -1,0 +1,281 @@
+"""Whole flights in JSBSim: how closely they follow, how they end, and that they repeat bit for bit."""
+
+import hashlib
+import math
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from flight.dynamics.fdm import Variation
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.local_map import Chart
+from flight.simulation.simulate import BANK_RESERVE, Flight, as_track, simulate
+from flight.simulation.track import COLUMNS, Track, join_tracks
+from tests.flight.conftest import standard
+from world.errors import FlightError
+from world.frames import GeoOrigin, to_map
+
+Floats = NDArray[np.float64]
+MakeSetup = Callable[..., FlightSetup]
+ROOT = Path(__file__).parents[3]
+TICK = 1 / 60
+
+
+def _within(track: Track, cross: tuple[float, float], height: tuple[float, float]) -> None:
+    for name, values, (rms, most) in (("cross", track.cross_track, cross), ("height", track.height_error, height)):
+        kept = values[track.time > 5.0]
+        assert math.sqrt(float((kept.astype(np.float64) ** 2).mean())) <= rms, name
+        assert float(np.abs(kept).max()) <= most, name
+
+
+def _digest(track: Track) -> str:
+    digest = hashlib.sha256()
+    for name in COLUMNS:
+        digest.update(getattr(track, name).tobytes())
+    return digest.hexdigest()
+
+
+def test_calm(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    flown = simulate(make_setup(standard()), aerosonde)
+    track = flown.track
+    assert flown.ended == "completed"
+    _within(track, (0.10, 0.6), (0.05, 0.3))
+    assert np.diff(track.time) == pytest.approx(TICK, abs=1e-9)
+    assert track.time[-1] == pytest.approx(flown.path.length / 25.0, rel=0.01)
+    assert track.leg.tolist() == sorted(track.leg.tolist())
+    assert set(track.leg.tolist()) == set(range(9))
+    assert np.abs(track.airspeed - 25.0).max() < 1.25
+    # Guidance may go beyond the planned bank by its reserve, and the roll loop over its command by next to nothing.
+    assert math.degrees(np.abs(track.attitude[:, 0]).max()) < 30.0 + math.degrees(BANK_RESERVE) + 0.5
+    assert track.position[-1] == pytest.approx(standard()[-1], abs=1.0)
+    assert track.position[0] == pytest.approx(standard()[0], abs=1e-3)
+
+
+def test_what_the_track_says_of_itself(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # 60 km from the map's origin, where north is not the map's: velocity, attitude and wind stand in map axes.
+    way = standard()[:4] + np.array([60_000.0, 20_000.0, 0.0])
+    setup = make_setup(way, wind=(8.0, 60.0), origin={"lat_deg": 60.0, "lon_deg": 10.0})
+    flown = simulate(setup, aerosonde)
+    track = flown.track
+    assert flown.ended == "completed"
+    _within(track, (0.10, 0.6), (0.10, 0.4))
+    velocity = np.gradient(track.position, track.time, axis=0)[5:-5]
+    assert velocity == pytest.approx(track.velocity[5:-5], abs=0.02)
+    east, north = setup.scenario.wind.at(500.0)
+    assert track.wind == pytest.approx(np.tile([east, north, 0.0], (len(track), 1)), abs=5e-4)
+    # Ground velocity less wind is what the air sees: its size the airspeed, its direction the nose's but for sideslip.
+    # Each axis is kept to 1 mm/s.
+    air = track.velocity.astype(np.float64) - track.wind
+    assert np.linalg.norm(air, axis=1) == pytest.approx(track.airspeed, abs=3e-3)
+    heading = np.arctan2(air[:, 0], air[:, 1])
+    level = np.abs(track.attitude[:, 0]) < 0.02
+    assert np.abs(np.remainder(heading - track.attitude[:, 2] + math.pi, math.tau) - math.pi)[level].max() < 0.01
+    assert track.clearance == pytest.approx(track.position[:, 2] - 100.0, abs=0.01)
+    assert (np.diff(track.energy) > 0.0).all()
+    # Watt hours from volts and amperes.
+    assert float(track.energy[-1]) == pytest.approx(float((track.current * 44.4 * TICK / 3600).sum()), rel=0.05)
+
+
+@pytest.mark.parametrize(("from_deg", "seed"), [(0.0, 1), (120.0, 2), (240.0, 3)])
+def test_wind_and_moderate_turbulence(make_setup: MakeSetup, aerosonde: Aircraft, from_deg: float, seed: int) -> None:
+    flown = simulate(make_setup(standard(), wind=(10.0, from_deg), turbulence="moderate", seed=seed), aerosonde)
+    assert flown.ended == "completed"
+    _within(flown.track, (0.15, 1.0), (0.3, 1.0))
+    gusts = flown.track.wind - flown.track.wind.mean(axis=0)
+    assert 0.7 < float(gusts.std()) < 3.0
+
+
+@pytest.mark.parametrize(
+    "variation", [Variation(mass=1.1), Variation(mass=0.9), Variation(drag=1.3), Variation(control=0.75)], ids=str
+)
+def test_an_aircraft_that_differs_from_its_model(
+    make_setup: MakeSetup, aerosonde: Aircraft, variation: Variation
+) -> None:
+    calm = simulate(make_setup(standard()), aerosonde, variation=variation)
+    assert calm.ended == "completed"
+    _within(calm.track, (0.15, 1.5), (0.15, 1.5))
+    windy = simulate(make_setup(standard(), wind=(10.0, 200.0), turbulence="moderate"), aerosonde, variation=variation)
+    assert windy.ended == "completed"
+    _within(windy.track, (0.25, 2.0), (0.3, 1.5))
+    assert _digest(calm.track) != _digest(simulate(make_setup(standard()), aerosonde).track)
+
+
+_FLY_AGAIN = """
+import hashlib, pickle, sys
+from aircraft.catalog import load_aircraft
+from flight.simulation.simulate import simulate
+from flight.simulation.track import COLUMNS
+with open(sys.argv[1], "rb") as file:
+    track = simulate(pickle.load(file), load_aircraft("aerosonde")).track
+print(hashlib.sha256(b"".join(getattr(track, name).tobytes() for name in COLUMNS)).hexdigest())
+"""
+
+
+def test_the_same_setup_gives_the_same_bytes(make_setup: MakeSetup, aerosonde: Aircraft, tmp_path: Path) -> None:
+    def setup(seed: int) -> FlightSetup:
+        return make_setup(standard()[:4], wind=(7.0, 30.0), turbulence="light", seed=seed)
+
+    def fly(seed: int, **more: Any) -> str:
+        return _digest(simulate(setup(seed), aerosonde, **more).track)
+
+    first = fly(5)
+    parts: list[Floats] = []
+    told: list[tuple[float, float]] = []
+    # Listening changes nothing.
+    assert fly(5, sink=parts.append, progress=lambda done, whole: told.append((done, whole))) == first
+    assert fly(6) != first
+    assert _digest(join_tracks([as_track(part) for part in parts])) == first
+    assert [done for done, _ in told] == sorted(done for done, _ in told)
+    assert told[-1][0] == told[-1][1]
+    # Nor does another process, with another order of hashes.
+    (tmp_path / "setup").write_bytes(pickle.dumps(setup(5)))
+    run = subprocess.run(
+        [sys.executable, "-c", _FLY_AGAIN, str(tmp_path / "setup")],
+        cwd=ROOT, env=os.environ | {"PYTHONHASHSEED": "77"}, capture_output=True, text=True, check=True, timeout=120,
+    )  # fmt: skip
+    assert run.stdout.split() == [first]
+
+
+def test_a_seed_of_the_wind_wins(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    def fly(seed: int, own: int | None) -> str:
+        setup = make_setup(standard()[:2], turbulence="light", seed=seed)
+        scenario = replace(setup.scenario, wind=replace(setup.scenario.wind, seed=own))
+        return _digest(simulate(replace(setup, scenario=scenario), aerosonde).track)
+
+    assert fly(1, 9) == fly(2, 9)
+    assert fly(1, None) != fly(2, None)
+
+
+def test_not_a_number(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    flight = Flight(make_setup(standard()), aerosonde)
+    for _ in range(8):
+        rows, ended = flight.block(60)
+        assert not ended
+    flight.fdm.write(np.full(4, math.nan))
+    flight.fdm.step()
+    rows, ended = flight.block(60)
+    assert ended == "departure: the state is not a number"
+    assert len(rows) == 0
+    assert np.isfinite(flight.memory).all()
+
+
+def test_dive_into_a_hill(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    peaks = {"kind": "peaks", "peak": [{"east_m": 0.0, "north_m": 3000.0, "height_m": 600.0, "sigma_m": 400.0}]}
+    flown = simulate(make_setup([[0, 0, 300], [0, 6000, 300]], terrain=peaks), aerosonde)
+    assert flown.ended == "ground contact"
+    last = flown.track.position[-1]
+    assert flown.track.clearance[-1] <= 0.0
+    assert (flown.track.clearance[:-1] > 0.0).all()
+    # exp(-d^2 / (2 sigma^2)) = 1/2 at 1.177 sigma before the summit.
+    assert last[1] == pytest.approx(3000.0 - 1.1774 * 400.0, abs=5.0)
+    assert last[2] == pytest.approx(300.0, abs=2.0)
+
+
+def test_start_under_the_terrain(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    setup = make_setup([[0, 0, 500], [0, 3000, 500]])
+    route = replace(setup.route, waypoints=np.array([[0.0, 0.0, 99.0], [0.0, 3000.0, 500.0]]))
+    with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
+        simulate(replace(setup, route=route), aerosonde)
+
+
+def test_a_corner_that_cannot_be_flown(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # A hairpin of 60 m: its arcs are of 30 m, a quarter of what the bank allows.
+    flown = simulate(make_setup([[0, 0, 500], [0, 1500, 500], [60, 1500, 500], [60, 0, 500]]), aerosonde)
+    assert float(np.abs(flown.track.cross_track).max()) > 20.0
+    assert math.degrees(np.abs(flown.track.attitude[:, 0]).max()) < 36.0
+    assert flown.ended == "completed"  # it comes back; that it left the path is for the verdict
+
+
+def test_a_climb_that_cannot_be_flown(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # 25 degrees, where 14 can be climbed at 25 m/s: height is given up for speed, and the flight does not stall.
+    setup = make_setup([[0, 0, 300], [0, 1000, 300], [0, 2500, 1000], [0, 4500, 1000]])
+    flown = simulate(setup, aerosonde)
+    assert flown.ended == "completed"
+    assert float(flown.track.height_error.min()) < -120.0
+    assert float(flown.track.airspeed.min()) > 19.0
+    climbing = (flown.track.position[:, 1] > 1400.0) & (flown.track.position[:, 1] < 2400.0)
+    slope = np.polyfit(flown.track.position[climbing, 1], flown.track.position[climbing, 2], 1)[0]
+    able, _ = setup.envelope.air_angles(float(flown.track.airspeed[climbing].mean()), 500.0)
+    assert math.degrees(math.atan(slope)) == pytest.approx(math.degrees(able), abs=0.7)
+
+
+def test_u_turn_comes_back(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    flown = simulate(make_setup([[0, 0, 500], [0, 2000, 500], [0, 20, 500]]), aerosonde)
+    assert flown.ended == "completed"
+    for point in ([0, 2000, 500], [0, 20, 500]):
+        assert np.linalg.norm(flown.track.position - point, axis=1).min() < 2.0
+
+
+def test_a_wind_that_cannot_be_beaten_ends(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # 30 m/s from ahead of an aircraft that holds 25.
+    setup = make_setup([[0, 0, 500], [0, 1500, 500]], wind=(30.0, 0.0))
+    with pytest.raises(FlightError, match=r"^made: no way made along the course of -?0 degrees") as caught:
+        simulate(setup, aerosonde)
+    assert "\n" not in str(caught.value)
+
+
+def test_time_limit(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    # It starts downwind and can, but the leg back against 27 m/s never ends.
+    setup = make_setup([[0, 0, 500], [0, 1000, 500], [300, 0, 500]], wind=(27.0, 180.0))
+    flown = simulate(setup, aerosonde)
+    assert flown.ended.startswith("time limit: not finished after")
+    assert len(flown.track) < 60_000
+
+
+def test_unknown_ground(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    setup = make_setup([[0, 0, 500], [0, 1500, 500]], terrain={"kind": "none"}, turbulence="light")
+    flown = simulate(setup, aerosonde)
+    assert flown.ended == "completed"
+    assert np.isnan(flown.track.clearance).all()
+
+
+def test_each_leg_at_its_speed(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    flown = simulate(make_setup([[0, 0, 500], [0, 2000, 500], [0, 4500, 500]], speeds=[22.0, 28.0]), aerosonde)
+    track = flown.track
+    assert track.speed_command[track.leg == 0] == pytest.approx(22.0)
+    assert track.speed_command[track.leg == 1] == pytest.approx(28.0)
+    assert track.airspeed[(track.leg == 1) & (track.position[:, 1] > 3500)] == pytest.approx(28.0, abs=0.3)
+
+
+@pytest.mark.parametrize("origin", [GeoOrigin(36.6, -84.2), GeoOrigin(70.0, 179.0), GeoOrigin(-45.0, 10.0)])
+def test_chart_against_the_map(make_setup: MakeSetup, origin: GeoOrigin) -> None:
+    place = {"lat_deg": origin.lat_deg, "lon_deg": origin.lon_deg}
+    setup = make_setup([[-15000, 0, 500], [15000, 9000, 500]], origin=place)
+    chart = Chart.around(setup)
+    lat = origin.lat_deg + np.linspace(-0.05, 0.1, 40)
+    lon = origin.lon_deg + np.linspace(-0.2, 0.15, 40)
+    east, north = to_map(origin, lat, lon)
+    got = chart.position(np.radians(lat), np.radians(lon))
+    assert np.hypot(got[0] - east, got[1] - north).max() < 1e-3
+    # Map course of true north, by a step of a hundredth of a second of arc to the north.
+    ahead_e, ahead_n = to_map(origin, lat + 1e-4, lon)
+    back_e, back_n = to_map(origin, lat - 1e-4, lon)
+    turn = chart.angle(np.radians(lat), np.radians(lon))[0]
+    assert turn == pytest.approx(np.arctan2(ahead_e - back_e, ahead_n - back_n), abs=1e-7)
+
+
+def test_a_flight_crosses_the_180th_meridian(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
+    points = [[-2000, 0, 500], [2000, 500, 520]]
+    here = simulate(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 179.999}), aerosonde)
+    there = simulate(make_setup(points, origin={"lat_deg": -17.0, "lon_deg": 100.0}), aerosonde)
+    assert here.ended == there.ended == "completed"
+    assert np.abs(here.track.cross_track).max() < 0.5
+    assert np.allclose(here.track.position, there.track.position, atol=0.01)
+
+
+def test_tracks_hold_their_types_and_join() -> None:
+    empty = join_tracks([])
+    assert len(empty) == 0
+    assert list(COLUMNS) == [item.name for item in fields(Track)]
+    assert empty.position.shape == (0, 3)
+    assert empty.leg.dtype == np.int32

@@ -1,0 +1,44 @@
+"""What the verdict tests share: a route, judging it, and finding one finding."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.findings import Finding, Verdict, verdict_json
+from logs.verdict.judge_flight import judge_flight
+from planner.plan import Certificate, Plan
+
+ROUTE = [[0, 0, 300], [0, 2000, 300], [1500, 3500, 380], [1500, 6000, 300], [3500, 6500, 300]]
+
+
+def judge(setup: FlightSetup, track: Track, **how: Any) -> Verdict:
+    verdict = judge_flight(setup, track, "completed", **how)
+    verdict_json(verdict)  # refuses NaN
+    return verdict
+
+
+def of(verdict: Verdict, rule: str, where: str = "") -> Finding:
+    found = [item for item in verdict.findings if item.rule == rule and item.where.startswith(where)]
+    assert found, f"no finding {rule} {where}"
+    return found[0]
+
+
+def failing(verdict: Verdict) -> set[tuple[str, str]]:
+    return {(item.rule, item.where.split(" (")[0]) for item in verdict.findings if item.ok is False}
+
+
+def bad_plan(setup: FlightSetup) -> Plan:
+    return Plan(
+        scenario=setup.scenario,
+        waypoints=setup.route.waypoints,
+        violations=np.array([0, 2, 0, 0]),
+        objectives=np.zeros(4),
+        certificate=Certificate(0.1, math.inf, -0.05, 12.0, 100.0, 50.0, ("leg 2: slope 16.6 deg beyond 13.7 deg",)),
+        seed=1,
+        algorithm="umda",
+        evaluations=1,
+        history=np.zeros((0, 3)),
+    )

@@ -1,0 +1,88 @@
+"""Energy: predicted from the envelope's power, flown from the record, both against the battery less its reserve."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.dynamics.envelope_tables import load_envelope
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.state import STATE_SIZE, S
+from flight.dynamics.trim import straight
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.simulate import simulate
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.rules.energy_rule import air_angle, predicted_energy
+from tests.logs.verdict.judging import of
+from tests.synthetic import make_scenario, make_setup
+
+AEROSONDE = load_aircraft("aerosonde")
+ROUTE = [[0, 0, 500], [0, 3000, 500], [2000, 5000, 800], [2000, 8000, 500]]
+
+
+def real_setup(**changes: object) -> FlightSetup:
+    return replace(make_setup(ROUTE, table=load_envelope(AEROSONDE)), **changes)  # type: ignore[arg-type]  # fields by name
+
+
+@pytest.mark.parametrize("airspeed", [20.0, 25.0, 29.0])
+@pytest.mark.parametrize("angle_deg", [-4.0, -2.0, 0.0, 2.0, 4.0])
+def test_the_parabola_through_three_trims_is_the_trims_between_them(airspeed: float, angle_deg: float) -> None:
+    fdm, state = Fdm(AEROSONDE), np.zeros(STATE_SIZE)
+    found = straight(fdm, airspeed, 700.0, math.radians(angle_deg))
+    assert found is not None
+    fdm.balance(found.vector())
+    fdm.read(state)
+    known = load_envelope(AEROSONDE).power(airspeed, 700.0, math.radians(angle_deg))
+    # Idle is less than full by 300 to 800 W.
+    assert known == pytest.approx(float(state[S.POWER]), abs=10.0)
+
+
+def test_prediction_and_flight_agree() -> None:
+    setup = real_setup()
+    predicted, peak = predicted_energy(route_demands(setup))
+    flown = simulate(setup, AEROSONDE)
+    item = of(judge_flight(setup, flown.track, flown.ended), "energy")
+    assert item.planned == pytest.approx(predicted, abs=1e-5)
+    assert item.flown is not None
+    assert predicted == pytest.approx(item.flown, rel=0.06)
+    assert peak == pytest.approx(float(np.percentile(flown.track.current, 95)), rel=0.1)
+    assert "by prediction" in item.reason
+
+
+def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:
+    predicted, _ = predicted_energy(route_demands(real_setup()))
+    for battery, ok in ((predicted / 0.8 * 1.01, True), (predicted / 0.8 * 0.99, False)):
+        item = of(judge_geometry(real_setup(battery=battery)), "energy")
+        assert item.ok is ok
+        assert item.limit == pytest.approx(0.8 * battery)
+        assert ("times as large" in item.suggestion) is not ok
+        assert "peak current" in item.reason
+
+
+def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() -> None:
+    calm, _ = predicted_energy(route_demands(real_setup()))
+    scenario = make_scenario(ROUTE, wind={"speed_mps": 8.0, "from_deg": 20.0})
+    against, _ = predicted_energy(route_demands(real_setup(scenario=scenario)))
+    assert against > 1.2 * calm
+    shape = route_demands(real_setup())
+    assert air_angle(shape, 1, 25.0, 650.0) == pytest.approx(float(shape.slopes[1]), abs=1e-3)
+
+
+def test_what_is_not_known_is_not_judged() -> None:
+    assert of(judge_geometry(make_setup(ROUTE)), "energy").ok is None
+    fast = replace(real_setup(), route=replace(real_setup().route, airspeed=np.full(3, 60.0)))
+    assert of(judge_geometry(fast), "energy").ok is None
+
+
+def test_an_aircraft_that_burns_fuel_has_no_current() -> None:
+    envelope = replace(load_envelope(AEROSONDE), volts=0.0)
+    for verdict in (
+        judge_geometry(real_setup(envelope=envelope)),
+        judge_flight(real_setup(envelope=envelope), simulate(real_setup(), AEROSONDE).track, "completed"),
+    ):
+        reason = of(verdict, "energy").reason
+        assert "of fuel heat used" in reason
+        assert "peak current" not in reason

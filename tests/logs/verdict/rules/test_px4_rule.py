@@ -1,0 +1,144 @@
+"""What PX4's feasibility checker refuses, found by the names of its checks."""
+
+import pytest
+
+from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_geometry
+from tests.flight.mission.test_loiter_circles import setup_of
+from tests.flight.mission.test_routing import wp
+
+GOOD = (wp(0, 500, command=22), wp(0, 1500), wp(1500, 1500))
+HOME_FAR = "36.5 -84.0 300"
+
+
+def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
+    """The finding of one check."""
+    verdict = judge_geometry(setup_of(*lines, home=home))
+    found = [item for item in verdict.findings if item.rule == "mission" and item.reason.endswith(f"(PX4 {check})")]
+    assert len(found) == 1, verdict.findings
+    assert not (verdict.flyable and found[0].ok is False)
+    return found[0]
+
+
+REFUSED = {
+    "gate": (
+        "checkDistancesBetweenWaypoints",
+        (*GOOD[:2], wp(0, 1500, command=4501), GOOD[2]),
+        3,
+        "distance between waypoint and gate too close",
+    ),
+    "unsupported": ("checkMissionItemValidity", (*GOOD, "2 5000 0 0 0 0 0 0 0"), 4, "unsupported command command 5000"),
+    "spline": ("checkMissionItemValidity", (*GOOD, wp(1500, 0, command=82)), 4, "NAV_SPLINE_WAYPOINT"),
+    "servo": (
+        "checkMissionItemValidity",
+        (*GOOD, "2 183 6 1500 0 0 0 0 0"),
+        4,
+        "actuator number 6 is out of bounds 0..5",
+    ),
+    "pwm": ("checkMissionItemValidity", (*GOOD, "2 183 5 2500 0 0 0 0 0"), 4, "actuator value 2500"),
+    "takeoff-low": ("checkTakeoff", (wp(0, 500, 10.9, command=22), *GOOD[1:]), 1, "takeoff altitude 10.9 m too low"),
+    "takeoff-late": ("checkTakeoff", (GOOD[1], GOOD[0], GOOD[2]), 2, "takeoff is not the first waypoint item"),
+    "two-land-starts": (
+        "checkFixedWingLanding",
+        (*GOOD, "2 189 0 0 0 0 0 0 0", "2 189 0 0 0 0 0 0 0", wp(1500, 0, 60), wp(0, 0, 0, command=21)),
+        5,
+        "more than one land start",
+    ),
+    "land-start-alone": ("checkFixedWingLanding", (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0)), 4, "invalid land start"),
+    "rtl-after-land-start": (
+        "checkFixedWingLanding",
+        (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0, 60), "2 20 0 0 0 0 0 0 0", wp(0, 0, 0, command=21)),
+        6,
+        "land start item before RTL item",
+    ),
+    "approach-below": (
+        "checkFixedWindLandApproach",
+        (*GOOD, wp(1500, 0, 20), wp(0, 0, 20, command=21)),
+        5,
+        "the approach waypoint must be above the landing point",
+    ),
+    # 150 m down over 1500 m: 5.7 degrees.
+    "too-steep": (
+        "checkFixedWindLandApproach",
+        (*GOOD, wp(1500, 0, 150), wp(0, 0, 0, command=21)),
+        5,
+        "the landing glide slope 5.7° is steeper than 5.0°",
+    ),
+    "inside-orbit": (
+        "checkFixedWindLandApproach",
+        (*GOOD, wp(200, 0, 60, command=31, p="1 250 0 0"), wp(0, 0, 0, command=21)),
+        5,
+        "outside the orbit radius",
+    ),
+    "approach-kind": (
+        "checkFixedWindLandApproach",
+        (*GOOD, wp(1500, 0, 60, command=18, p="1 0 150 0"), wp(0, 0, 0, command=21)),
+        5,
+        "unsupported landing approach entrance",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_px4_refuses(case: str) -> None:
+    check, lines, item, words = REFUSED[case]
+    finding = of(check, *lines)
+    assert finding.ok is False
+    assert finding.where == f"item {item}"
+    assert words in finding.reason
+
+
+def test_first_waypoint_too_far() -> None:
+    finding = of("checkDistanceToFirstWaypoint", wp(0, 500), wp(0, 1500), home=HOME_FAR)
+    assert finding.ok is False
+    assert "first waypoint too far away: 179" in finding.reason
+
+
+def test_a_good_landing_passes_every_check() -> None:
+    lines = (*GOOD, "2 189 0 0 0 0 0 0 0", wp(1500, 0, 100, command=31, p="1 150 0 0"), wp(0, 0, 0, command=21))
+    findings = [item for item in judge_geometry(setup_of(*lines)).findings if item.rule == "mission"]
+    assert len(findings) == 9
+    assert all(item.ok for item in findings), [item.reason for item in findings]
+
+
+def test_what_px4_only_remarks_on_does_not_fail() -> None:
+    assert of("checkMissionItemValidity", *GOOD, wp(1500, 0, command=18, p="1 0 150 0")).ok is None
+    assert of("checkMissionItemValidity", *GOOD, wp(1500, 0, frame=10)).ok is None
+    below = of("checkIfBelowHomeAltitude", *GOOD, wp(1500, 0, -5))
+    assert below.ok
+    assert "waypoint 4 below home" in below.reason
+    apart = of("checkDistancesBetweenWaypoints", *GOOD)
+    assert apart.ok
+    assert "MIS_DIST_WPS" in apart.reason
+
+
+def test_geofence() -> None:
+    """A square of 2 km around the origin, and a hole in it that the route's second place lies in."""
+    from dataclasses import replace
+
+    from flight.mission.items import MissionItem
+    from world.frames import to_geo
+
+    setup = setup_of(*GOOD)
+    origin = setup.scenario.origin
+
+    def fence(command: int, p1: float, *places: tuple[float, float]) -> tuple[MissionItem, ...]:
+        spots = [tuple(float(value) for value in to_geo(origin, *place)) for place in places]
+        return tuple(
+            MissionItem(k, command, 0, (p1, 0.0, 0.0, 0.0), lat, lon, 0.0) for k, (lat, lon) in enumerate(spots)
+        )
+
+    square = fence(5001, 4, (-2000, -2000), (2000, -2000), (2000, 2000), (-2000, 2000))
+    small = fence(5001, 4, (-1000, -1000), (1000, -1000), (1000, 1000), (-1000, 1000))
+    hole, ring = fence(5004, 300, (100, 1500)), fence(5003, 3000, (0, 0))
+    for fences, words in (
+        ((*square, *ring), None),
+        (small, "outside an inclusion polygon"),
+        ((*square, *hole), "inside an exclusion circle of 300 m"),
+        (fence(5003, 1000, (0, 0)), "outside an inclusion circle"),
+        (fence(5002, 3, (-100, 1400), (100, 1400), (0, 1700)), "inside an exclusion polygon"),
+    ):
+        fenced = replace(setup, mission=replace(setup.mission, fences=fences))
+        (finding,) = [item for item in judge_geometry(fenced).findings if "(PX4 checkGeofence)" in item.reason]
+        assert finding.ok == (words is None)
+        assert words is None or words in finding.reason

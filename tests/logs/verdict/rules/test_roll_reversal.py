@@ -1,0 +1,54 @@
+"""A leg between a left and a right turn holds the roll from one bank into the other, for planner and check alike."""
+
+import math
+
+import numpy as np
+import pytest
+
+from aircraft.path_limits import ROLL_TIME
+from flight.simulation.flight_setup import limits_of
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_demands import route_demands
+from planner.evaluation.certify import turn_needs
+from planner.evaluation.problem import make_problem
+from tests.logs.verdict.judging import of
+from tests.synthetic import bank_radius, make_scenario, make_setup
+
+
+def zigzag(turn_deg: float, run: float, *, same_way: bool, course_deg: float = 20.0) -> np.ndarray:
+    """Two turns of this angle with a leg of this length between them."""
+    turn = math.radians(turn_deg)
+    courses = math.radians(course_deg) + np.array([0.0, turn, 2.0 * turn if same_way else 0.0])
+    steps = np.array([1500.0, run, 1500.0])[:, None] * np.stack([np.sin(courses), np.cos(courses), 0.0 * courses], 1)
+    return np.array([0.0, 0.0, 500.0]) + np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+
+
+def test_calm_the_roll_takes_the_bank_limit_over_the_rate() -> None:
+    s_turn, same = (route_demands(make_setup(zigzag(60.0, 300.0, same_way=way))) for way in (False, True))
+    # 30 degrees into 30 degrees, less the 30 that any turn rolls in.
+    assert s_turn.reversal[1] == pytest.approx(25.0 * ROLL_TIME * math.radians(30.0), rel=1e-6)
+    assert same.reversal.tolist() == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("turn", [30.0, 60.0, 90.0, 120.0])
+@pytest.mark.parametrize("wind", [0.0, 10.0])
+@pytest.mark.parametrize("same_way", [True, False])
+def test_planner_and_check_need_the_same(turn: float, wind: float, same_way: bool) -> None:
+    for from_deg in (20.0, 110.0, 245.0):
+        points = zigzag(turn, 900.0, same_way=same_way)
+        scenario = make_scenario(points, wind={"speed_mps": wind, "from_deg": from_deg})
+        setup = make_setup(points, scenario=scenario)
+        shape = route_demands(setup)
+        needs, rolls = turn_needs(make_problem(scenario, limits_of(setup)).certified, points)
+        np.testing.assert_allclose(needs, shape.after[:-1] + shape.before[1:], atol=1e-6)
+        np.testing.assert_allclose(rolls, shape.reversal, atol=1e-6)
+        assert (rolls.max() == 0.0) or not same_way
+
+
+def test_a_leg_a_little_short_of_the_roll_fails_and_one_longer_passes() -> None:
+    arcs = 2.0 * bank_radius() * math.tan(math.radians(30.0))
+    roll = 25.0 * ROLL_TIME * math.radians(30.0)
+    for spare, ok in ((-1.0, False), (1.0, True)):
+        setup = make_setup(zigzag(60.0, arcs + roll + spare, same_way=False))
+        assert of(judge_geometry(setup), "turn", "waypoint 1").ok is ok
+    assert judge_geometry(make_setup(zigzag(60.0, arcs + 1.0, same_way=True))).flyable

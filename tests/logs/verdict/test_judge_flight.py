@@ -1,0 +1,205 @@
+"""The verdict as a whole, on synthetic flights whose numbers are known, and on tracks that are none."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.findings import RULES, verdict_json
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.track_alignment import lay_track
+from tests.logs.verdict.judging import ROUTE, failing, judge, of
+from tests.synthetic import (
+    copied,
+    edited,
+    envelope,
+    fly_path,
+    make_setup,
+)
+
+
+@pytest.fixture(scope="module")
+def setup() -> FlightSetup:
+    return make_setup(ROUTE)
+
+
+@pytest.fixture(scope="module")
+def track(setup: FlightSetup) -> Track:
+    return fly_path(setup)
+
+
+def test_a_clean_flight_is_flyable_and_every_rule_speaks(setup: FlightSetup, track: Track) -> None:
+    verdict = judge(setup, track)
+    assert verdict.flyable
+    assert verdict.complete
+    assert verdict.summary.split("\n")[:2] == ["flyable", f"Start: {setup.route.started}"]
+    assert {item.rule for item in verdict.findings} == set(RULES) - {"mission", "loiter"}
+    assert all(item.ok for item in verdict.findings)
+    assert len([item for item in verdict.findings if item.rule == "turn"]) == 3
+    assert len([item for item in verdict.findings if item.rule == "slope"]) == 4
+
+
+def test_flown_angles_and_slopes_are_the_planned_ones(setup: FlightSetup, track: Track) -> None:
+    verdict = judge(setup, track)
+    for item in verdict.findings:
+        if item.rule == "turn":
+            assert item.flown == pytest.approx(item.planned, abs=0.01)
+        if item.rule == "slope":
+            assert item.flown == pytest.approx(item.planned, abs=0.05)
+    assert of(verdict, "turn", "waypoint 3").planned == pytest.approx(math.degrees(math.atan2(2000, 500)))
+    assert of(verdict, "energy").flown == pytest.approx(300.0 * track.time[-1] / 3600.0, rel=1e-6)
+
+
+def test_wind_does_not_bend_what_is_measured() -> None:
+    setup = make_setup(ROUTE, wind={"speed_mps": 10.0, "from_deg": 220.0})
+    # The turn's radius is of the ground speed downwind.
+    shape = route_demands(setup)
+    track = fly_path(setup, radius=[float(r) for r in shape.radius[1:-1]])
+    verdict = judge(setup, track)
+    assert verdict.flyable, verdict.summary
+    for item in verdict.findings:
+        if item.rule == "turn":
+            assert item.flown == pytest.approx(item.planned, abs=0.02)
+        if item.rule == "slope":
+            assert item.flown == pytest.approx(item.planned, abs=0.1)
+
+
+@pytest.mark.parametrize("column", ["leg", "cross_track", "height_error", "clearance", "speed_command", "commands"])
+def test_what_guidance_says_of_itself_changes_nothing(setup: FlightSetup, track: Track, column: str) -> None:
+    rubbish = np.full_like(getattr(track, column), 77)
+    assert verdict_json(judge(setup, edited(track, **{column: rubbish}))) == verdict_json(judge(setup, track))
+
+
+@pytest.mark.parametrize(
+    ("shift", "expected"),
+    [
+        ((40.0, 0.0, 0.0), ("waypoint", "waypoint 0")),
+        ((0.0, 0.0, -290.0), ("clearance", "leg 0")),
+        ((0.0, 0.0, 5000.0), ("bounds", "flight")),
+    ],
+)
+def test_moving_the_track_changes_the_verdict(
+    setup: FlightSetup, track: Track, shift: tuple[float, float, float], expected: tuple[str, str]
+) -> None:
+    verdict = judge(setup, edited(track, position=track.position + np.array(shift)))
+    assert not verdict.flyable
+    assert expected in failing(verdict)
+
+
+def test_one_moved_row_is_a_contradiction(setup: FlightSetup, track: Track) -> None:
+    position = track.position.copy()
+    position[5000, 0] += 3.0
+    verdict = judge(setup, edited(track, position=position))
+    assert not verdict.complete
+    assert "contradict" in of(verdict, "completion").reason
+
+
+# Any track at all
+
+
+SPOILERS: list[Callable[[dict[str, Any]], None]] = [
+    lambda c: c["position"].__setitem__(slice(100, 200), np.nan),
+    lambda c: c["position"].__setitem__(slice(None), np.nan),
+    lambda c: c["position"].__setitem__(slice(50, None), 1e300),
+    lambda c: c["time"].__setitem__(slice(None), 0.0),
+    lambda c: c["time"].__imul__(-1.0),
+    lambda c: c["time"].__setitem__(slice(10, None), np.inf),
+    lambda c: c["airspeed"].__setitem__(slice(None), np.inf),
+    lambda c: c["attitude"].__setitem__(slice(None), np.nan),
+    lambda c: c["velocity"].__setitem__(slice(None), -1e30),
+    lambda c: c["energy"].__setitem__(slice(None), np.nan),
+    lambda c: c["position"].__setitem__(slice(None), 0.0),
+    lambda c: c["leg"].__setitem__(slice(None), -5),
+]
+
+
+@pytest.mark.parametrize("spoil", SPOILERS)
+def test_garbage_is_judged_and_never_flyable(
+    setup: FlightSetup, track: Track, spoil: Callable[[dict[str, Any]], None]
+) -> None:
+    columns = copied(track)
+    spoil(columns)
+    verdict = judge(setup, Track(**columns))
+    assert verdict.flyable is (spoil is SPOILERS[-1])
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 3, 10, 70])
+def test_very_short_tracks(setup: FlightSetup, track: Track, rows: int) -> None:
+    verdict = judge(setup, track.rows(0, rows))
+    assert not verdict.complete
+    assert not verdict.flyable
+
+
+def test_two_rows_far_apart_say_nothing_of_a_slope() -> None:
+    setup = make_setup(ROUTE)
+    columns = copied(fly_path(setup, rate=5.0))
+    columns["time"][:211] = 0.0
+    # One row at 0 s is left of the first leg, and one at 42 s.
+    judge(setup, Track(**columns).rows(0, 212))
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.data())
+def test_random_cuts_and_holes_never_raise(data: st.DataObject) -> None:
+    setup = make_setup(ROUTE)
+    track = fly_path(setup, rate=5.0)
+    columns = copied(track)
+    for _ in range(data.draw(st.integers(0, 4))):
+        name = data.draw(
+            st.sampled_from(["time", "position", "velocity", "attitude", "airspeed", "controls", "current"])
+        )
+        start = data.draw(st.integers(0, len(track) - 1))
+        value = data.draw(st.sampled_from([math.nan, math.inf, -math.inf, 0.0, 1e30, -3.0]))
+        columns[name][start : start + data.draw(st.integers(1, 400))] = value
+    first = data.draw(st.integers(0, len(track)))
+    judge(setup, Track(**columns).rows(first, data.draw(st.integers(first, len(track)))))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(-80.0, 80.0), st.floats(500.0, 2500.0), st.floats(-6.0, 10.0)), min_size=1, max_size=6
+    ),
+    st.floats(0.0, 360.0),
+)
+def test_routes_inside_every_limit_are_flyable_on_both_levels(
+    legs: list[tuple[float, float, float]], course: float
+) -> None:
+    points = [[0.0, 0.0, 1500.0]]
+    heading = math.radians(course)
+    for turn, run, slope in [(0.0, 800.0, 0.0), *legs]:
+        heading += math.radians(turn)
+        east, north, up = points[-1]
+        climb = run * math.tan(math.radians(slope))
+        points.append([east + run * math.sin(heading), north + run * math.cos(heading), up + climb])
+    setup = make_setup(points)
+    verdict = judge(setup, fly_path(setup, rate=20.0, blend=60.0))
+    assert verdict.flyable, verdict.summary
+    assert judge_geometry(setup).flyable
+
+
+def test_routes_that_come_back_are_laid_leg_by_leg() -> None:
+    # Three rounds of one square: each waypoint comes again, and each leg must get its own round's rows.
+    square = [[0, 0], [0, 1500], [1500, 1500], [1500, 0]]
+    points = [[e, n, 300.0 + 10 * k] for k, (e, n) in enumerate(square * 3)]
+    setup = make_setup(points)
+    track = fly_path(setup, rate=20.0)
+    assert judge(setup, track).flyable
+    flown = lay_track(route_demands(setup), track)
+    assert flown is not None
+    assert (np.diff(flown.rows) > 800).all()
+    assert flown.distance.max() < 3.0
+
+
+def test_a_narrower_envelope_is_not_the_scenario(setup: FlightSetup) -> None:
+    weak = replace(setup, envelope=envelope(climb_deg=1.5))
+    item = of(judge(weak, fly_path(weak)), "slope", "leg 1")
+    assert (item.ok, item.limit_source) == (False, "aircraft")

@@ -1,0 +1,54 @@
+"""Missions beyond one limit, and inside all of them, by 20 % and by 10 %: what both levels say of each.
+
+100 and 100 of either with PLANFLY_SOAK=1, the first few otherwise.
+"""
+
+import os
+
+import pytest
+
+from flight.simulation.simulate import simulate
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from tests.missions import KINDS, MadeMission, feasible, infeasible
+
+SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+MARGINS = (0.2, 0.1) if SOAK else (0.2,)
+BEYOND = range(100) if SOAK else range(2 * len(KINDS))
+INSIDE = range(100) if SOAK else range(8)
+
+
+def levels(made: MadeMission) -> dict[str, Verdict]:
+    """Verdicts by geometry, of the flight, and of the flight without the aircraft's envelope."""
+    flown = simulate(made.setup, made.vehicle.aircraft)
+    return {
+        "geometric": judge_geometry(made.setup),
+        "flown": judge_flight(made.setup, flown.track, flown.ended),
+        "flown alone": judge_flight(made.setup, flown.track, flown.ended, envelope=False),
+    }
+
+
+@pytest.mark.parametrize("margin", MARGINS)
+@pytest.mark.parametrize("number", BEYOND)
+def test_beyond_one_limit_is_not_flyable_and_the_rule_is_named(number: int, margin: float) -> None:
+    made = infeasible(number, margin)
+    for level, verdict in levels(made).items():
+        named = [item for item in verdict.findings if item.ok is False and item.rule == made.rule]
+        assert not verdict.flyable, (made.kind, level)
+        assert {item.where.split(" (")[0] for item in named} & set(made.where), (made.kind, level, verdict.summary)
+
+
+@pytest.mark.parametrize("margin", MARGINS)
+@pytest.mark.parametrize("number", INSIDE)
+def test_inside_every_limit_is_flyable(number: int, margin: float) -> None:
+    for level, verdict in levels(feasible(number, margin)).items():
+        assert verdict.flyable, (level, verdict.summary)
+
+
+def test_the_missions_are_what_they_say() -> None:
+    """Every kind is there, each from its number alone."""
+    kinds = [infeasible(number, 0.2).kind for number in range(len(KINDS))]
+    assert kinds == list(KINDS)
+    one, two = infeasible(3, 0.2), infeasible(3, 0.2)
+    assert (one.setup.route.waypoints == two.setup.route.waypoints).all()
+    assert not feasible(3, 0.2).kind

@@ -1,0 +1,108 @@
+"""`planfly aircraft`: its tables, its pictures, and a second and a third aircraft flown by the same commands."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import planfly
+from aircraft.catalog import load_aircraft
+from planfly.cli import main
+
+ROOT = Path(__file__).parents[3]
+PICTURES = ["envelope.png", "steps.png", "trims.png"]
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+
+
+def test_without_a_name_it_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["aerosonde", "c172x"]
+
+
+def _rows(text: str, title: str) -> list[list[str]]:
+    """The rows of the table whose heading begins so, without its column heads."""
+    block = next(part for part in text.split("\n\n") if part.startswith(title))
+    return [line.split() for line in block.splitlines()[1:] if line.split()[0].replace(".", "").isdigit()]
+
+
+def test_the_aerosonde(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft", "aerosonde", "--out", "shown"]) == 0
+    text = capsys.readouterr().out
+    assert sorted(path.name for path in Path("shown").iterdir()) == PICTURES
+    for name in PICTURES:
+        assert (tmp_path / "shown" / name).read_bytes().startswith(b"\x89PNG")
+    assert "mass     11 kg" in text
+    modes = {line.split("  ")[1].strip(): line for line in text.splitlines() if "to half" in line or "DOUBLE" in line}
+    assert sorted(modes) == ["Dutch roll", "phugoid", "roll", "short period", "spiral"]
+    assert "DOUBLE" in modes["spiral"]
+    envelope = {float(row[0]): row for row in _rows(text, "steepest climb / descent to the air")}
+    # At 24 m/s and sea level: climb 16.0, descent 7.5.
+    assert [float(envelope[24.0][k]) for k in (1, 3)] == pytest.approx([16.0, 7.5], abs=0.2)
+    turns = {float(row[0]): row for row in _rows(text, "turn radius")}
+    # 25^2 / (g tan 30) = 110.4 m.
+    assert float(turns[25.0][3]) == pytest.approx(110.0, abs=1.0)
+    legs = {float(row[0]): row for row in _rows(text, "shortest leg")}
+    # Two turns of 60 degrees use 2 R tan 30 = 127.5 m; the same two of 90 degrees 2 R = 221 m.
+    assert [float(legs[25.0][k]) for k in (3, 4)] == pytest.approx([127.5, 220.8], abs=1.0)
+
+
+def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft", "aerosonde", "--motor-braking"]) == 0
+    rows = _rows(capsys.readouterr().out, "steepest climb / descent to the air")
+    # Without, it is 7.5 degrees.
+    assert float(next(row for row in rows if float(row[0]) == 24.0)[3]) > 12.5
+    assert sorted(path.name for path in Path("runs/aircraft-aerosonde").iterdir()) == PICTURES
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        (["zeppelin"], "no aircraft called 'zeppelin'"),
+        (["./nowhere"], "nowhere.toml: No such file"),
+        (["c172x", "--motor-braking"], "motor/braking is needed and not defined"),
+        (["aerosonde", "--out", "full"], "exists and is not empty"),
+    ],
+)
+def test_bad_input(argv: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "full").mkdir()
+    (tmp_path / "full" / "mine.txt").write_text("keep", encoding="utf-8")
+    assert main(["aircraft", *argv]) == 2
+    error = capsys.readouterr().err.splitlines()
+    assert said in error[-1]
+    assert error[-1].startswith("planfly: ")
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["full", "mine.txt"]
+
+
+def test_the_cessna_flies_its_mission() -> None:
+    result = planfly.plan_then_fly(str(ROOT / "examples" / "c172x.toml"), seed=1)
+    assert result.plan.safe
+    assert result.track is not None
+    assert result.verdict.flyable, result.verdict.summary
+    assert float(result.track.airspeed.min()) > 45.0
+    assert float(result.track.airspeed.max()) < 55.0
+    # A quarter of a megawatt of heat, for seven minutes.
+    assert 10_000.0 < float(result.track.energy[-1]) < 60_000.0
+
+
+def test_a_folder_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "fleet" / "mine"
+    shutil.copytree(load_aircraft("aerosonde").folder, folder)
+    for old in folder.glob("aerosonde.*"):
+        old.rename(folder / f"mine{old.suffix}")
+    (tmp_path / "fleet" / "s.toml").write_text(
+        'name = "own"\n[terrain]\nkind = "flat"\namsl_m = 100\n[area]\neast_m = [0, 5000]\nnorth_m = [0, 5000]\n'
+        "ceiling_amsl_m = 900\n[start]\neast_m = 500\nnorth_m = 500\namsl_m = 300\n[destination]\neast_m = 3500\n"
+        'north_m = 3000\namsl_m = 320\n[planner]\npopulation = 20\ngenerations = 5\n[flight]\naircraft = "./mine"\n',
+        encoding="utf-8",
+    )
+    # The folder counts from the scenario's file, not from where the command runs.
+    assert main(["run", "fleet/s.toml", "--out", "out"]) == 0
+    assert capsys.readouterr().out.startswith("flyable\n")
+    # The log and the plan are enough to go on from.
+    assert main(["check", "out/flight.mcap"]) == 0
+    assert main(["fly", "out/plan.json", "--log", "again.mcap"]) == 0

@@ -1,0 +1,128 @@
+"""``planfly export``, and the options of ``fly`` and ``check``, from the command line."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import gpxpy
+import numpy as np
+import pytest
+
+from flight.mission_files.formats import read_mission
+from logs.recording.reader import read_log
+from planfly.cli import main
+from planner.plan import plan_json
+from tests.flight.mission.test_routing import a_plan
+
+MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
+KML = "{http://www.opengis.net/kml/2.2}"
+
+
+@pytest.fixture(scope="module")
+def plan_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("plan") / "plan.json"
+    file.write_text(plan_json(a_plan([(9500.0, -5000.0, 700.0), (9000.0, -3000.0, 750.0), (6000.0, -2000.0, 800.0)])))
+    return file
+
+
+@pytest.fixture(scope="module")
+def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("log") / "flight.mcap"
+    assert main(["fly", str(MISSIONS / "by_hand.waypoints"), "--log", str(file)]) == 0
+    return file
+
+
+def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    targets = [tmp_path / f"a.{kind}" for kind in ("waypoints", "plan", "fence", "rally", "kml", "gpx")]
+    assert main(["export", str(plan_file), *map(str, targets)]) == 0
+    said = capsys.readouterr()
+    assert "a fence has no height" in said.err
+    assert said.out.count("\n") == len(targets)
+    waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
+    assert waypoints.items == plan.items
+    assert plan.fences == fence.fences
+    assert plan.rally == rally.rally
+    assert len(fence.fences) > 4
+    assert len(rally.rally) == 2
+    # What is written is refused the second time.
+    assert main(["export", str(plan_file), str(targets[2])]) == 2
+
+
+def places(file: Path) -> list[list[tuple[float, float, float]]]:
+    """Points of each LineString of a KML file: longitude, latitude, height."""
+    lines = ElementTree.parse(file).getroot().iter(f"{KML}LineString")
+    texts = [line.findtext(f"{KML}coordinates") or "" for line in lines]
+    return [[(float(a), float(b), float(c)) for a, b, c in (p.split(",") for p in text.split())] for text in texts]
+
+
+def test_maps_of_a_log(log_file: Path, tmp_path: Path) -> None:
+    assert main(["export", str(log_file), str(tmp_path / "f.kml"), str(tmp_path / "f.gpx")]) == 0
+    log = read_log(log_file)
+    plan, flown = places(tmp_path / "f.kml")
+    items = [item for item in log.setup.mission.items if item.has_position]
+    wanted = np.array([(item.lon_deg, item.lat_deg) for item in items])
+    at = [k for k in range(len(items)) if k == 0 or items[k].x != items[k - 1].x or items[k].y != items[k - 1].y]
+    assert np.array(plan)[:, :2] == pytest.approx(wanted[at], abs=2e-8)
+    assert [up for _, _, up in plan] == pytest.approx(list(log.setup.route.waypoints[:, 2]), abs=1e-3)
+    assert len(flown) == pytest.approx(2.0 * log.end_time, abs=3)
+    assert flown[-1][2] == pytest.approx(log.track.position[-1, 2], abs=1e-3)
+    gpx = gpxpy.parse((tmp_path / "f.gpx").read_text())
+    assert [(p.longitude, p.latitude, p.elevation) for p in gpx.routes[0].points] == plan
+    points = gpx.tracks[0].segments[0].points
+    assert [(p.longitude, p.latitude, p.elevation) for p in points] == flown
+    assert gpx.routes[0].points[0].name == "0 (item 1)"
+
+
+def test_a_mission_from_form_to_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = str(MISSIONS / "qgc_takeoff.plan")
+    targets = [tmp_path / name for name in ("a.waypoints", "a.fence", "a.rally", "a.plan")]
+    assert main(["export", source, *map(str, targets)]) == 0
+    original = read_mission(MISSIONS / "qgc_takeoff.plan")
+    assert read_mission(targets[3]) == original
+    assert read_mission(targets[1]).fences == original.fences
+    assert read_mission(targets[2]).rally == original.rally
+    capsys.readouterr()
+    assert (
+        main(["export", str(MISSIONS / "qgc.waypoints"), str(tmp_path / "b.waypoints"), str(tmp_path / "b.fence")]) == 2
+    )
+    assert "no fence items to write" in capsys.readouterr().err
+    assert not (tmp_path / "b.waypoints").exists()
+
+
+@pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])
+def test_unknown_suffixes(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / name)]) == 2
+    assert "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx" in capsys.readouterr().err
+    assert not (tmp_path / "a.plan").exists()
+
+
+def test_aircraft_and_airspeed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = str(MISSIONS / "by_hand.waypoints")
+    log = tmp_path / "f.mcap"
+    assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
+    assert (read_log(log).setup.route.airspeed == 21.0).all()
+    capsys.readouterr()
+    for options, words in (
+        (["--aircraft", "boeing"], "flight.aircraft: no aircraft called 'boeing'"),
+        (["--airspeed", "70"], "airspeed_mps: 70"),
+        (["--airspeed", "28"], None),
+        (["--airspeed", "-3"], "a number above 0"),
+    ):
+        try:
+            code = main(["check", name, *options])
+        except SystemExit as stop:
+            code = int(str(stop.code))
+        said = capsys.readouterr().err
+        assert (code == 2) == (words is not None)
+        assert words is None or words in said
+    assert main(["check", str(log), "--airspeed", "20"]) == 2
+    assert "--airspeed: a log is judged" in capsys.readouterr().err
+
+
+def test_check_names_px4s_rules(tmp_path: Path) -> None:
+    target = tmp_path / "v.json"
+    assert main(["check", str(MISSIONS / "mission_planner_land.waypoints"), "--json", str(target)]) == 4
+    findings = json.loads(target.read_text())["findings"]
+    reasons = [finding["reason"] for finding in findings if finding["rule"] == "mission" and finding["ok"] is False]
+    assert any("(PX4 checkFixedWindLandApproach)" in reason for reason in reasons)
+    assert any("(PX4 checkMissionItemValidity)" in reason for reason in reasons)

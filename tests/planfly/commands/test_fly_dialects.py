@@ -1,0 +1,82 @@
+"""Mission files as QGroundControl, Mission Planner and MAVProxy write them, flown from the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from logs.recording.reader import read_log
+from planfly.cli import main
+
+MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
+LEGS = {
+    "by_hand.waypoints": 3,
+    "endless.waypoints": 7,
+    "mavproxy.txt": 21,
+    "mavproxy_terrain.txt": 3,
+    "mission_planner.waypoints": 10,
+    "mission_planner_land.waypoints": 5,
+    "qgc.waypoints": 14,
+    "qgc_amsl.plan": 4,
+    "qgc_takeoff.plan": 7,
+}
+ABOVE_TERRAIN = {"mavproxy_terrain.txt"}
+
+
+def test_every_sample_is_listed() -> None:
+    assert {path.name for path in MISSIONS.iterdir() if path.name != ".gitattributes"} == set(LEGS)
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_it_flies_over_terrain(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "flight.mcap"
+    code = main(["fly", str(MISSIONS / name), "--terrain", "jacksboro", "--log", str(log)])
+    out = capsys.readouterr().out
+    assert code == 0, out
+    assert out.splitlines()[0].startswith("flyable")
+    assert "terrain not judged" not in out.splitlines()[0]
+    flown = read_log(log)
+    assert flown.setup.route.legs == LEGS[name]
+    assert set(flown.track.leg) == set(range(LEGS[name]))
+
+
+@pytest.mark.parametrize("name", sorted(set(LEGS) - ABOVE_TERRAIN))
+def test_without_terrain_it_says_so(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    target = tmp_path / "verdict.json"
+    log = tmp_path / "flight.mcap"
+    assert main(["fly", str(MISSIONS / name), "--log", str(log)]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "flyable; terrain not judged"
+    assert main(["check", str(log), "--json", str(target)]) == 0
+    findings = json.loads(target.read_text(encoding="utf-8"))["findings"]
+    for rule in ("clearance", "threat"):
+        mine = [finding for finding in findings if finding["rule"] == rule]
+        assert mine
+        assert all(finding["ok"] is None and finding["reason"] for finding in mine)
+
+
+@pytest.mark.parametrize("name", sorted(ABOVE_TERRAIN))
+def test_heights_above_terrain_need_terrain(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["fly", str(MISSIONS / name), "--log", str(tmp_path / "f.mcap")]) == 2
+    assert "terrain" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_the_geometric_level_agrees(name: str, capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["check", str(MISSIONS / name), "--terrain", "jacksboro"])
+    out = capsys.readouterr().out
+    # A spline, and a landing that PX4 finds too steep: flown all the same, by ArduPlane.
+    assert code == (4 if name == "mission_planner_land.waypoints" else 0), out
+    assert all("  failed  mission " in line for line in out.splitlines() if line.startswith("  failed"))
+
+
+def test_wind_turns_a_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A wind that leaves too little room or climb is told apart from calm air."""
+    name = str(MISSIONS / "qgc.waypoints")
+    assert main(["fly", name, "--terrain", "jacksboro", "--log", str(tmp_path / "a.mcap")]) == 0
+    windy = ["--wind", "9,250", "--turbulence", "moderate", "--seed", "4"]
+    code = main(["fly", name, "--terrain", "jacksboro", "--log", str(tmp_path / "b.mcap"), *windy])
+    calm, wind = read_log(tmp_path / "a.mcap"), read_log(tmp_path / "b.mcap")
+    assert code in (0, 4)
+    assert wind.setup.scenario.wind.speed == 9.0
+    assert wind.track.wind.std() > 0.3 > calm.track.wind.std()
+    assert len(wind.track) != len(calm.track)

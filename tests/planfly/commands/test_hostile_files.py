@@ -1,0 +1,150 @@
+"""Hostile files, each met by a process of its own: refused in a second and 200 MiB, nothing written or fetched."""
+
+import json
+import os
+import struct
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rasterio
+import zstandard
+from rasterio.transform import Affine
+
+from tests.logs.conftest import make_setup, make_track, record
+
+ROOT = Path(__file__).parents[3]
+MAGIC = b"\x89MCAP0\r\n"
+# Runs one command under the limits; imports stand before them, since it is the file that is limited, not Python.
+CHILD = """
+import json, resource, sys, time
+import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.dispatch, planfly.commands.log_commands
+import planfly.open_mission, world.raster
+from planfly.cli import main
+def kib(name):
+    with open("/proc/self/status") as file:
+        return next(int(line.split()[1]) for line in file if line.startswith(name))
+before = kib("VmSize:")
+resource.setrlimit(resource.RLIMIT_AS, ((before + 200 * 1024) * 1024,) * 2)
+spent = time.process_time()
+code = main(sys.argv[1:])
+print(json.dumps({"code": code, "seconds": time.process_time() - spent}))
+"""
+
+
+def judge(folder: Path, *argv: str) -> tuple[int, float, str]:
+    """Run planfly in a folder: exit code, seconds of work, what it said on standard error."""
+    before = {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")}
+    result = subprocess.run(
+        [sys.executable, "-c", CHILD, *argv], cwd=folder, capture_output=True, text=True, check=False, timeout=120,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert result.returncode == 0, result.stderr[-2000:]
+    assert {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")} == before, "a file was written"
+    told = json.loads(result.stdout.splitlines()[-1])
+    return told["code"], told["seconds"], result.stderr
+
+
+def mcap_record(opcode: int, content: bytes) -> bytes:
+    return struct.pack("<BQ", opcode, len(content)) + content
+
+
+def bomb() -> bytes:
+    """A chunk of some 33 kB that is 1 GiB of zeros."""
+    compressor = zstandard.ZstdCompressor(level=19).compressobj(size=2**30)
+    data = b"".join(compressor.compress(bytes(2**22)) for _ in range(256)) + compressor.flush()
+    head = struct.pack("<QQQI", 0, 0, 2**30, 1) + struct.pack("<I", 4) + b"zstd" + struct.pack("<Q", len(data))
+    return MAGIC + mcap_record(1, bytes(8)) + mcap_record(6, head + data)
+
+
+def giant() -> bytes:
+    """A record that says it is 4 GiB long."""
+    return MAGIC + mcap_record(1, bytes(8)) + struct.pack("<BQ", 6, 2**32) + bytes(1000)
+
+
+def climber() -> bytes:
+    """An attachment whose name leads out of any folder."""
+    name, data = b"../../x", b"#!/bin/sh\n"
+    content = (
+        bytes(16) + struct.pack("<I", len(name)) + name + struct.pack("<I", 0) + struct.pack("<Q", len(data)) + data
+    )
+    return MAGIC + mcap_record(1, bytes(8)) + mcap_record(9, content + struct.pack("<I", zlib.crc32(content)))
+
+
+@pytest.mark.parametrize(
+    ("make", "command"),
+    [(bomb, "check"), (bomb, "report"), (giant, "check"), (giant, "replay"), (climber, "check"), (climber, "recover")],
+)
+def test_hostile_logs(make: Callable[[], bytes], command: str, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    (folder / "x.mcap").write_bytes(make())
+    code, seconds, said = judge(folder, command, "x.mcap")
+    assert code == 2
+    assert seconds < 1.0
+    assert len(said.strip().splitlines()) == 1
+    assert said.startswith("planfly: x.mcap: ")
+
+
+def test_an_attachment_with_a_climbing_name_in_a_whole_log(tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    log = record(tmp_path / "good.mcap", make_setup(), make_track(2.0)).read_bytes()
+    # Before the first attachment, so that the rest is a log like any other; its data CRC no longer holds.
+    header = len(MAGIC) + 9 + struct.unpack_from("<Q", log, len(MAGIC) + 1)[0]
+    evil = climber()[len(MAGIC) + 17 :]
+    (folder / "x.mcap").write_bytes(log[:header] + evil + log[header:])
+    code, seconds, said = judge(folder, "check", "x.mcap")
+    assert code == 3
+    assert seconds < 1.0
+    assert "incomplete" in said
+
+
+def sparse_tiff(path: Path, side: int, **blocks: Any) -> None:
+    """A GeoTIFF without a single block of data, of this many pixels a side."""
+    profile = {"driver": "GTiff", "width": side, "height": side, "count": 1, "dtype": "float32", "crs": "EPSG:4326"}
+    transform = Affine(1e-4, 0, 8.0, 0, -1e-4, 46.1)
+    profile |= blocks or {"tiled": True}
+    with rasterio.open(path, "w", transform=transform, sparse_ok=True, bigtiff="YES", **profile):
+        pass
+
+
+def vrt(path: Path) -> None:
+    path.write_text(
+        '<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1"><SimpleSource>'
+        "<SourceFilename>/etc/passwd</SourceFilename></SimpleSource></VRTRasterBand></VRTDataset>",
+        encoding="utf-8",
+    )
+
+
+MISSION = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.05\t8.05\t500\t1\n" + "".join(
+    f"{k}\t0\t0\t16\t0\t0\t0\t0\t{46.05 + 0.01 * k:.3f}\t8.05\t700\t1\n" for k in (1, 2)
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "make"),
+    [
+        ("bomb.tif", lambda path: sparse_tiff(path, 200_000)),
+        ("block.tif", lambda path: sparse_tiff(path, 30_000, blockysize=30_000, compress="deflate")),
+        ("other.tif", vrt),
+        ("other.vrt", vrt),
+        ("http://127.0.0.1:9/x.tif", None),
+        ("/vsicurl/http://127.0.0.1:9/x.tif", None),
+    ],
+)
+def test_hostile_terrain(name: str, make: Callable[[Path], None] | None, tmp_path: Path) -> None:
+    folder = tmp_path / "a" / "b"
+    folder.mkdir(parents=True)
+    (folder / "m.waypoints").write_text(MISSION, encoding="utf-8")
+    if make is not None:
+        make(folder / name)
+    code, seconds, said = judge(folder, "check", "m.waypoints", "--terrain", name)
+    assert code == 2, said
+    assert seconds < 1.0
+    assert name in said
+    assert len([line for line in said.strip().splitlines() if not line.startswith("warning: ")]) == 1

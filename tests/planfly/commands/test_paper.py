@@ -1,0 +1,128 @@
+"""``planfly paper``: tables and figures of the paper's experiment."""
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planfly.cli import main
+from planfly.commands.paper import PaperRun, exposure_probability, problem_name, run_section, table
+from planfly.commands.paper_files import file_names, table_text
+from planfly.terminal.targets import prepare_folder
+from tests.planner.conftest import small_scenario
+from world.scenario import load_scenario
+
+STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """One problem, two seeds, one process."""
+    made = tmp_path_factory.mktemp("paper") / "out"
+    assert main(["paper", "--problems", "7", "--runs", "2", "--jobs", "1", "--out", str(made)]) == 0
+    return made
+
+
+def test_every_file_is_there_and_the_table_agrees_with_the_runs(folder: Path) -> None:
+    assert sorted(path.name for path in folder.iterdir()) == sorted(file_names([7]))
+    assert all(path.read_bytes().startswith(b"\x89PNG") for path in folder.glob("*.png"))
+    data = json.loads((folder / "runs.json").read_text(encoding="utf-8"))
+    assert [row["algorithm"] for row in data["table"]] == ["umda", "umda-cartesian", "umda-polar"]
+    for row in data["table"]:
+        mine = [run for run in data["runs"] if run["algorithm"] == row["algorithm"]]
+        assert [run["seed"] for run in mine] == [1, 2]
+        safe = [run["length_ratio"] for run in mine if run["safe"]]
+        assert row["safe"] == len(safe)
+        assert row["length_worst"] == (max(safe) if safe else None)
+        assert row["kill_worst"] == max(run["kill_exposure"] for run in mine)
+        for run in mine:
+            clean = not any(value for key, value in run.items() if key.startswith("violations_"))
+            assert run["safe"] == (clean and run["kill_exposure"] == 0)
+            assert (run["kill_probability"] > 0) == (run["kill_exposure"] > 0)
+            assert 0 <= run["kill_probability"] <= 1
+            assert run["evaluations"] == 120 + 100 * 60
+            assert np.shape(run["waypoints_east_north_amsl_m"]) == (10, 3)
+    with (folder / "runs.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["length_ratio"]) for row in rows] == [run["length_ratio"] for run in data["runs"]]
+
+
+def test_same_bytes_whatever_the_number_of_processes(folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "again"
+    assert main(["paper", "--problems", "7", "--runs", "2", "--jobs", "3", "--out", str(out)]) == 0
+    for name in STABLE:
+        assert (out / name).read_bytes() == (folder / name).read_bytes(), name
+
+
+def test_a_named_folder_that_holds_anything_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["paper", "--problems", "7", "--out", str(folder)]) == 2
+    assert "--overwrite" in capsys.readouterr().err
+
+
+def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
+    for name in ("mine.txt", "paths-60.png", "table.csv"):
+        (tmp_path / name).write_text("old", encoding="utf-8")
+    prepare_folder(tmp_path, tuple(file_names([7, 60])))
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--problems", "8"], "7,15,30,60"),
+        (["--problems", ""], "7,15,30,60"),
+        (["--runs", "0"], "1 to 1,000"),
+        (["--runs", "2.5"], "1 to 1,000"),
+        (["--jobs", "-1"], "1 to 1,000"),
+    ],
+)
+def test_bad_options_get_one_line(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main(["paper", *options])
+    assert stopped.value.code == 2
+    line = capsys.readouterr().err
+    assert said in line
+    assert line.count("\n") == 1
+
+
+def test_an_unknown_algorithm_is_refused_before_anything_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["paper", "--algorithm", "simplex", "--out", str(tmp_path / "out")]) == 2
+    assert "simplex" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_rows_count_and_order() -> None:
+    def run(algorithm: str, seed: int, length: float, kill: float, bad: int = 0) -> PaperRun:
+        numbers = ((bad, 0, 0, 0), (length, kill, 2.0 * seed, 5.0), kill == 0.0, 0.1 * (kill > 0), 0.2)
+        return PaperRun(7, algorithm, seed, np.zeros((3, 3)), *numbers, 100, np.zeros((2, 3)), float(seed))
+
+    rows = table([run("a", 1, 1.2, 0.0), run("a", 2, 1.1, 0.0), run("a", 3, 1.0, 0.5), run("b", 1, 1.0, 0.0, bad=1)])
+    assert [(row.algorithm, row.runs, row.safe, row.certified) for row in rows] == [("a", 3, 2, 2), ("b", 1, 0, 1)]
+    assert rows[0].length_median == pytest.approx(1.15)
+    assert (rows[0].length_worst, rows[0].kill_worst, rows[0].detection_median) == (1.2, 0.5, 4.0)
+    assert rows[1].length_median is None
+    text = table_text(rows).splitlines()
+    assert "2/3" in text[1]
+    assert " - " in text[2]
+    assert problem_name(7) == "paper-07"
+
+
+def test_probability_of_one_unit_by_hand() -> None:
+    unit = {"east_m": 0, "north_m": 500, "amsl_m": 150, "kill_radius_m": 700, "kill_scale_m": 250}
+    scenario = small_scenario(threats=[unit], start={"east_m": 0, "north_m": 0, "amsl_m": 150})
+    far = np.array([[0.0, 0.0, 150.0], [60_000.0, 0.0, 150.0]])
+    # One of the seven points lies within reach, at 500 m: (250 / 500)^4.
+    assert exposure_probability(scenario, far, "kill") == pytest.approx(1 / 16)
+    assert exposure_probability(scenario, far, "detection") == 0.0
+    # Two points at that distance.
+    assert exposure_probability(scenario, far[[0, 0]], "kill") == pytest.approx(1 - (15 / 16) ** 7)
+
+
+def test_runs_of_another_algorithm_stand_beside_the_baselines() -> None:
+    done = run_section([7], 1, "umda-polar", jobs=1)
+    assert [item.algorithm for item in done] == ["umda-polar", "umda-cartesian"]
+    assert load_scenario(problem_name(7)).planner.algorithm == "umda"

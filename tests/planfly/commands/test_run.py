@@ -1,0 +1,174 @@
+"""The whole chain as a person runs it."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from logs.recording.reader import read_log
+from logs.verdict.findings import RULES
+from planfly.cli import main
+from planfly.terminal.targets import RUN_FILES
+
+ROOT = Path(__file__).parents[3]
+SAME = ("plan.json", "mission.waypoints", "mission.plan", "flight.mcap", "verdict.json")
+SEEDS = range(1, 101) if os.environ.get("PLANFLY_SOAK") else range(1, 11)
+
+
+def planfly(*argv: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run the command in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "planfly", *argv],
+        cwd=cwd, capture_output=True, text=True, check=False, env={**os.environ, **environment},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder that one run of the default scenario leaves."""
+    folder = tmp_path_factory.mktemp("demo")
+    result = planfly("run", cwd=folder)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert result.stdout.startswith("flyable\n")
+    return folder / "runs" / "jacksboro-seed1"
+
+
+def test_a_run_leaves_every_file(demo: Path) -> None:
+    assert sorted(path.name for path in demo.iterdir()) == sorted(RUN_FILES)
+    assert all(path.stat().st_size > 500 for path in demo.iterdir())
+    assert (demo / "map.png").read_bytes().startswith(b"\x89PNG")
+    page = (demo / "report.html").read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)=.https?:", page)
+
+
+def test_the_verdict_file(demo: Path) -> None:
+    verdict = json.loads((demo / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["flyable"] is True
+    assert verdict["complete"] is True
+    assert {finding["rule"] for finding in verdict["findings"]} == set(RULES) - {"mission", "loiter"}
+    numbers = ["planned", "flown", "limit", "tolerance", "margin", "unit"]
+    keys = ["rule", "where", *numbers, "limit_source", "method", "ok", "reason", "suggestion"]
+    assert all(sorted(finding) == sorted(keys) for finding in verdict["findings"])
+    assert all(finding["ok"] is True for finding in verdict["findings"])
+
+
+def test_two_runs_are_byte_identical(demo: Path, tmp_path: Path) -> None:
+    result = planfly("run", "--out", "again", cwd=tmp_path, PYTHONHASHSEED="77", OPENBLAS_NUM_THREADS="1")
+    assert result.returncode == 0, result.stderr
+    for name in SAME:
+        assert (tmp_path / "again" / name).read_bytes() == (demo / name).read_bytes(), name
+
+
+def test_check_of_the_log_repeats_the_verdict(demo: Path, tmp_path: Path) -> None:
+    assert main(["check", str(demo / "flight.mcap"), "--json", str(tmp_path / "v.json")]) == 0
+    assert (tmp_path / "v.json").read_bytes() == (demo / "verdict.json").read_bytes()
+
+
+def test_flying_the_plan_again_gives_the_same_track(demo: Path, tmp_path: Path) -> None:
+    assert main(["fly", str(demo / "plan.json"), "--log", str(tmp_path / "f.mcap")]) == 0
+    again, first = read_log(tmp_path / "f.mcap").track, read_log(demo / "flight.mcap").track
+    assert again.position.tobytes() == first.position.tobytes()
+
+
+@pytest.mark.parametrize("suffix", ["waypoints", "plan"])
+def test_the_exported_mission_flies_in_its_scenario(demo: Path, tmp_path: Path, suffix: str) -> None:
+    log = tmp_path / "f.mcap"
+    assert (
+        main(["fly", str(demo / f"mission.{suffix}"), "--scenario", "jacksboro", "--log", str(log), "--seed", "1"]) == 0
+    )
+    again, first = read_log(log).track, read_log(demo / "flight.mcap").track
+    assert again.position.tobytes() == first.position.tobytes()
+
+
+def test_export_writes_what_the_run_wrote(demo: Path, tmp_path: Path) -> None:
+    targets = [tmp_path / "m.waypoints", tmp_path / "m.plan"]
+    assert main(["export", str(demo / "plan.json"), *map(str, targets)]) == 0
+    assert targets[0].read_bytes() == (demo / "mission.waypoints").read_bytes()
+    # An export adds the fence and the rally points, which the run's own files leave out.
+    plan, bare = (json.loads(file.read_text(encoding="utf-8")) for file in (targets[1], demo / "mission.plan"))
+    assert plan["mission"] == bare["mission"]
+    assert plan["geoFence"]["circles"]
+    assert plan["rallyPoints"]["points"]
+    assert not bare["geoFence"]["circles"]
+
+
+def test_replay_and_report_from_the_log_alone(demo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    copy = tmp_path / "only.mcap"
+    copy.write_bytes((demo / "flight.mcap").read_bytes())
+    assert main(["replay", str(copy)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    verdict = json.loads((demo / "verdict.json").read_text(encoding="utf-8"))
+    legs = sum(finding["rule"] == "slope" for finding in verdict["findings"])
+    assert sum(line[13:16] == "leg" for line in lines) == legs
+    assert main(["report", str(copy), "--out", str(tmp_path / "r")]) == 0
+    drawn = {name for name in RUN_FILES if name.endswith((".png", ".html"))}
+    assert {path.name for path in (tmp_path / "r").iterdir()} == drawn
+    assert (tmp_path / "r" / "map.png").read_bytes() == (demo / "map.png").read_bytes()
+
+
+def test_a_named_target_that_exists_is_refused(demo: Path, tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "mine.txt").write_text("keep", encoding="utf-8")
+    assert main(["run", "--out", str(tmp_path / "run")]) == 2
+    assert main(["check", str(demo / "flight.mcap"), "--json", str(demo / "verdict.json")]) == 2
+    assert main(["fly", str(demo / "plan.json"), "--log", str(demo / "flight.mcap")]) == 2
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["mine.txt"]
+    assert main(["run", "--out", str(tmp_path / "run"), "--overwrite"]) == 0
+    assert (tmp_path / "run" / "mine.txt").read_text(encoding="utf-8") == "keep"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_every_seed_ends_flyable(seed: int, tmp_path: Path) -> None:
+    import planfly as package
+
+    result = package.plan_then_fly("jacksboro", seed=seed)
+    assert result.plan.safe, result.plan.certificate.problems
+    assert result.verdict.flyable, result.verdict.summary
+
+
+def test_the_example_runs() -> None:
+    result = subprocess.run(
+        [sys.executable, ROOT / "examples" / "plan_then_fly.py"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert result.returncode == 0, result.stderr
+    assert result.stdout.startswith("flyable\n")
+    source = (ROOT / "examples" / "plan_then_fly.py").read_text(encoding="utf-8")
+    assert len([line for line in source.splitlines() if line and not line.startswith('"""')]) < 10
+
+
+@pytest.mark.parametrize(("name", "rule"), [("steep", "slope"), ("tight", "turn")])
+def test_plans_that_do_not_fly(name: str, rule: str, tmp_path: Path) -> None:
+    result = planfly("run", name, "--out", "out", cwd=tmp_path)
+    assert result.returncode == 4, result.stdout + result.stderr
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["flyable"] is False
+    failed = [finding for finding in verdict["findings"] if finding["ok"] is False]
+    assert rule in {finding["rule"] for finding in failed}
+    assert result.stdout.startswith("not flyable: ")
+    assert rule in result.stdout.splitlines()[0]
+
+
+def test_no_feasible_plan(tmp_path: Path) -> None:
+    ridge = "".join(
+        f"[[terrain.peak]]\neast_m = 3000\nnorth_m = {north}\nheight_m = 1500\nsigma_m = 500\n"
+        for north in range(-1000, 7001, 500)
+    )
+    (tmp_path / "walled.toml").write_text(
+        'name = "walled"\n[terrain]\nkind = "peaks"\n' + ridge + "[area]\neast_m = [0, 6000]\nnorth_m = [0, 6000]\n"
+        "ceiling_amsl_m = 900\n[start]\neast_m = 300\nnorth_m = 3000\nheight_m = 100\n"
+        "[destination]\neast_m = 5700\nnorth_m = 3000\nheight_m = 100\n",
+        encoding="utf-8",
+    )
+    result = planfly("run", "walled.toml", "--out", "out", cwd=tmp_path)
+    assert result.returncode == 4, result.stdout + result.stderr
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
+    assert verdict["complete"] is False
+    assert verdict["flyable"] is False
+    assert {"clearance"} <= {finding["rule"] for finding in verdict["findings"] if finding["ok"] is False}
+    assert (tmp_path / "out" / "plan.json").exists()
+    assert not (tmp_path / "out" / "flight.mcap").exists()
+    assert "no feasible plan" in result.stdout.splitlines()[0]

@@ -1,0 +1,55 @@
+"""`steep` and `tight`: the flight fails where the plan asks too much, and only there."""
+
+import dataclasses
+import re
+
+import pytest
+
+from flight.mission.from_plan import plan_mission
+from logs.verdict.findings import Verdict
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import fly, make_plan, make_setup
+from planner.plan import Plan
+from world.scenario import load_scenario
+
+
+def judge(plan: Plan, airframe: Airframe, first: int, last: int) -> Verdict:
+    """The verdict on waypoints first..last of a plan, flown as a mission of their own."""
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+    # Item 0 sets the speed; item k + 1 is waypoint k.
+    part = dataclasses.replace(mission, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
+    setup = make_setup(plan.scenario, airframe, part, 1)
+    return fly(setup, airframe, None)[2]
+
+
+def failing_legs(verdict: Verdict, legs: int) -> set[int]:
+    """Legs that a failed finding names, and those beside the waypoints that one names."""
+    out: set[int] = set()
+    for finding in verdict.findings:
+        named = re.match(r"(leg|waypoint) (\d+)", finding.where)
+        if finding.ok is False and named:
+            number = int(named[2])
+            out |= {number} if named[1] == "leg" else {number - 1, number}
+    return {leg for leg in out if 0 <= leg < legs}
+
+
+@pytest.mark.parametrize(("name", "rule"), [("steep", "slope"), ("tight", "turn")])
+def test_the_rest_of_it_flies(name: str, rule: str) -> None:
+    scenario = load_scenario(name)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, 1)
+    assert plan.safe
+    legs = len(plan.waypoints) - 1
+    whole = judge(plan, airframe, 0, legs)
+    assert not whole.flyable
+    assert rule in {finding.rule for finding in whole.findings if finding.ok is False}
+    bad = failing_legs(whole, legs)
+    assert 0 < len(bad) < legs - 2
+    flown = 0
+    starts = [leg for leg in range(legs) if leg not in bad and (leg == 0 or leg - 1 in bad)]
+    for first in starts:
+        last = min([leg for leg in bad if leg > first], default=legs)
+        verdict = judge(plan, airframe, first, last)
+        assert verdict.flyable, (first, last, verdict.summary)
+        flown += last - first
+    assert flown == legs - len(bad)

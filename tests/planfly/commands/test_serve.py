@@ -1,0 +1,269 @@
+"""A served vehicle over real sockets, with a ground station of our own."""
+
+import math
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.simulation.simulate import simulate
+from logs.recording.reader import read_log
+from planfly.airframe import load_airframe
+from planfly.cli import main
+from tests.planfly.conftest import FIELD, Served
+from tests.stations import UdpStation, item
+
+SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+LAT, LON = 460_000_000, 80_000_000
+ROUTE = [
+    item(0, LAT, LON, 0.0),
+    item(1, LAT, LON, 100.0),
+    item(2, LAT, LON + 33_333, 100.0, frame=3),
+    item(3, LAT + 3_000, LON + 65_000, 100.0),
+]
+# 4 km out: long enough for whatever is done to it.
+LONG = [*ROUTE[:3], item(3, LAT, LON + 300_000, 100.0)]
+STEEP = [*ROUTE[:3], item(3, LAT, LON + 65_000, 300.0)]
+
+
+def done(message: object) -> bool:
+    return message.get_type() == "MISSION_CURRENT" and message.mission_state == 5
+
+
+@pytest.fixture
+def served_log(tmp_path: Path) -> Path:
+    """A flight log of the route above, made without a vehicle."""
+    (tmp_path / "f.toml").write_text(FIELD, encoding="utf-8")
+    rows = [(0, LAT, LON, 0.0, 0), *((one.seq, one.x, one.y, one.z, one.frame) for one in ROUTE[1:])]
+    lines = [
+        f"{k}\t{int(k == 0)}\t{frame}\t16\t0\t0\t0\t0\t{x / 1e7:.7f}\t{y / 1e7:.7f}\t{z}\t1"
+        for k, x, y, z, frame in rows
+    ]
+    (tmp_path / "m.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="ascii")
+    log = tmp_path / "played.mcap"
+    assert main(["fly", str(tmp_path / "m.waypoints"), "--scenario", str(tmp_path / "f.toml"), "--log", str(log)]) == 0
+    return log
+
+
+def test_a_flight_at_real_time(serve: Callable[..., Served]) -> None:
+    """Rates within 5 %, under 15 % of a core, and the very flight that ``planfly fly`` gives."""
+    vehicle = serve("--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(ROUTE) == 0
+        station.fly()
+        station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
+        before, begun, used = len(station.log), time.monotonic(), vehicle.cpu()
+        station.listen(10.0)
+        seconds = time.monotonic() - begun
+        share = (vehicle.cpu() - used) / seconds
+        counts = Counter(message.get_type() for message in station.log[before:])
+        assert counts["ATTITUDE"] / seconds == pytest.approx(30.0, rel=0.05)
+        assert counts["GLOBAL_POSITION_INT"] / seconds == pytest.approx(10.0, rel=0.05)
+        assert {"VFR_HUD", "SYS_STATUS", "WIND", "HOME_POSITION", "EXTENDED_SYS_STATE", "HEARTBEAT"} <= set(counts)
+        print(f"{share:.3f} of a core, attitude {counts['ATTITUDE'] / seconds:.2f} Hz")
+        assert share < 0.15, f"{share:.3f} of a core"
+        station.until(done)
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and "log" in m.text)
+        reached = [m.seq for m in station.log if m.get_type() == "MISSION_ITEM_REACHED"]
+        assert reached == [1, 2, 3]
+        assert "verdict (flown): FLYABLE" in station.texts()
+        assert station.upload(STEEP) == 0
+    assert vehicle.stop() == 0
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert log.ended == "completed"
+    again = simulate(log.setup, load_airframe(log.setup.scenario).aircraft)
+    assert again.track.position.tobytes() == log.track.position.tobytes()
+    assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 0
+
+
+def test_a_mission_that_cannot_be_flown(serve: Callable[..., Served]) -> None:
+    """It is stored, warned of, and armed only by force; the forced flight is logged and judged."""
+    vehicle = serve("--scenario", "field.toml", "--speed", "50")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(STEEP) == 0
+        assert station.command(400, 1) == mavlink.MAV_RESULT_DENIED
+        station.listen(0.3)
+        assert "NOT FLYABLE" in station.texts()
+        assert "slope: leg" in station.texts()
+        far = [ROUTE[0], item(1, -LAT, LON, 100.0), item(2, -LAT, LON + 40_000, 100.0)]
+        assert station.upload(far) == 0
+        assert station.command(400, 1, 21196) == mavlink.MAV_RESULT_DENIED
+        assert "mission cannot be flown" in station.texts()
+        assert station.upload(STEEP) == 0
+        station.send(mavlink.MAVLink_param_set_message(1, 1, b"PFLY_FORCE", 1.0, 9))
+        station.until(lambda m: m.get_type() == "PARAM_VALUE" and m.param_value == 1.0)
+        station.fly()
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and m.text.startswith("log"))
+        assert "verdict (flown): NOT FLYABLE" in station.texts()
+    assert vehicle.stop() == 0
+    assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 4
+
+
+def test_two_stations_over_sockets(serve: Callable[..., Served]) -> None:
+    vehicle = serve("--scenario", "field.toml")
+    rng = random.Random(4)
+    with UdpStation(vehicle.port) as one, UdpStation(vehicle.port, system=254) as two:
+        for station in (one, two):
+            station.until(lambda m: m.get_type() == "HEARTBEAT")
+        for _ in range(100 if SOAK else 5):
+            first, second = (one, two) if rng.random() < 0.5 else (two, one)
+            first.send(mavlink.MAVLink_mission_count_message(1, 1, len(ROUTE), 0))
+            first.until(lambda m: m.get_type() == "MISSION_REQUEST_INT")
+            second.send(mavlink.MAVLink_mission_count_message(1, 1, len(LONG), 0))
+            assert second.until(lambda m: m.get_type() == "MISSION_ACK").type == mavlink.MAV_MISSION_DENIED
+            assert first.upload(ROUTE) == 0
+            first.send(mavlink.MAVLink_mission_request_int_message(1, 1, 3, 0))
+            back = first.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
+            assert (back.x, back.y) == (ROUTE[3].x, ROUTE[3].y)
+    assert vehicle.stop() == 0
+
+
+@pytest.mark.parametrize("seed", range(20 if SOAK else 2))
+def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], seed: int) -> None:
+    """Kill -9 of all of it, in flight, at any moment: what is logged is exact, and no more than a second is lost."""
+    vehicle = serve("--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(LONG) == 0
+        station.fly()
+        begun = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0).time_boot_ms
+        last = station.listen(random.Random(seed).uniform(1.0, 4.0))
+        vehicle.kill()
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert not log.complete
+    flown = max(m.time_boot_ms for m in last if m.get_type() == "GLOBAL_POSITION_INT") - begun
+    assert log.end_time >= flown / 1000.0 - 1.0
+    whole = simulate(log.setup, load_airframe(log.setup.scenario).aircraft).track
+    count = len(log.track)
+    assert count > 30
+    assert np.array_equal(whole.position[:count], log.track.position)
+    assert np.array_equal(whole.controls[:count], log.track.controls)
+
+
+def test_the_process_that_flies_may_die(serve: Callable[..., Served]) -> None:
+    """The vehicle stays, says so, and flies the next mission."""
+    vehicle = serve("--scenario", "field.toml", "--speed", "20")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(LONG) == 0
+        station.fly()
+        flying = [n for n in vehicle.children() if "spawn_main" in Path(f"/proc/{n}/cmdline").read_text("utf-8")]
+        os.kill(flying[0], signal.SIGKILL)
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and "died" in m.text)
+        assert station.command(400, 1) == mavlink.MAV_RESULT_DENIED
+        assert station.upload(ROUTE) == 0
+        station.fly()
+        station.until(done)
+    assert vehicle.stop() == 0
+
+
+def test_a_log_is_played_into_a_station(tmp_path: Path, served_log: Path) -> None:
+    """Heartbeats call it; positions, modes and the end come as they were flown."""
+    log = read_log(served_log)
+    with UdpStation(9) as station:
+        port = station.socket.getsockname()[1]
+        play = subprocess.Popen(
+            [sys.executable, "-m", "planfly", "replay", str(served_log), "--to", f"127.0.0.1:{port}", "--speed", "8"],
+            cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        station.socket.settimeout(60.0)
+        _, station.to = station.socket.recvfrom(4096)
+        station.socket.settimeout(0.01)
+        station.until(done)
+        _, errors = play.communicate(timeout=20.0)
+    assert play.returncode == 0, errors
+    east = [m.lon for m in station.log if m.get_type() == "GLOBAL_POSITION_INT"]
+    assert len(set(east)) > 15
+    assert max(east) - min(east) > 0.95 * (ROUTE[3].y - ROUTE[1].y)
+    assert log.ended in station.texts()
+    assert main(["replay", str(served_log), "--to", "127.0.0.1:9", "--wait", "0.3"]) == 2
+
+
+def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """The mission is from a file, with a gap in its numbers, and is given to stations that ask for it."""
+    lines = ["0 1 0 16 0 0 0 0 46 8 0 1", "3 0 0 16 0 0 0 0 46 8 100 1", "7 0 3 16 0 0 0 0 46 8.03 100 1"]
+    (tmp_path / "m.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="ascii")
+    vehicle = serve("m.waypoints", "--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        station.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3))
+        station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
+        assert station.until(lambda m: m.get_type() == "MISSION_COUNT").count == 3
+        station.send(mavlink.MAVLink_mission_request_int_message(1, 1, 2, 0))
+        back = station.until(lambda m: m.get_type() == "MISSION_ITEM_INT")
+        assert (back.seq, back.frame, back.x, back.y) == (2, 3, LAT, LON + 300_000)
+        station.fly()
+        station.listen(1.0)
+    assert vehicle.stop() == 0
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert log.ended == "stopped: the vehicle was shut down"
+
+
+def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """A station that signs is served; one that does not is called by heartbeats alone."""
+    key = bytes(range(32))
+    (tmp_path / "key").write_text(key.hex(), encoding="ascii")
+    (tmp_path / "key").chmod(0o600)
+    vehicle = serve("--scenario", "field.toml", "--sign-key", "key")
+    with UdpStation(vehicle.port) as stranger, UdpStation(vehicle.port, system=254) as station:
+        for mav in (station.mav, station._parser):
+            mav.signing.secret_key = key
+            mav.signing.timestamp = int((time.time() - 1_420_070_400) * 1e5)
+        station.mav.signing.sign_outgoing = True
+        assert station.upload(ROUTE) == 0
+        assert station.until(lambda m: m.get_type() == "ATTITUDE").get_signed()
+        assert stranger.listen(1.5) == []
+    assert vehicle.stop() == 0
+
+
+def test_the_default_scenario_stands_ready(serve: Callable[..., Served]) -> None:
+    """And a log is played into a station as it was flown."""
+    vehicle = serve()
+    with UdpStation(vehicle.port) as station:
+        place = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT")
+        assert math.isclose(place.lat / 1e7, 36.5, abs_tol=0.2)
+        assert math.isclose(place.relative_alt / 1e3, 150.0, abs_tol=1.0)
+        state = station.until(lambda m: m.get_type() == "MISSION_CURRENT")
+        assert state.mission_state == mavlink.MISSION_STATE_NO_MISSION
+        assert station.command(176, 1, 10) == mavlink.MAV_RESULT_DENIED
+        station.send(mavlink.MAVLink_param_request_list_message(1, 1))
+        count = station.until(lambda m: m.get_type() == "PARAM_VALUE").param_count
+        station.listen(0.5)
+        names = {m.param_id for m in station.log if m.get_type() == "PARAM_VALUE"}
+        assert len(names) == count
+        assert {"AIRSPEED_CRUISE", "PFLY_FORCE"} <= names
+    assert vehicle.stop() == 0
+
+
+@pytest.mark.parametrize(
+    ("argv", "word"),
+    [
+        (["--bind", "0.0.0.0:0"], "--bind 0.0.0.0:0"),
+        (["--to", "192.0.2.1:14550"], "--to 192.0.2.1"),
+        (["--to", "here:14550"], "an IP address is expected"),
+        (["--to", "127.0.0.1:x"], "IP:PORT is expected"),
+        (["--speed", "0"], "0.1 to 100"),
+        (["none.waypoints"], "no such file"),
+        (["--sign-key", "none"], "none: cannot be read"),
+        (["--allow", "300.1.1.1"], "--allow 300.1.1.1"),
+    ],
+)
+def test_bad_usage_is_refused(
+    argv: list[str], word: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = main(["serve", *argv])
+    except SystemExit as exit_:
+        code = exit_.code
+    assert code == 2
+    assert word in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,95 @@
+"""Encodings: the rotation against a rotation matrix, boxes, intervals and round trips."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.evaluation.encoding import ENCODINGS, Space, polar, rotated, rotated_frame, rotated_vectors
+from world.geometry import leg_slopes, path_length, turning_angles
+
+coordinate = st.floats(-20_000, 20_000)
+points = st.tuples(coordinate, coordinate, st.floats(0, 3000)).map(np.array)
+
+
+def space(across: float | None = None) -> Space:
+    bounds = np.array([[-1000.0, 9000.0], [-2000.0, 7000.0]])
+    return Space(np.array([0.0, 0.0, 200.0]), np.array([8000.0, 6000.0, 300.0]), bounds, (100.0, 900.0), across)
+
+
+@settings(max_examples=50)
+@given(points, points, st.lists(points, min_size=3, max_size=6).map(np.array))
+def test_frame_round_trip_and_criteria_survive(start: np.ndarray, end: np.ndarray, path: np.ndarray) -> None:
+    if math.dist(start[:2], end[:2]) < 1.0:
+        return
+    frame = rotated_frame(start, end)
+    turned = frame.rotate(path)
+    np.testing.assert_allclose(frame.restore(turned), path, atol=1e-7)
+    assert path_length(turned) == pytest.approx(float(path_length(path)), abs=1e-6)
+    np.testing.assert_allclose(frame.rotate(start)[:2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(frame.rotate(end)[:2], [math.dist(start[:2], end[:2]), 0.0], atol=1e-7)
+
+
+def test_rotation_is_the_papers_matrix() -> None:
+    start, end = np.array([500.0, 500.0, 0.0]), np.array([9600.0, 9600.0, 0.0])
+    angle = math.atan2(end[1] - start[1], end[0] - start[0])
+    matrix = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    point = np.array([3000.0, 7000.0, 120.0])
+    np.testing.assert_allclose(rotated_frame(start, end).rotate(point)[:2], matrix @ (point - start)[:2], atol=1e-9)
+
+
+def test_turns_and_slopes_survive_rotation() -> None:
+    path = np.random.default_rng(3).uniform(0, 5000, (9, 3))
+    turned = rotated_frame(path[0], path[-1]).rotate(path)
+    np.testing.assert_allclose(turning_angles(turned), turning_angles(path), atol=1e-9)
+    np.testing.assert_allclose(leg_slopes(turned), leg_slopes(path), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ENCODINGS)
+@pytest.mark.parametrize("count", [3, 10])
+def test_decoded_paths_keep_their_ends(name: str, count: int) -> None:
+    encoding = ENCODINGS[name](space(), count)
+    vectors = np.random.default_rng(1).uniform(encoding.lower, encoding.upper, (20, encoding.lower.size))
+    paths = encoding.decode(vectors)
+    assert paths.shape == (20, count, 3)
+    np.testing.assert_array_equal(paths[:, 0], np.tile(space().start, (20, 1)))
+    np.testing.assert_array_equal(paths[:, -1], np.tile(space().destination, (20, 1)))
+    assert paths[..., 2].min() >= 100.0
+    assert paths[..., 2].max() <= 900.0
+
+
+def test_rotated_waypoints_lie_each_in_its_interval() -> None:
+    encoding = rotated(space(), 7)
+    vectors = np.random.default_rng(2).uniform(encoding.lower, encoding.upper, (200, 15))
+    along = rotated_frame(space().start, space().destination).rotate(encoding.decode(vectors))[:, 1:-1, 0]
+    interval = np.floor(along / 2000.0 - 1e-12)
+    np.testing.assert_array_equal(interval, np.tile(np.arange(5), (200, 1)))
+    np.testing.assert_allclose(rotated_vectors(space(), encoding, encoding.decode(vectors)), vectors, atol=1e-6)
+
+
+def test_box_across_covers_the_map_and_no_more() -> None:
+    encoding = rotated(space(), 4)
+    frame = rotated_frame(space().start, space().destination)
+    for side in (encoding.lower, encoding.upper):
+        for i in range(2):
+            # Some place at the box's edge within the interval is on the map's edge.
+            along = np.linspace(5000.0 * i, 5000.0 * (i + 1), 9)
+            edge = frame.restore(np.column_stack([along, np.full(9, side[3 * i + 1]), np.zeros(9)]))
+            inside = (np.abs(edge[:, 0] - 4000.0) <= 5000.0 + 1e-6) & (np.abs(edge[:, 1] - 2500.0) <= 4500.0 + 1e-6)
+            assert inside.any()
+    narrow = rotated(space(1500.0), 4)
+    assert narrow.lower[1] == -1500.0
+    assert narrow.upper[4] == 1500.0
+
+
+def test_polar_step_of_the_straight_line() -> None:
+    encoding = polar(space(), 6)
+    path = encoding.decode(np.tile([2000.0, 0.0, 500.0], 4)[None])[0]
+    np.testing.assert_allclose(path[1:5, :2], np.outer(np.arange(1, 5), [1600.0, 1200.0]), atol=1e-9)
+
+
+def test_no_direction_without_distance() -> None:
+    with pytest.raises(ValueError, match="same place"):
+        rotated_frame(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 9.0]))

@@ -1,0 +1,126 @@
+"""Planning again in flight, budgets, and what ends a search."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from aircraft.path_limits import Limits
+from planner.plan import Plan, parse_plan, plan_json
+from planner.search.explain_failure import what_blocks
+from planner.search.plan_path import plan_path
+from planner.search.replan import replan, with_waypoints
+from world.errors import MissionError, ScenarioError
+from world.geometry import turning_angles
+from world.scenario import Scenario
+from world.scenario_variants import with_planner, with_threats
+
+
+@pytest.fixture(scope="module")
+def old(scenario: Scenario, limits: Limits) -> Plan:
+    return plan_path(scenario, limits, seed=1)
+
+
+def in_the_way(plan: Plan, leg: int) -> tuple[float, float, float, float]:
+    middle = 0.5 * (plan.waypoints[leg] + plan.waypoints[leg + 1])
+    return float(middle[0]), float(middle[1]), 400.0, 700.0
+
+
+def test_pop_up_threat_is_avoided_and_what_is_flown_stays(old: Plan, limits: Limits) -> None:
+    now = with_threats(old.scenario, [in_the_way(old, 4)], "test")
+    plan = replan(now, limits, old, 2, seed=1)
+    np.testing.assert_array_equal(plan.waypoints[:3], old.waypoints[:3])
+    assert plan.flown_legs == 2
+    assert plan.safe
+    centre, radius = now.threats.position[-1], now.threats.kill_radius[-1]
+    legs = [np.linspace(*plan.waypoints[i : i + 2], 2000) for i in range(2, len(plan.waypoints) - 1)]
+    assert np.linalg.norm(np.concatenate(legs) - centre, axis=1).min() > radius
+    assert len(now.threats) == len(old.scenario.threats) + 1
+    again = parse_plan(plan_json(plan), "replan.json")
+    assert again.flown_legs == 2
+    assert len(again.scenario.threats) == len(now.threats)
+
+
+def test_turn_counts_from_the_present_course(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> None:
+    """With 45 degrees at most, the first new leg may not leave the course of the leg flown last by more."""
+    scenario = small(limits={"max_turn_deg": 45})
+    limits = make_limits(scenario)
+    first = plan_path(scenario, limits, seed=1)
+    now = with_threats(scenario, [in_the_way(first, 4)], "test")
+    plan = replan(now, limits, first, 3, seed=1)
+    assert plan.feasible
+    assert turning_angles(plan.waypoints[2:5])[0] <= math.radians(45.0)
+
+
+def test_a_leg_that_begins_in_reach_is_refused_by_its_own_name(old: Plan, limits: Limits) -> None:
+    east, north = old.waypoints[3, :2]
+    now = with_threats(old.scenario, [(float(east), float(north), 2000.0, 2500.0)], "test")
+    with pytest.raises(
+        MissionError, match=r"leg 3: waypoint 3, where it begins, is \d+ m inside .* pop-up 1"
+    ) as caught:
+        replan(now, limits, old, 3, seed=1)
+    assert "\n" not in str(caught.value)
+
+
+def test_same_seed_same_replan(old: Plan, limits: Limits) -> None:
+    now = with_threats(old.scenario, [in_the_way(old, 4)], "test")
+    one, two = (plan_json(replan(now, limits, old, 2, seed=3)) for _ in range(2))
+    assert one == two
+
+
+def test_legs_that_are_not_there_and_other_missions_are_refused(
+    old: Plan, limits: Limits, small: Callable[..., Scenario]
+) -> None:
+    with pytest.raises(MissionError, match=r"leg 7: the plan has legs 0\.\.6"):
+        replan(old.scenario, limits, old, 7, seed=1)
+    other = small(destination={"east_m": 5000, "north_m": 0, "amsl_m": 150})
+    with pytest.raises(MissionError, match="destination: 1000 m"):
+        replan(other, limits, old, 1, seed=1)
+    with pytest.raises(ScenarioError, match="kill_radius_m: -5"):
+        with_threats(old.scenario, [(0.0, 0.0, -5.0, 0.0)], "--add-threat")
+
+
+def test_longest_legs_are_split() -> None:
+    path = np.array([[0.0, 0, 0], [1000, 0, 100], [1100, 0, 100]])
+    np.testing.assert_allclose(with_waypoints(path, 5)[:, 0], [0, 250, 500, 1000, 1100])
+
+
+def test_stop_ends_a_search_with_the_best_plan_yet(scenario: Scenario, limits: Limits) -> None:
+    plan = plan_path(scenario, limits, seed=1, stop=lambda: "interrupted")
+    assert plan.ended == "interrupted"
+    assert plan.safe
+    assert plan.evaluations < 1000
+    assert '"ended": "interrupted"' in plan_json(plan)
+    assert parse_plan(plan_json(plan), "plan.json").ended == "interrupted"
+
+
+def test_budget_in_evaluations_is_kept(scenario: Scenario, limits: Limits) -> None:
+    for budget in (60, 700):
+        plan = plan_path(with_planner(scenario, "--budget", budget=budget), limits, seed=1)
+        assert plan.evaluations <= budget + 60
+        assert plan.ended == "budget"
+    with pytest.raises(ScenarioError, match="--budget: budget: 3"):
+        with_planner(scenario, "--budget", budget=3)
+
+
+def test_first_safe_path_comes_before_the_best(scenario: Scenario, limits: Limits) -> None:
+    first = plan_path(scenario, limits, seed=1, first_safe=True)
+    whole = plan_path(scenario, limits, seed=1)
+    assert first.safe
+    assert first.evaluations < whole.evaluations
+    assert whole.objectives[0] <= first.objectives[0]
+
+
+def test_what_blocks_a_way_is_named(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> None:
+    hills = [{"east_m": 3000, "north_m": n, "height_m": 600, "sigma_m": 300} for n in range(-4000, 4001, 400)]
+    table = {"waypoints": 6, "population": 20, "generations": 3}
+    walled = small(terrain={"kind": "peaks", "peak": hills}, planner=table)
+    plan = plan_path(walled, make_limits(walled), seed=1)
+    assert not plan.feasible
+    lines = what_blocks(plan)
+    assert "terrain closes the way" in lines[0]
+    assert "ceiling is 450 m" in lines[0]
+    assert "must turn back" in lines[-1]

@@ -1,0 +1,106 @@
+"""The same scenario with something changed: its terrain, wind, flight, threats or planner."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.scenario import Scenario, checked_table, from_spec, make_threats
+from world.scenario_file import FlightTable, PlannerTable, ThreatTable, WindTable
+
+Floats = NDArray[np.float64]
+
+
+def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
+    """Make the same scenario over another elevation file.
+
+    Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
+    Raises TerrainError.
+    """
+    spec = fixed_ends(scenario.to_json(), scenario.start, scenario.destination)
+    return from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
+
+
+def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
+    """Give the start and destination of a scenario's JSON data these heights (m AMSL), whatever is below them."""
+    changed = dict(spec)
+    for key, point in (("start", start), ("destination", destination)):
+        if isinstance(spec.get(key), dict):
+            kept = {name: value for name, value in spec[key].items() if name != "height_m"}
+            changed[key] = kept | {"amsl_m": float(point[2])}
+    return changed
+
+
+def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
+    """Make the same scenario in another wind (m/s, rad); None keeps what it has.
+
+    Raises ScenarioError for a wind that a scenario file may not have either.
+    """
+    table = scenario.spec.wind
+    changes: dict[str, Any] = {}
+    if speed is not None and from_course is not None:
+        changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
+    if turbulence is not None:
+        changes["turbulence"] = turbulence
+    changed = checked_table(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
+    spec = scenario.spec.model_copy(update={"wind": changed})
+    wind = replace(
+        scenario.wind,
+        speed=spec.wind.speed_mps,
+        from_course=math.radians(spec.wind.from_deg),
+        turbulence=spec.wind.turbulence,
+    )
+    return replace(scenario, spec=spec, wind=wind)
+
+
+def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
+    """Make the same scenario with other entries of [flight]; None keeps what it has.
+
+    Raises ScenarioError for a value that a scenario file may not have either.
+    """
+    given = {key: value for key, value in changes.items() if value is not None}
+    table = checked_table(lambda: FlightTable(**(scenario.flight.model_dump() | given)), f"{scenario.name}: flight")
+    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
+
+
+def with_threats(
+    scenario: Scenario,
+    added: Sequence[tuple[float, float, float, float]],
+    source: str,
+    kept: Sequence[ThreatTable] = (),
+) -> Scenario:
+    """Make the same scenario with more threats on its ground: east, north, kill and detection radius (m; 0 for none).
+
+    Their scales are the median shares of the radius of those that the scenario has, or a quarter and a third.
+    source: names them in messages.  kept: tables that come before them.  Raises ScenarioError for a threat that a
+    scenario file may not have either.
+    """
+
+    def share(radius: Floats, scale: Floats, default: float) -> float:
+        armed = radius > 0.0
+        return float(np.median(scale[armed] / radius[armed])) if armed.any() else default
+
+    known = scenario.threats
+    kill_share = share(known.kill_radius, known.kill_scale, 1.0 / 4.0)
+    seen_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
+    tables = [*scenario.spec.threats, *kept]
+    for number, (east, north, kill, seen) in enumerate(added):
+        data: dict[str, Any] = {"name": f"pop-up {len(kept) + number + 1}", "east_m": east, "north_m": north}
+        if kill != 0.0:
+            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_share}
+        if seen != 0.0:
+            data |= {"detection_radius_m": seen, "detection_scale_m": seen * seen_share}
+        tables.append(checked_table(partial(ThreatTable, **data), source))
+    spec = scenario.spec.model_copy(update={"threats": tables})
+    return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))
+
+
+def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
+    """Make the same scenario with other keys of [planner].  Raises ScenarioError as a file with them would."""
+    table = scenario.planner.model_dump() | changes
+    changed = checked_table(lambda: PlannerTable(**table), source)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed}), planner=changed)
