@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from world.frames import PolyMap, fit_polymap, polymap
+from world.frames import PolyMap, PolyMapRecord, fit_polymap, polymap
 from world.kernels import compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Terrain:
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
-        return _heights_many(self.heights, self.to_pixel.packed, es.ravel(), ns.ravel()).reshape(es.shape)
+        return _heights_many(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
         """Smallest height above ground on the segment a-b, and the fraction of it where that is.
@@ -61,7 +61,7 @@ class Terrain:
         a, b: (3,) m.  Exact for the bilinear surface.  NaN where the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-        low, at = segment_clearance(self.heights, self.to_pixel.packed, start, end)
+        low, at = segment_clearance(self.heights, self.to_pixel.record, start, end)
         return float(low), float(at)
 
 
@@ -107,34 +107,36 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
 
 
 @compiled_views
-def ground_height(heights: Heights, packed: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
+def ground_height(
+    heights: Heights, to_pixel: PolyMapRecord, east: float, north: float
+) -> float:  # pragma: no cover - compiled
     """Ground height at one map position; NaN outside the raster."""
-    col, row = polymap(packed, east, north)
+    col, row = polymap(to_pixel, east, north)
     return pixel_height(heights, col, row)
 
 
 @compiled
-def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats) -> Floats:  # pragma: no cover
+def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats) -> Floats:  # pragma: no cover
     out = np.empty(east.size)
     for k in range(east.size):
-        out[k] = ground_height(heights, packed, east[k], north[k])
+        out[k] = ground_height(heights, to_pixel, east[k], north[k])
     return out
 
 
 @compiled_views
 def segment_clearance(
-    heights: Heights, packed: Floats, a: Floats, b: Floats
+    heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Smallest height above the bilinear ground on a-b and its fraction; (NaN, fraction) off the raster."""
     pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
     best = math.inf
     best_at = 0.0
-    col1, row1 = polymap(packed, a[0], a[1])
+    col1, row1 = polymap(to_pixel, a[0], a[1])
     for piece in range(pieces):
         f0 = piece / pieces
         f1 = (piece + 1) / pieces
         col0, row0 = col1, row1
-        col1, row1 = polymap(packed, a[0] + f1 * (b[0] - a[0]), a[1] + f1 * (b[1] - a[1]))
+        col1, row1 = polymap(to_pixel, a[0] + f1 * (b[0] - a[0]), a[1] + f1 * (b[1] - a[1]))
         low, at = _piece_clearance(
             heights, col0, row0, a[2] + f0 * (b[2] - a[2]), col1, row1, a[2] + f1 * (b[2] - a[2])
         )

@@ -80,7 +80,7 @@ def test_polynomial_copy_of_a_frame_change(lat_deg: float, half: float, u: float
     got = copy(u * half, v * half)
     assert got[0] == pytest.approx(float(wanted[0]), abs=2e-3)
     assert got[1] == pytest.approx(float(wanted[1]), abs=2e-3)
-    assert polymap(copy.packed, u * half, v * half) == (float(got[0]), float(got[1]))
+    assert polymap(copy.record, u * half, v * half) == (float(got[0]), float(got[1]))
 
 
 def test_polynomial_says_how_wrong_it_is() -> None:
@@ -93,4 +93,4 @@ def test_polynomial_says_how_wrong_it_is() -> None:
     assert copy.residual > 0.1
     assert worst > 0.1
     with pytest.raises(ValueError, match="read-only"):
-        copy.packed[0, 0] = 1.0
+        copy.record["u"][0, 0] = 1.0

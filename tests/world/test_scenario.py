@@ -43,7 +43,7 @@ def _equal(a: Scenario, b: Scenario) -> bool:
         (getattr(a.threats, name), getattr(b.threats, name)) for name in ("position", "kill_radius", "kill_scale")
     ]
     if a.terrain is not None and b.terrain is not None:
-        arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.packed, b.terrain.to_pixel.packed)]
+        arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.rows(), b.terrain.to_pixel.rows())]
     return same and all(np.array_equal(x, y) for x, y in arrays)
 
 
