@@ -6,7 +6,7 @@ level, kept apart from the map so that Earth curvature never leaks into altitude
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -57,19 +57,29 @@ def _aeqd(origin: GeoOrigin) -> "Proj":
 
 
 def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[Floats, Floats]:
-    """East and north in metres of geodetic positions in degrees; any shape, the same shape back."""
+    """East and north in metres of geodetic positions in degrees; any shape, the same shape back.
+
+    >>> east, north = to_map(GeoOrigin(46.0, 8.0), [46.0, 46.01], [8.01, 8.0])
+    >>> east.round(1).tolist(), north.round(1).tolist()
+    ([774.6, 0.0], [0.0, 1111.5])
+    """
     east, north = _aeqd(origin)(np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64))
     return np.asarray(east), np.asarray(north)
 
 
 def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats, Floats]:
-    """Latitude and longitude in degrees of map positions in metres; any shape, the same shape back."""
+    """Latitude and longitude in degrees of map positions in metres; any shape, the same shape back.
+
+    >>> lat, lon = to_geo(GeoOrigin(46.0, 8.0), 0.0, 10_000.0)
+    >>> float(lat.round(6)), float(lon.round(6))
+    (46.089967, 8.0)
+    """
     lon, lat = _aeqd(origin)(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64), inverse=True)
     return np.asarray(lat), np.asarray(lon)
 
 
 def crs_transformer(crs: str) -> "Transformer":
-    """Make the transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
+    """The transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
 
     Heights are never passed through: without a geoid grid PROJ would return them unchanged, in silence.
     Raises ValueError for a CRS that PROJ does not know.
@@ -108,7 +118,7 @@ class PolyMap:
     residual: the largest error seen at check points between the nodes, in the unit of the result.
     """
 
-    record: PolyMapRecord
+    record: PolyMapRecord = field(repr=False)
     residual: float
 
     def __post_init__(self) -> None:
@@ -160,6 +170,11 @@ def fit_polymap(
 
     The degree grows from 1 to 9 until the largest error at points between the fitted nodes is within the
     tolerance; the best one is returned in any case, with its residual.
+
+    >>> copy = fit_polymap(lambda x, y: (x * y, x + y), [[0.0, 2.0], [0.0, 4.0]], 1e-9)
+    >>> u, v = copy(1.0, 3.0)
+    >>> round(float(u), 9), round(float(v), 9), copy.residual < 1e-9
+    (3.0, 4.0, True)
     """
     (x0, x1), (y0, y1) = np.asarray(bounds, dtype=np.float64)
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2])

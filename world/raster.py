@@ -49,6 +49,9 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     """Open an elevation file or an embedded name.  Relative paths count from ``base``.
 
     Raises TerrainError for anything that is not a single-band .tif, .hgt or .npz elevation file.
+
+    >>> open_raster("jacksboro").shape
+    (344, 403)
     """
     if path in EMBEDDED:
         from matplotlib import cbook
@@ -82,6 +85,11 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margi
 
     Raises TerrainError where the bounds reach beyond the tile, where data is missing inside them, or where
     the window is too large.  The margin is cut at the tile's edge in silence.
+
+    >>> raster = open_raster("jacksboro")
+    >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
+    >>> terrain.heights.shape, float(terrain.height(0.0, 0.0).round(1))
+    ((16, 21), 568.0)
     """
     box = np.asarray(bounds, dtype=np.float64)
     rows, cols = raster.shape
@@ -100,8 +108,8 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margi
             f" at most {MOST_PIXELS:,} are read"
         )
     heights = raster.read(top, bottom, left, right)
-    sound = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
-    heights[~sound] = np.nan
+    valid = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
+    heights[~valid] = np.nan
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
         box + np.array([-margin, margin]),
@@ -129,7 +137,7 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
         return
     to_map_metres = np.linalg.inv(per_metre)
     # A height is made of the four pixels around it.
-    reach = np.abs(to_map_metres).sum(axis=1)[:, None]
+    footprint = np.abs(to_map_metres).sum(axis=1)[:, None]
     for first in range(0, rows.size, _HOLES_AT_ONCE):
         part = slice(first, first + _HOLES_AT_ONCE)
         wanted = np.stack([cols[part], rows[part]]).astype(np.float64)
@@ -137,7 +145,7 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
         place = np.repeat(box.mean(axis=1)[:, None], wanted.shape[1], axis=1)
         for _ in range(8):
             place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
-        inside = ((place > box[:, :1] - reach) & (place < box[:, 1:] + reach)).all(axis=0)
+        inside = ((place > box[:, :1] - footprint) & (place < box[:, 1:] + footprint)).all(axis=0)
         if inside.any():
             east, north = place[:, int(np.argmax(inside))]
             raise TerrainError(
@@ -167,9 +175,13 @@ def _shifted(
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Find the largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
+    """The largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
 
     Raises TerrainError where there is none.
+
+    >>> raster = open_raster("jacksboro")
+    >>> tile_bounds(raster, raster.centre).round(-2).tolist()
+    [[-14900.0, 14900.0], [-15800.0, 15800.0]]
     """
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
     middle_e, middle_n = (east.min() + east.max()) / 2, (north.min() + north.max()) / 2

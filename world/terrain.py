@@ -5,7 +5,9 @@ The raster stays in its own grid at its source resolution; map positions are tak
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,9 +31,12 @@ TILE = 16
 class Terrain:
     """Measured or made ground heights above mean sea level.
 
-    heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.  to_pixel: map (east, north)
-    to fractional (col, row).  spacing: the finer pixel pitch, m.  source, sha256: where it came from.
-    datum: the vertical datum as stated.  vertical_error: stated error, m, or None where none is stated.
+    heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.
+    to_pixel: map (east, north) to fractional (col, row).
+    spacing: the finer pixel pitch, m.
+    source, sha256: where it came from.
+    datum: the vertical datum as stated.
+    vertical_error: stated error, m, or None where none is stated.
     """
 
     heights: Heights
@@ -162,7 +167,10 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Do the same on a piece that is straight in pixels: within a cell the height difference is a parabola."""
+    """Smallest height above ground on a piece straight in pixels, and its fraction; (NaN, fraction) off the data.
+
+    col, row, up: of its two ends.  Within a cell the height above the bilinear ground is a parabola.
+    """
     dc, dr, du = col1 - col0, row1 - row0, up1 - up0
     t = 0.0
     g0 = up0 - pixel_height(heights, col0, row0)
@@ -211,22 +219,32 @@ def flat_terrain(bounds: Floats, amsl: float, margin: float) -> Terrain:
     return gridded(np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level")
 
 
-def peaks_terrain(bounds: Floats, peaks: Floats, margin: float) -> Terrain:
-    """Sum of Gaussian hills on level ground at sea level.
+class Peak(NamedTuple):
+    """A Gaussian hill: its summit's place and height, and its standard deviation, all m."""
 
-    peaks: (p, 4) east, north, height, sigma in m.  Gridded at a sixteenth of the smallest sigma (at most 1,500
+    east: float
+    north: float
+    height: float
+    sigma: float
+
+
+def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], margin: float) -> Terrain:
+    """Sum of Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a margin, m.
+
+    Gridded at a sixteenth of the smallest sigma (at most 1,500
     pixels a side), which holds each summit to 0.05 % of its height.
     """
     width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * margin
-    pitch = max(float(peaks[:, 3].min()) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
+    pitch = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
 
     def axis(low: float, high: float) -> Floats:
         return np.linspace(low - margin, high + margin, 2 + int((high - low + 2 * margin) / pitch))
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
     heights = np.zeros((north.size, east.size))
-    for pe, pn, height, sigma in peaks:
-        heights += height * np.outer(
-            np.exp(-((north - pn) ** 2) / (2 * sigma**2)), np.exp(-((east - pe) ** 2) / (2 * sigma**2))
+    for peak in peaks:
+        heights += peak.height * np.outer(
+            np.exp(-((north - peak.north) ** 2) / (2 * peak.sigma**2)),
+            np.exp(-((east - peak.east) ** 2) / (2 * peak.sigma**2)),
         )
     return gridded(heights, east, north, source=f"{len(peaks)} Gaussian peaks", sha256="", datum="mean sea level")

@@ -14,7 +14,7 @@ from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
 from world.scenario import MARGIN, Scenario, from_spec
-from world.scenario_file import MAP_REACH, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
+from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -84,12 +84,12 @@ def _boxes(mission: Mission, origin: GeoOrigin) -> tuple[Floats, Floats]:
     """Area, and smallest box of the places flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
     stops = plan_stops(mission, 0.0).stops
     points = np.stack(to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops]))
-    if not (np.abs(points) <= MAP_REACH).all():
+    if not (np.abs(points) <= MAP_EXTENT).all():
         # The error that names the item.
         make_route(mission, origin, None, 1.0, False)
     flown = np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
     around = AROUND + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
-    return np.clip(flown + np.array([-around, around]), -MAP_REACH, MAP_REACH), flown
+    return np.clip(flown + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
 
 
 def _ground(

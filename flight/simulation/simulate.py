@@ -140,7 +140,7 @@ class Flight:
     def _disturb(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation's error."""
         wind, arena = setup.scenario.wind, self.arena
-        to = wind.from_course + math.pi
+        to = wind.to_course
         arena.wind[:] = (
             *(wind.speed, math.cos(to), math.sin(to)),
             *(wind.gradient, wind.reference_amsl, W20[wind.turbulence]),

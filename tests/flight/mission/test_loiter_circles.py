@@ -26,7 +26,7 @@ from tests.flight.mission.test_routing import ORIGIN, ground, mission, refusal, 
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
 from world.scenario import from_spec
-from world.scenario_file import MAP_REACH
+from world.scenario_tables import MAP_EXTENT
 
 TURN = 2.0 * math.pi
 
@@ -159,7 +159,7 @@ def test_refusals() -> None:
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=19, p="3e38 0 100 0"))
     many = [wp(0, 2000, command=18, p="900 0 100 0"), wp(0, 4000), wp(0, 2000, command=18, p="900 0 100 0")]
     assert "more than 10,000 places" in refusal(wp(0, 0), *many)
-    assert MAP_REACH > 30_000.0
+    assert MAP_EXTENT > 30_000.0
 
 
 @pytest.fixture(scope="module")
