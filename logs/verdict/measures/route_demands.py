@@ -16,7 +16,7 @@ from aircraft.path_limits import (
     reversal_room,
     turn_radius_between,
 )
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from world.geometry import arc_cut, arc_reach, leg_courses, leg_runs, leg_slopes, signed_turns
 
 Floats = NDArray[np.float64]
@@ -94,7 +94,7 @@ class RouteDemands:
 
 def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     """Work out a route's shape.  ``envelope=False`` leaves the aircraft's limits out, for flown evidence alone."""
-    route, limits = setup.route, limits_of(setup)
+    route, limits = setup.route, setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     count, legs = len(points), len(points) - 1
     packed = {float(v): limits.packed(float(v)) for v in route.airspeed}
