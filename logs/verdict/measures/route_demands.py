@@ -17,7 +17,7 @@ from aircraft.path_limits import (
     roll_reversal_length,
     turn_radius_between,
 )
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
 
 Floats = NDArray[np.float64]
@@ -95,7 +95,7 @@ class RouteDemands:
 
 def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     """Work out a route's shape.  ``envelope=False`` leaves the aircraft's limits out, for flown evidence alone."""
-    route, limits = setup.route, limits_of(setup)
+    route, limits = setup.route, setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     count, legs = len(points), len(points) - 1
     tables = {float(v): limits.performance(float(v)) for v in route.airspeed}
