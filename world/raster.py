@@ -80,11 +80,11 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     )
 
 
-def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margin: float) -> Terrain:
-    """Read the window of ``raster`` that covers map ``bounds`` [[e0, e1], [n0, n1]] m and a margin, as `Terrain`.
+def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
+    """Read the window of ``raster`` over map bounds [[e0, e1], [n0, n1]] and a buffer about them, m, as `Terrain`.
 
     Raises TerrainError where the bounds reach beyond the tile, where data is missing inside them, or where
-    the window is too large.  The margin is cut at the tile's edge in silence.
+    the window is too large.  The buffer is cut at the tile's edge in silence.
 
     >>> raster = open_raster("jacksboro")
     >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
@@ -99,7 +99,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margi
             f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
             f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}"
         )
-    c0, c1, r0, r1 = _outline_window(raster, origin, box, margin)
+    c0, c1, r0, r1 = _outline_window(raster, origin, box, buffer)
     left, right = max(0, math.floor(c0) - 1), min(cols, math.ceil(c1) + 2)
     top, bottom = max(0, math.floor(r0) - 1), min(rows, math.ceil(r1) + 2)
     if (right - left) * (bottom - top) > MOST_PIXELS:
@@ -112,7 +112,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margi
     heights[~valid] = np.nan
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
-        box + np.array([-margin, margin]),
+        box + np.array([-buffer, buffer]),
         PIXEL_TOLERANCE,
     )
     if to_pixel.residual > 10 * PIXEL_TOLERANCE:
@@ -155,11 +155,11 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
 
 
 def _outline_window(
-    raster: RasterFile, origin: GeoOrigin, box: Floats, margin: float
+    raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
     """Range of cols and rows that the outline of a map box takes: (col0, col1, row0, row1)."""
     ramp = np.linspace(0.0, 1.0, 41)
-    (w, e), (s, n) = box + np.array([-margin, margin])
+    (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
     north = np.concatenate([np.full(41, s), np.full(41, n), s + ramp * (n - s), s + ramp * (n - s)])
     col, row = _shifted(raster.to_source, origin, east, north, 0, 0)

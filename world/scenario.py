@@ -32,7 +32,7 @@ from world.wind import Wind
 Floats = NDArray[np.float64]
 
 # Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
-MARGIN = 1000.0
+GROUND_BUFFER = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +172,7 @@ def from_spec(
         raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from")
     if ground is None:
         if raster is not None:
-            ground = read_terrain(raster, origin, bounds, MARGIN)
+            ground = read_terrain(raster, origin, bounds, GROUND_BUFFER)
         else:
             ground = _made_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
@@ -268,10 +268,10 @@ def _assemble(
 
 def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
     if table.kind == "flat":
-        return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * MARGIN)
+        return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
     if table.kind == "peaks":
         peaks = [Peak(p.east_m, p.north_m, p.height_m, p.sigma_m) for p in table.peak or []]
-        return peaks_terrain(bounds, peaks, MARGIN)
+        return peaks_terrain(bounds, peaks, GROUND_BUFFER)
     return None
 
 

@@ -114,14 +114,14 @@ def with_threats(
 
     known = scenario.threats
     kill_share = share(known.kill_radius, known.kill_scale, 1.0 / 4.0)
-    seen_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
+    detection_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
     tables = [*scenario.spec.threats, *kept]
-    for number, (east, north, kill, seen) in enumerate(added):
+    for number, (east, north, kill, detection) in enumerate(added):
         data: dict[str, Any] = {"name": f"pop-up {len(kept) + number + 1}", "east_m": east, "north_m": north}
         if kill != 0.0:
             data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_share}
-        if seen != 0.0:
-            data |= {"detection_radius_m": seen, "detection_scale_m": seen * seen_share}
+        if detection != 0.0:
+            data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_share}
         tables.append(checked_table(partial(ThreatTable, **data), source))
     spec = scenario.spec.model_copy(update={"threats": tables})
     return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))

@@ -212,10 +212,10 @@ def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: st
     return Terrain(function_heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum)
 
 
-def flat_terrain(bounds: Floats, amsl: float, margin: float) -> Terrain:
-    """Level ground over bounds [[e0, e1], [n0, n1]] and a margin, m."""
-    east = np.linspace(bounds[0, 0] - margin, bounds[0, 1] + margin, 3)
-    north = np.linspace(bounds[1, 0] - margin, bounds[1, 1] + margin, 3)
+def flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
+    """Level ground over bounds [[e0, e1], [n0, n1]] and a buffer about them, m."""
+    east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
+    north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
     return gridded(np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level")
 
 
@@ -228,17 +228,17 @@ class Peak(NamedTuple):
     sigma: float
 
 
-def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], margin: float) -> Terrain:
-    """Sum of Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a margin, m.
+def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
+    """Sum of Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a buffer about them, m.
 
     Gridded at a sixteenth of the smallest sigma (at most 1,500
     pixels a side), which holds each summit to 0.05 % of its height.
     """
-    width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * margin
+    width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * buffer
     pitch = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
 
     def axis(low: float, high: float) -> Floats:
-        return np.linspace(low - margin, high + margin, 2 + int((high - low + 2 * margin) / pitch))
+        return np.linspace(low - buffer, high + buffer, 2 + int((high - low + 2 * buffer) / pitch))
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
     heights = np.zeros((north.size, east.size))

@@ -13,7 +13,7 @@ from flight.mission.routing import HIGHEST, make_route
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
-from world.scenario import MARGIN, Scenario, from_spec
+from world.scenario import GROUND_BUFFER, Scenario, from_spec
 from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
 
@@ -112,7 +112,7 @@ def _ground(
     file = Path(path)
     place = str(file.resolve()) if file.is_file() else path
     table = TerrainTable(kind="dem", path=place, sha256=raster.sha256)
-    return read_terrain(raster, origin, cut, MARGIN), table, cut
+    return read_terrain(raster, origin, cut, GROUND_BUFFER), table, cut
 
 
 def _end(point: Floats, terrain: Terrain | None) -> EndTable:

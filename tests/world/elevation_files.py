@@ -97,9 +97,9 @@ def write_hgt(folder: Path) -> Path:
 
 
 def read_window(
-    path: Path | str, bounds: Floats = BOUNDS, origin: GeoOrigin = MIDDLE, margin: float = 500.0
+    path: Path | str, bounds: Floats = BOUNDS, origin: GeoOrigin = MIDDLE, buffer: float = 500.0
 ) -> Terrain:
-    return read_terrain(open_raster(str(path)), origin, bounds, margin)
+    return read_terrain(open_raster(str(path)), origin, bounds, buffer)
 
 
 def assert_refused(path: Path | str, match: str, **options: Any) -> None:

@@ -77,7 +77,7 @@ SYSTEMS: dict[str, float] = {
 
 @pytest.mark.parametrize("crs", SYSTEMS)
 def test_any_reference_system(crs: str, tmp_path: Path) -> None:
-    terrain = read_window(write_in_crs(tmp_path / "t.tif", crs, SYSTEMS[crs]), margin=100.0)
+    terrain = read_window(write_in_crs(tmp_path / "t.tif", crs, SYSTEMS[crs]), buffer=100.0)
     east, north = np.random.default_rng(3).uniform(-2400.0, 2400.0, (2, 500))
     lat, lon = to_geo(MIDDLE, east, north)
     assert terrain.height(east, north) == pytest.approx(made_ground(lon, lat), abs=0.1)

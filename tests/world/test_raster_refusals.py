@@ -31,9 +31,8 @@ from world.raster import open_raster
 
 
 def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
-    assert_refused(
-        write_in_crs(tmp_path / "datum.tif", "EPSG:32632+6360"), "heights in US survey foot: metres are expected"
-    )
+    datum = write_in_crs(tmp_path / "datum.tif", "EPSG:32632+6360")
+    assert_refused(datum, "heights in US survey foot: metres are expected")
     path = write_geotiff(tmp_path / "unit.tif")
     for unit, taken in (("ft", False), ("Meters", True), ("m", True)):
         with rasterio.open(path, "r+") as out:
@@ -103,8 +102,8 @@ def test_area_beyond_the_tile(tmp_path: Path) -> None:
     path = write_npz(tmp_path / "t.npz")
     assert_refused(path, "reaches beyond the tile", bounds=BOUNDS * 4)
     assert_refused(path, "reaches beyond the tile", origin=GeoOrigin(MIDDLE.lat_deg + 1.0, MIDDLE.lon_deg))
-    # A margin is cut at the edge without a word.
-    assert not np.isnan(read_window(path, margin=50_000.0).heights).any()
+    # A buffer is cut at the edge without a word.
+    assert not np.isnan(read_window(path, buffer=50_000.0).heights).any()
 
 
 @pytest.mark.parametrize("value", [np.nan, -9999.0, -32768.0, 1e20, np.inf])
@@ -121,7 +120,7 @@ def test_missing_data_in_the_area_is_refused_stated_or_not(value: float, tmp_pat
     # Beyond the area it does no harm.
     away = made_tile()
     away[2, 2] = value
-    assert read_window(write_geotiff(tmp_path / "away.tif", away), margin=0.0).heights.size > 0
+    assert read_window(write_geotiff(tmp_path / "away.tif", away), buffer=0.0).heights.size > 0
 
 
 def test_one_missing_pixel_of_a_large_fine_area_is_found(tmp_path: Path) -> None:
