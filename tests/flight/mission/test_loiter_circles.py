@@ -11,21 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
-from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.fly_by_path import fly_by_path, sample_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.route import Route
-from flight.mission.routing import make_route
 from flight.simulation.flight_setup import FlightSetup, limits_of
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.replay.timeline import timeline
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from tests.flight.mission.test_routing import ORIGIN, ground, mission, refusal, route, wp
+from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
-from world.scenario import from_spec
 from world.scenario_file import MAP_REACH
 
 TURN = 2.0 * math.pi
@@ -38,29 +35,6 @@ def circled(flown: Route, item: int) -> tuple[float, float]:
     at = (flown.items == item) & (flown.arcs > 0.0)
     assert np.ptp(flown.arcs[at]) == 0.0
     return float(turns[at].sum()) / TURN, float(flown.arcs[at][0])
-
-
-def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> FlightSetup:
-    """A mission over flat ground at 100 m, ready to fly."""
-    read = mission(*lines, home=home)
-    end = {"east_m": 0.0, "north_m": 0.0, "amsl_m": 400.0}
-    spec: dict[str, Any] = {
-        "name": "loiters",
-        "origin": {"lat_deg": ORIGIN.lat_deg, "lon_deg": ORIGIN.lon_deg},
-        "terrain": {"kind": "flat", "amsl_m": 100.0},
-        "area": {"east_m": [-6000, 6000], "north_m": [-6000, 6000], "ceiling_amsl_m": 3000.0},
-        "start": end,
-        "destination": end | {"east_m": 500.0},
-    }
-    scenario = from_spec(spec | tables, "loiters", external=True)
-    aircraft = load_aircraft("aerosonde")
-    bank = math.radians(30.0)
-    blank = Route(
-        np.array([[0.0, 0, 400], [500, 0, 400]]), np.array([25.0]), np.zeros(2), np.zeros(2, bool), np.arange(2), ""
-    )
-    envelope = load_envelope(aircraft)
-    setup = FlightSetup(scenario, read, "", blank, envelope, "aerosonde", 25.0, bank, 888.0, 1)
-    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, limits_of(setup)))
 
 
 @settings(max_examples=60, deadline=None)
