@@ -33,12 +33,13 @@ Response = PeerMessage | StatusText
 
 @dataclass(frozen=True, slots=True)
 class _Waiting:
-    """An arm command that waits for the verdict."""
+    """An arm command that waits for the verdict; param1, param2: of MAV_CMD_COMPONENT_ARM_DISARM."""
 
     peer: Peer
     system: int
     component: int
-    values: tuple[float, float]
+    param1: float
+    param2: float
 
 
 @dataclass(slots=True)
@@ -60,7 +61,7 @@ class Requests:
         waiting, self._waiting = self._waiting, []
         replies: list[Response] = []
         for item in waiting:
-            reply = self.arming.arm(*_switch(item.values))
+            reply = self.arming.arm(item.param1 == 1.0, item.param2)
             replies += self._answered(item.peer, item.system, item.component, _ARM, reply)
         return replies
 
@@ -68,10 +69,10 @@ class Requests:
         system, component = message.get_srcSystem(), message.get_srcComponent()
         number = int(message.command)
         if number == _ARM:
-            reply = self.arming.arm(*_switch((message.param1, message.param2)))
+            reply = self.arming.arm(message.param1 == 1.0, message.param2)
             if reply.result == IN_PROGRESS:
                 if len(self._waiting) < _MOST_WAITING:
-                    self._waiting.append(_Waiting(peer, system, component, (message.param1, message.param2)))
+                    self._waiting.append(_Waiting(peer, system, component, message.param1, message.param2))
                 else:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
             return self._answered(peer, system, component, number, reply)
@@ -181,10 +182,6 @@ class Requests:
         if reply.text:
             replies.append(StatusText(reply.text, WARNING if reply.result == DENIED else INFO))
         return replies
-
-
-def _switch(values: tuple[float, float]) -> tuple[bool, float]:
-    return values[0] == 1.0, values[1]
 
 
 def _whole(value: float) -> int:

@@ -24,7 +24,7 @@ def status_texts(text: str, severity: int, number: int) -> list[Any]:
     " deg", and what is beyond 400 bytes is left out.
 
     >>> [message.text for message in status_texts("climb of 9° at leg 3", 4, 1)]
-    [b'climb of 9 deg at leg 3']
+    ['climb of 9 deg at leg 3']
     >>> [(message.id, message.chunk_seq, len(message.text)) for message in status_texts("x" * 120, 6, 7)]
     [(7, 0, 50), (7, 1, 50), (7, 2, 20)]
     """

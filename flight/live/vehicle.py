@@ -6,7 +6,7 @@ import select
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -44,6 +44,13 @@ _MOST_DEATHS = 3
 _SAME_TEXT = 3.0
 
 
+class Standby(NamedTuple):
+    """An aircraft without a mission, and its home."""
+
+    snapshot: Snapshot
+    home: Home
+
+
 class Vehicle:
     """A vehicle that stands ready, takes missions, and flies them on a station's command."""
 
@@ -52,7 +59,7 @@ class Vehicle:
         link: Link,
         spawn: Callable[[], Connection],
         parameters: Parameters,
-        where: tuple[Snapshot, Home],
+        standby: Standby,
         battery: float,
         show: ShowText,
     ) -> None:
@@ -61,17 +68,17 @@ class Vehicle:
         link: the stations.
         spawn: starts a process that flies, and returns the link's end of its pipe.
         parameters: what stations may read and set.
-        where: the aircraft before it has a mission, and home.
+        standby: the aircraft before it has a mission.
         battery: Wh when full.
         show: gets what a person at the terminal should read.
         """
         self.link = link
         self.server = MissionServer()
         self.arming = ArmingState()
-        self.status = Status(where[0], where[1], battery=battery)
+        self.status = Status(standby.snapshot, standby.home, battery=battery)
         self.down = Downlink(link, self.status, parameters, show, _NAP)
         self.requests = Requests(self.arming, parameters, self.status)
-        self._where = where
+        self._standby = standby
         self._spawn = spawn
         # In a row, without being ready in between.
         self._deaths = 0
@@ -181,11 +188,11 @@ class Vehicle:
         self._number += 1
         if not self.server.lists[MissionType.MISSION]:
             self.arming.mission_cleared()
-            self.status.snapshot, self.status.home = self._where
+            self.status.snapshot, self.status.home = self._standby
             self._pass_on(self.requests.verdict_came())
             self._refresh()
             return
-        mission, self._shift = uploaded(self.server.lists, self._where[1])
+        mission, self._shift = uploaded(self.server.lists, self._standby.home)
         # A fence or rally points that are changed need not repeat the texts about the mission.
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
         self.arming.mission_uploaded()

@@ -10,7 +10,7 @@ from pathlib import Path
 from flight.live.link import SYSTEM, Link
 from flight.live.parameters import vehicle_parameters
 from flight.live.snapshot import Snapshot
-from flight.live.vehicle import Vehicle
+from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 from planfly.commands.served_flights import ServeOptions, fly_process, open_served
 from planfly.terminal.link_options import link_access, stop_signals
@@ -36,8 +36,9 @@ def serve(args: argparse.Namespace) -> int:
         speed=options.speed,
     )
     pool = _FlightPool(options)
+    standby = standby_at_start(served.scenario)
     with stop_signals() as stopped:
-        vehicle = Vehicle(link, pool.spawn, parameters, parked(served.scenario), served.airframe.battery, _show)
+        vehicle = Vehicle(link, pool.spawn, parameters, standby, served.airframe.battery, _show)
         host, port = link.address
         targets = ", ".join(f"{to}:{number}" for to, number in access.to)
         print(f"vehicle {SYSTEM} at {host}:{port}, calling {targets}; scenario {served.scenario.name}", flush=True)
@@ -79,7 +80,7 @@ class _FlightPool:
             child.join(timeout=5.0)
 
 
-def parked(scenario: Scenario) -> tuple[Snapshot, Home]:
+def standby_at_start(scenario: Scenario) -> Standby:
     """State and home of an aircraft without a mission: at the scenario's start, on a course to its destination."""
     east, north, amsl = (float(value) for value in scenario.start)
     lat, lon = (float(value) for value in to_geo(scenario.origin, east, north))
@@ -87,7 +88,7 @@ def parked(scenario: Scenario) -> tuple[Snapshot, Home]:
     step = scenario.destination - scenario.start
     course = math.atan2(float(step[0]), float(step[1]))
     snapshot = Snapshot(time=0.0, lat_deg=lat, lon_deg=lon, amsl=amsl, height=amsl - ground, yaw=course)
-    return snapshot, Home(lat, lon, amsl if math.isnan(ground) else ground)
+    return Standby(snapshot, Home(lat, lon, amsl if math.isnan(ground) else ground))
 
 
 def _show(text: str) -> None:

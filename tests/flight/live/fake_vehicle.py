@@ -9,7 +9,7 @@ from flight.live.link import Access, Link
 from flight.live.parameters import vehicle_parameters
 from flight.live.signing import EPOCH
 from flight.live.snapshot import Snapshot
-from flight.live.vehicle import Vehicle
+from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 
 LOCAL = Access(("127.0.0.1", 0), (("127.0.0.1", 9),))
@@ -45,7 +45,7 @@ class FakeVehicle:
         )
         self.shown: list[str] = []
         self.flyable = True
-        self.vehicle = Vehicle(self.link, lambda: ours, parameters, (snapshot, home), 200.0, self.show)
+        self.vehicle = Vehicle(self.link, lambda: ours, parameters, Standby(snapshot, home), 200.0, self.show)
         self.orders: list[object] = []
 
     def show(self, text: str) -> None:

@@ -37,7 +37,7 @@ def test_the_table_of_stations_is_bounded_and_forgets(link: Link) -> None:
     assert list(link.peers) == [("127.0.0.1", 5000)]
 
 
-def test_one_count_of_frames_a_station(link: Link) -> None:
+def test_a_station_gets_one_count_of_frames(link: Link) -> None:
     """A ground station takes a jump in it for lost packets."""
     ours = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     ours.bind(("127.0.0.1", 0))
@@ -81,7 +81,7 @@ def test_beyond_this_machine_only_with_protection(access: Access, word: str) -> 
         Link(access)
 
 
-def test_the_allow_list() -> None:
+def test_only_addresses_on_the_list_are_let_in() -> None:
     made = Link(Access(("127.0.0.1", 0), (), frozenset({"192.0.2.7"})))
     try:
         assert made.take(packed(HEARTBEAT), ("192.0.2.8", 5)) == []

@@ -16,7 +16,7 @@ def test_damaged_frames_are_skipped_to_the_next_whole_one(cut: int) -> None:
     assert split_frames(bytes(turned)) == [] or cut % len(frame) == 0
 
 
-def test_both_versions_are_read() -> None:
+def test_frames_of_both_versions_are_read() -> None:
     mav = mavlink.MAVLink(None, 255, 190)
     old = HEARTBEAT.pack(mav, force_mavlink1=True)
     assert old[0] == 0xFE

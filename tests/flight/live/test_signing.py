@@ -11,7 +11,7 @@ from tests.flight.live.fake_vehicle import HEARTBEAT, KEY, WALL, packed
 from world.errors import FlightError
 
 
-def test_signed_frames_are_pymavlinks() -> None:
+def test_pymavlink_accepts_our_signatures_and_we_its() -> None:
     """An independent implementation accepts ours, and ours accepts its."""
     ours, theirs = Signing(KEY, 3), mavlink.MAVLink(None, 255, 190)
     theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
@@ -43,7 +43,7 @@ def test_a_forged_timestamp_locks_nobody_out() -> None:
     assert not vehicle.accepts(old, WALL), "a recording from two minutes ago, on a new link"
 
 
-def test_key_files(tmp_path: Path) -> None:
+def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "key"
     path.write_text(KEY.hex() + "\n", encoding="ascii")
     path.chmod(0o644)

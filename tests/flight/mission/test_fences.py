@@ -39,7 +39,7 @@ def test_threats_and_area_become_a_fence() -> None:
 
 
 @pytest.mark.parametrize("kind", ["fence", "rally", "plan"])
-def test_fences_come_back(kind: Any) -> None:
+def test_fences_come_back_from_every_form(kind: Any) -> None:
     plan = a_plan([(9000.0, -5000.0, 700.0), (-9000.0, 3000.0, 900.0)])
     mission, _ = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario)
     again = parse_mission(mission_text(mission, kind), f"a.{kind}")
@@ -55,7 +55,7 @@ def test_mission_planners_fence_has_a_home_line() -> None:
     assert (item.seq, item.params[0], item.x) == (0, 90.0, 366_000_000)
 
 
-def test_a_polygon_with_too_few_corners() -> None:
+def test_a_polygon_with_too_few_corners_is_refused() -> None:
     text = "QGC WPL 110\n0 0 0 5002 3 0 0 0 36.5 -84.2 0 1\n1 0 0 5002 3 0 0 0 36.6 -84.2 0 1\n"
     with pytest.raises(MissionError, match="fence item 0: p1 3: fewer corners follow"):
         parse_mission(text, "a.fence")

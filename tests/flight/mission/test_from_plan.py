@@ -40,7 +40,7 @@ def test_an_exported_plan_comes_back(points: list[tuple[float, float, float]]) -
     assert (flown.acceptance >= 10.0).all()
 
 
-def test_export_of_a_corner() -> None:
+def test_a_corner_has_its_fly_by_offset_as_acceptance() -> None:
     """R = 625 / (9.80665 tan 30) = 110.39 m; at 60 degrees the arc passes R(1/cos 30 - 1) = 17.08 m from the corner."""
     corner = [(0.0, 0.0, 700.0), (0.0, 1000.0, 700.0), (866.0, 1500.0, 700.0)]
     exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0))

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from flight.mission.implied_scenario import implied_scenario, mission_origin
+from flight.mission.items import Mission
+from flight.mission.itinerary import make_itinerary
 from flight.mission.routing import make_route
 from flight.mission_files.formats import read_mission
 from tests.mission_lines import mission, wp
@@ -58,7 +60,7 @@ def test_samples_fly_over_the_tile(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(set(LEGS) - ON_TERRAIN))
-def test_samples_without_terrain(name: str) -> None:
+def test_samples_have_a_scenario_without_terrain(name: str) -> None:
     read = read_mission(SAMPLES / name)
     scenario = implied_scenario(read, None)
     assert scenario.terrain is None
@@ -69,12 +71,12 @@ def test_samples_without_terrain(name: str) -> None:
     assert np.array_equal(again.bounds, scenario.bounds)
 
 
-def test_heights_that_need_terrain() -> None:
+def test_heights_over_terrain_need_terrain() -> None:
     with pytest.raises(MissionError, match=r"item 1: height above terrain.*no terrain is given"):
         implied_scenario(read_mission(SAMPLES / "mavproxy_terrain.txt"), None)
 
 
-def test_implied_scenario_from_its_log() -> None:
+def test_a_log_gives_the_same_scenario() -> None:
     """A log keeps the scenario's JSON and the terrain, and makes the same scenario of them."""
     scenario = implied_scenario(read_mission(SAMPLES / "qgc.waypoints"), "jacksboro")
     again = from_spec(scenario.to_json(), "log", ground=scenario.terrain, external=True)
@@ -85,12 +87,12 @@ def test_implied_scenario_from_its_log() -> None:
         assert np.array_equal(getattr(again, name), getattr(scenario, name))
 
 
-def test_implied_scenario_off_the_tile() -> None:
+def test_a_mission_off_the_tile_is_refused() -> None:
     with pytest.raises(TerrainError, match="the mission flies to east"):
         implied_scenario(mission(wp(0, 0), wp(0, -9000), home="40 -84 0"), "jacksboro")
 
 
-def test_implied_scenario_below_ground() -> None:
+def test_a_mission_through_a_hill_has_a_scenario() -> None:
     """A mission through a hill is not bad input: it has a scenario, and its verdict says no."""
     read = mission(wp(3000, 3000, 20, frame=0), wp(3000, 6000, 20, frame=0))
     scenario = implied_scenario(read, "jacksboro")
@@ -99,8 +101,12 @@ def test_implied_scenario_below_ground() -> None:
     assert make_route(read, scenario.origin, scenario.terrain, 25.0, False).waypoints[:, 2].tolist() == [20.0, 20.0]
 
 
-def test_origin() -> None:
-    assert mission_origin(mission(wp(0, 500), wp(0, 900))) == GeoOrigin(36.5, -84.2)
+def origin_of(read: Mission) -> GeoOrigin:
+    return mission_origin(read, make_itinerary(read, 25.0).stops)
+
+
+def test_the_origin_is_home_if_home_is_near() -> None:
+    assert origin_of(mission(wp(0, 500), wp(0, 900))) == GeoOrigin(36.5, -84.2)
     # A ground station's default home on the other side of the world is nobody's home.
-    away = mission_origin(mission(wp(0, 500), wp(0, 900), home="47.4 8.5 488"))
+    away = origin_of(mission(wp(0, 500), wp(0, 900), home="47.4 8.5 488"))
     assert away.lat_deg == pytest.approx(36.5045, abs=1e-4)

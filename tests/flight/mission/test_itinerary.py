@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flight.mission.itinerary import plan_stops
+from flight.mission.itinerary import make_itinerary
 from tests.mission_lines import ground, mission, refusal, route, wp
 
 
@@ -35,7 +35,7 @@ def test_speeds_count_for_the_legs_after_them() -> None:
     )
 
 
-def test_jumps() -> None:
+def test_jumps_are_followed_as_often_as_they_say() -> None:
     corners = [wp(0, 0), wp(0, 900), wp(900, 900)]
     assert route(*corners, "2 177 2 2 0 0 0 0 0").items.tolist() == [1, 2, 3, 2, 3, 2, 3]
     assert route(*corners, "2 177 1 0 0 0 0 0 0").items.tolist() == [1, 2, 3]
@@ -58,14 +58,14 @@ def test_a_jump_flies_its_body_once_more_each_time(corners: int, repeats: int) -
     assert flown.items.tolist() == list(range(1, corners + 1)) * (repeats + 1)
 
 
-def test_jumps_that_are_refused() -> None:
+def test_jumps_to_nowhere_or_too_often_are_refused() -> None:
     assert "item 3: DO_JUMP p1 9: the mission has no item 9" in refusal(wp(0, 0), wp(0, 900), "2 177 9 1 0 0 0 0 0")
     assert "DO_JUMP p1 0" in refusal(wp(0, 0), wp(0, 900), "2 177 0 1 0 0 0 0 0")
     assert "more than 10,000 places" in refusal(wp(0, 0), wp(0, 900), "2 177 1 9999 0 0 0 0 0")
     assert "more than 200,000 items" in refusal(wp(0, 0), wp(0, 900), "2 177 3 999999 0 0 0 0 0")
 
 
-def test_ends() -> None:
+def test_a_return_or_a_landing_ends_the_itinerary() -> None:
     home = route(wp(0, 500, 150), wp(0, 1500, 200), "0 20 0 0 0 0 0 0 0", wp(5, 5))
     assert home.waypoints[-1] == pytest.approx([0.0, 0.0, 500.0], abs=0.01)
     assert home.notes == (
@@ -97,5 +97,5 @@ def test_nothing_is_dropped_in_silence(command: int) -> None:
 
 
 def test_long_missions_walk_in_linear_time() -> None:
-    stops = plan_stops(mission(*[wp(k, k) for k in range(9000)]), 25.0).stops
+    stops = make_itinerary(mission(*[wp(k, k) for k in range(9000)]), 25.0).stops
     assert len(stops) == 9000

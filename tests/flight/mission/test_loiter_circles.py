@@ -76,7 +76,7 @@ def place_of(east: float, north: float) -> tuple[float, float]:
 FLAT = setup_of(wp(0, 0), wp(0, 2000))
 
 
-def test_how_long() -> None:
+def test_loiters_last_as_long_as_asked() -> None:
     timed = route(wp(0, 0), wp(0, 2000, command=19, p="90 0 200 0"), wp(3000, 2000))
     assert 90.0 <= abs(circled(timed, 2)[0]) * TURN * 200.0 / 25.0 < 90.0 + TURN * 200.0 / 25.0
     endless = route(wp(0, 0), wp(0, 2000, command=17, p="0 0 -150 0"), wp(3000, 2000))
@@ -98,7 +98,7 @@ def test_to_height_spirals_within_the_envelope() -> None:
     assert circled(down, 2)[0] < -1.0
 
 
-def test_its_own_radius() -> None:
+def test_a_loiter_without_a_radius_has_the_aircrafts_own() -> None:
     """R = 625 / (9.80665 tan 30) = 110.39 m in calm air; a tenth over it in whole tens of metres is 130 m."""
     lines = (wp(0, 0), wp(0, 2000, command=18, p="1 0 0 0"), wp(3000, 2000))
     assert circled(setup_of(*lines).route, 2)[1] == 130.0
@@ -107,7 +107,7 @@ def test_its_own_radius() -> None:
     assert circled(setup_of(*lines, wind={"speed_mps": 8.0, "from_deg": 0.0}).route, 2)[1] == 220.0
 
 
-def test_places_inside_a_circle() -> None:
+def test_stops_inside_a_circle_are_left_out() -> None:
     over = route(wp(0, 0), wp(0, 2000), wp(0, 2000, command=18, p="1 0 120 0"), wp(10, 1990), wp(3000, 2000))
     assert list(dict.fromkeys(over.items.tolist())) == [1, 3, 5]
     assert [note.split(":")[0] for note in over.notes] == ["items 2, 4"]
@@ -122,12 +122,12 @@ def test_places_inside_a_circle() -> None:
     assert (here.waypoints[here.items == 3, 2] == 400.0).all()
 
 
-def test_a_jump_back_to_a_loiter() -> None:
+def test_a_jump_back_to_a_loiter_flies_it_again() -> None:
     flown = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 150 0"), wp(3000, 2000), "2 177 2 1 0 0 0 0 0")
     assert circled(flown, 2)[0] > 2.0
 
 
-def test_refusals() -> None:
+def test_circles_too_wide_or_too_long_are_refused() -> None:
     assert "item 2: loiter radius 30000 m" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1 0 30000 0"))
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1e9 0 100 0"))
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=19, p="3e38 0 100 0"))
@@ -190,7 +190,7 @@ def test_a_loiter_cut_short_is_not_complete(flight: tuple[FlightSetup, Any]) -> 
     assert not any(item.ok for item in verdict.findings if item.rule == "loiter")
 
 
-def test_terrain_and_relative_heights_of_loiters() -> None:
+def test_loiters_over_terrain_have_the_height_of_their_middle() -> None:
     flown = route(wp(0, 0), wp(0, 2000, 250, command=18, frame=10, p="1 0 150 0"), wp(2500, 0), terrain=ground(320.0))
     assert (flown.waypoints[flown.items == 2, 2] == 570.0).all()
 

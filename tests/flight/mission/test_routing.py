@@ -23,7 +23,7 @@ def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
     assert any("count from 0 m AMSL" in note for note in route.notes)
 
 
-def test_starts() -> None:
+def test_a_route_starts_at_the_first_position_or_over_home() -> None:
     plain = route(wp(0, 500, 120), wp(0, 1500, 150))
     assert plain.waypoints[0] == pytest.approx([0.0, 500.0, 420.0], abs=0.01)
     assert plain.started.startswith("no TAKEOFF: starts trimmed at the first position, item 1: 36.504")
@@ -41,7 +41,7 @@ def test_starts() -> None:
     assert same_place.items.tolist() == [1, 2]
 
 
-def test_take_off_without_home() -> None:
+def test_a_take_off_without_home_starts_at_the_first_position() -> None:
     """Home at 0, 0 means none: the first position item stands for it."""
     flown = route(wp(0, 700, 80, command=22), wp(900, 700), home="0 0 0", terrain=ground())
     assert flown.items.tolist() == [1, 2]
@@ -50,7 +50,7 @@ def test_take_off_without_home() -> None:
     assert "no home height: taken as the ground at 36.506" in flown.notes[-1]
 
 
-def test_frames() -> None:
+def test_heights_of_every_frame_are_amsl() -> None:
     flown = route(
         wp(0, 100, 450, frame=0),
         wp(0, 900, 450, frame=5),
@@ -64,7 +64,7 @@ def test_frames() -> None:
     assert "items 5-6: height above terrain" in flown.notes[0]
 
 
-def test_home_that_is_not_on_the_ground() -> None:
+def test_a_home_off_the_ground_is_noted() -> None:
     flown = route(wp(0, 100), wp(0, 900), home="36.5 -84.2 0", terrain=ground())
     assert "home is at 0.0 m AMSL, and the ground there at 300.0 m" in flown.notes[0]
 
@@ -75,7 +75,7 @@ def test_cruise_speed_is_no_command() -> None:
     assert "cruiseSpeed 15 m/s is the ground station's estimate" in flown.notes[-1]
 
 
-def test_merging() -> None:
+def test_stops_at_one_position_are_merged() -> None:
     flown = route(wp(0, 0), wp(0, 900), wp(0.3, 900.3), wp(0, 900), wp(900, 900))
     assert flown.items.tolist() == [1, 2, 5]
     assert flown.notes == ("items 3-4: at the place of item 2: merged with it",)
@@ -93,7 +93,7 @@ def test_refusals_name_the_item() -> None:
     assert "item 2: latitude -84" in refusal(wp(0, 0), "3 16 0 0 0 0 -84.2 36.5 100")
 
 
-def test_null_in_a_plan() -> None:
+def test_null_in_a_plan_keeps_what_is() -> None:
     """NaN means "as it is now": no position is none to fly to, no altitude keeps the last."""
     data = json.loads(mission_text(mission(wp(0, 0), wp(0, 900), wp(900, 900, 180)), "plan"))
     first, second, third = (item["params"] for item in data["mission"]["items"])
@@ -109,7 +109,7 @@ def test_null_in_a_plan() -> None:
         make_route(parse_mission(json.dumps(data), "a.plan"), ORIGIN, None, 25.0, False)
 
 
-def test_acceptance_and_fly_over() -> None:
+def test_circles_are_flown_by_whatever_the_waypoints_are() -> None:
     read = mission(wp(0, 0, p="0 40 0 0"), wp(0, 900, p="0 -3 0 0"), wp(900, 900, command=18, p="1 2 80 0"))
     flown = make_route(read, ORIGIN, None, 25.0, True)
     assert flown.acceptance[:2].tolist() == [40.0, 0.0]

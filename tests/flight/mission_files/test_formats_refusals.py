@@ -13,14 +13,14 @@ from world.errors import MissionError
 
 @pytest.mark.parametrize("suffix", ["waypoints", "plan"])
 @pytest.mark.parametrize("case", sorted(BAD_BYTES))
-def test_not_text(case: str, suffix: str, tmp_path: Path) -> None:
+def test_what_is_no_text_is_refused(case: str, suffix: str, tmp_path: Path) -> None:
     data, wanted = BAD_BYTES[case]
     file = tmp_path / f"bad.{suffix}"
     file.write_bytes(data)
     refused(file, wanted)
 
 
-def test_not_a_mission_file(tmp_path: Path) -> None:
+def test_what_is_no_mission_file_is_refused(tmp_path: Path) -> None:
     refused(tmp_path / "missing.waypoints", "cannot be read")
     (tmp_path / "folder.plan").mkdir()
     refused(tmp_path / "folder.plan", "cannot be read")

@@ -68,7 +68,7 @@ def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None
         ),
     ],
 )  # fmt: skip
-def test_complex_items_that_cannot_be_read(change: dict[str, Any], words: str) -> None:
+def test_complex_items_that_cannot_be_read_are_refused(change: dict[str, Any], words: str) -> None:
     with pytest.raises(MissionError, match=words) as caught:
         parse_mission(plan_with(simple(1, 36.6), {"type": "ComplexItem"} | change), "a.plan")
     assert "\n" not in str(caught.value)
