@@ -76,7 +76,8 @@ def implied_scenario(
 def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
     """Where the map of a mission without a scenario has its origin: home, or the first position flown to.
 
-    stops: the mission's itinerary.  Home counts if it is within 100 km of that position.  Raises MissionError beyond 89 degrees of latitude.
+    stops: of the mission's itinerary.  Home counts if it is within 100 km of that position.  Raises MissionError beyond
+    89 degrees of latitude.
     """
     first = stops[0]
     positions = [item for item in mission.items if item.has_position and item.seq >= first.item]

@@ -57,7 +57,10 @@ class RoutePoint:
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """A stop as a point, or as a circle about it.  turn: the circle's radius, m, positive to the right, 0 for a point."""
+    """A stop as a point, or as a circle about it.
+
+    turn: the circle's radius, m, positive to the right, 0 for a point.
+    """
 
     stop: ItineraryStop
     east: float
