@@ -13,7 +13,7 @@ from flight.mission.items import Mission
 from flight.mission.route import Route
 from flight.mission.routing import make_route
 from flight.mission_files.formats import parse_mission
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from planner.plan import Certificate, Plan
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo
@@ -70,9 +70,9 @@ def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> Flight
     blank = Route(
         np.array([[0.0, 0, 400], [500, 0, 400]]), np.array([25.0]), np.zeros(2), np.zeros(2, bool), np.arange(2), ""
     )
-    envelope = load_envelope(aircraft)
-    setup = FlightSetup(scenario, read, "", blank, envelope, "aerosonde", 25.0, bank, 888.0, 1)
-    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, limits_of(setup)))
+    limits = make_limits(scenario, load_envelope(aircraft), 25.0, bank)
+    setup = FlightSetup(scenario, read, "", blank, limits, "aerosonde", 888.0, 1)
+    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, setup.limits))
 
 
 def a_plan(points: list[tuple[float, float, float]]) -> Plan:

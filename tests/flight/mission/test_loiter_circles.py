@@ -14,7 +14,7 @@ from aircraft.catalog import load_aircraft
 from flight.guidance.fly_by_path import fly_by_path, sample_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
@@ -61,7 +61,7 @@ def test_the_path_is_the_circle(
     reach = np.hypot(*(corners - middle).T)
     assert reach == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
     setup = replace(FLAT, route=flown)
-    drawn = sample_path(fly_by_path(flown, limits_of(setup)), 5.0)[:, :2]
+    drawn = sample_path(fly_by_path(flown, setup.limits), 5.0)[:, :2]
     near = np.hypot(*(drawn - middle).T)
     # No point of the path is inside the circle, and the arcs lie on it.
     assert near.min() > radius - 0.05
