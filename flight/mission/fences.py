@@ -14,8 +14,8 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-POLYGONS = (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_POLYGON_EXCLUSION)
-INCLUSIONS = (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
+POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
+INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
@@ -87,7 +87,7 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
     """
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
-    fences = [_fence(scenario.origin, Command.NAV_FENCE_POLYGON_INCLUSION, 4.0, point) for point in corners]
+    fences = [_fence(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
     threats = scenario.threats
     lost = []
     for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True):

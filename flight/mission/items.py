@@ -61,8 +61,8 @@ class Command(IntEnum):
     VIDEO_STOP_CAPTURE = 2501
     DO_VTOL_TRANSITION = 3000
     CONDITION_GATE = 4501
-    NAV_FENCE_POLYGON_INCLUSION = 5001
-    NAV_FENCE_POLYGON_EXCLUSION = 5002
+    NAV_FENCE_POLYGON_VERTEX_INCLUSION = 5001
+    NAV_FENCE_POLYGON_VERTEX_EXCLUSION = 5002
     NAV_FENCE_CIRCLE_INCLUSION = 5003
     NAV_FENCE_CIRCLE_EXCLUSION = 5004
     NAV_RALLY_POINT = 5100
@@ -267,7 +267,7 @@ def _count_problem(item: MissionItem) -> str | None:
             return f"p2 {p2:g}: a jump's count is a whole number, or -1 for without end"
     if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:
         return f"p1 {p1:g}: turns and seconds to loiter cannot be negative"
-    if item.command in (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_POLYGON_EXCLUSION):
+    if item.command in (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION):
         if not (p1 >= 3 and p1 == int(p1)):
             return f"p1 {p1:g}: a fence polygon has a whole number of corners, at least 3"
     elif item.command in FENCES and not p1 > 0:

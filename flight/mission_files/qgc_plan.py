@@ -188,7 +188,11 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
         found.append(item)
 
     for k, shape in enumerate(fence.polygons):
-        command = Command.NAV_FENCE_POLYGON_INCLUSION if shape.inclusion else Command.NAV_FENCE_POLYGON_EXCLUSION
+        command = (
+            Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION
+            if shape.inclusion
+            else Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+        )
         for point in shape.polygon:
             add(command, float(len(shape.polygon)), point, f"polygons.{k}")
     for k, ring in enumerate(fence.circles):
