@@ -2,8 +2,8 @@
 
 import math
 import struct
-from collections.abc import Mapping
 from dataclasses import astuple, dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,11 +70,11 @@ class Snapshot:
 _FORM = struct.Struct(f"<{len(fields(Snapshot))}d")
 
 
-def _row_fields(row: Floats) -> Mapping[str, Floats]:
+def _named(row: Floats) -> SimpleNamespace:
     """Fields of a flown row by name, as `flight.simulation.track.Track` names them."""
-    found, at = {}, 0
+    found, at = SimpleNamespace(), 0
     for name, width in COLUMNS.items():
-        found[name] = row[at] if width == 1 else row[at : at + width]
+        setattr(found, name, row[at] if width == 1 else row[at : at + width])
         at += width
     return found
 
@@ -91,7 +91,7 @@ class SnapshotMaker:
 
     def snapshot(self, row: Floats) -> Snapshot:
         """Snapshot of a flown row."""
-        return self._of_fields(_row_fields(row))
+        return self._of_fields(_named(row))
 
     def before_start(self, setup: FlightSetup) -> Snapshot:
         """Snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
@@ -99,33 +99,28 @@ class SnapshotMaker:
         step = points[1] - points[0]
         terrain = setup.scenario.terrain
         ground = math.nan if terrain is None else float(terrain.height(points[0, 0], points[0, 1]))
-        still = {name: np.zeros(width if width > 1 else ()) for name, width in COLUMNS.items()}
-        return self._of_fields(
-            still
-            | {
-                "position": points[0],
-                "attitude": np.array([0.0, 0.0, math.atan2(step[0], step[1])]),
-                "clearance": points[0, 2] - ground,
-                "leg": np.array(-1.0),
-            }
-        )
+        row = _named(np.zeros(sum(COLUMNS.values())))
+        row.position = points[0]
+        row.attitude[2] = math.atan2(step[0], step[1])
+        row.clearance = points[0, 2] - ground
+        row.leg = -1.0
+        return self._of_fields(row)
 
-    def _of_fields(self, row: Mapping[str, Floats]) -> Snapshot:
-        east, north, amsl = (float(value) for value in row["position"])
+    def _of_fields(self, row: SimpleNamespace) -> Snapshot:
+        east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course and this.
         turn = self._chart.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
-        v_east, v_north, v_up = _turned(row["velocity"], turn)
-        wind_east, wind_north, _ = _turned(row["wind"], turn)
-        roll, pitch, yaw = (float(value) for value in row["attitude"])
-        p, q, r = (float(value) for value in row["rates"])
-        *_, throttle = (float(value) for value in row["controls"])
+        v_east, v_north, v_up = _turned(row.velocity, turn)
+        wind_east, wind_north, _ = _turned(row.wind, turn)
+        roll, pitch, yaw = (float(value) for value in row.attitude)
+        p, q, r = (float(value) for value in row.rates)
         return Snapshot(
-            time=float(row["time"]),
+            time=float(row.time),
             lat_deg=lat,
             lon_deg=lon,
             amsl=amsl,
-            height=float(row["clearance"]),
+            height=float(row.clearance),
             v_north=v_north,
             v_east=v_east,
             v_down=-v_up,
@@ -135,13 +130,13 @@ class SnapshotMaker:
             p=p,
             q=q,
             r=r,
-            airspeed=float(row["airspeed"]),
-            throttle=throttle,
+            airspeed=float(row.airspeed),
+            throttle=float(row.controls[3]),
             wind_north=wind_north,
             wind_east=wind_east,
-            current=float(row["current"]),
-            energy=float(row["energy"]),
-            leg=float(row["leg"]),
+            current=float(row.current),
+            energy=float(row.energy),
+            leg=float(row.leg),
         )
 
 

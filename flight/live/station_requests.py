@@ -133,7 +133,8 @@ class Requests:
     def _set_mode(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         reply = self.arming.set_mode(int(message.custom_mode))
         # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
-        return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), 11, reply)
+        number = mavlink.MAVLINK_MSG_ID_SET_MODE
+        return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
     def _mission_set_current(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         reply = self._set_current(int(message.seq))

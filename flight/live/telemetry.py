@@ -55,12 +55,12 @@ PERIODS: dict[str, float] = {
 }
 # Which of them each MAV_DATA_STREAM of REQUEST_DATA_STREAM means (as ArduPilot groups them).
 STREAMS: dict[int, tuple[str, ...]] = {
-    0: tuple(PERIODS),
-    2: ("SYS_STATUS", "MISSION_CURRENT", "GPS_RAW_INT"),
-    6: ("GLOBAL_POSITION_INT",),
-    10: ("ATTITUDE",),
-    11: ("VFR_HUD",),
-    12: ("WIND", "WIND_COV", "EXTENDED_SYS_STATE", "HOME_POSITION"),
+    mavlink.MAV_DATA_STREAM_ALL: tuple(PERIODS),
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: ("SYS_STATUS", "MISSION_CURRENT", "GPS_RAW_INT"),
+    mavlink.MAV_DATA_STREAM_POSITION: ("GLOBAL_POSITION_INT",),
+    mavlink.MAV_DATA_STREAM_EXTRA1: ("ATTITUDE",),
+    mavlink.MAV_DATA_STREAM_EXTRA2: ("VFR_HUD",),
+    mavlink.MAV_DATA_STREAM_EXTRA3: ("WIND", "WIND_COV", "EXTENDED_SYS_STATE", "HOME_POSITION"),
 }
 
 

@@ -32,7 +32,7 @@ def test_a_bad_message_is_refused() -> None:
     from pymavlink.dialects.v20 import common
 
     good = to_message(some_mission(1).items[0])
-    for field, value, words in (
+    for field, value, text in (
         ("x", 910_000_000, "latitude 91"),
         ("frame", 1, "frame 1"),
         ("param1", math.inf, "p1 inf"),
@@ -41,5 +41,5 @@ def test_a_bad_message_is_refused() -> None:
         message = common.MAVLink_mission_item_int_message(
             *(getattr(good, name) if name != field else value for name in good.fieldnames)
         )
-        with pytest.raises(MissionError, match=f"^station: item 1: .*{words}"):
+        with pytest.raises(MissionError, match=f"^station: item 1: .*{text}"):
             from_message(message, "station")

@@ -58,8 +58,8 @@ def test_the_path_is_the_circle(
     assert step <= math.pi / 4.0 + 1e-6
     middle = np.array([float(v) for v in to_map(ORIGIN, *place_of(east, north))])
     # A polygon around the circle: its corners are as far out as its angle says, its sides touch.
-    reach = np.hypot(*(corners - middle).T)
-    assert reach == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
+    distances = np.hypot(*(corners - middle).T)
+    assert distances == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
     setup = replace(FLAT, route=flown)
     drawn = sample_path(fly_by_path(flown, setup.limits), 5.0)[:, :2]
     near = np.hypot(*(drawn - middle).T)

@@ -48,7 +48,7 @@ def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "text"),
     [
         ({"complexItemType": "StructureScan"}, "'StructureScan'"),
         ({"complexItemType": "fwLandingPattern", "landCoordinate": [1, 2]}, "landCoordinate: \\[1, 2\\]"),
@@ -68,7 +68,7 @@ def test_a_landing_pattern_is_three_items(clockwise: bool, spiral: bool) -> None
         ),
     ],
 )  # fmt: skip
-def test_complex_items_that_cannot_be_read_are_refused(change: dict[str, Any], words: str) -> None:
-    with pytest.raises(MissionError, match=words) as caught:
+def test_complex_items_that_cannot_be_read_are_refused(change: dict[str, Any], text: str) -> None:
+    with pytest.raises(MissionError, match=text) as caught:
         parse_mission(plan_with(simple(1, 36.6), {"type": "ComplexItem"} | change), "a.plan")
     assert "\n" not in str(caught.value)
