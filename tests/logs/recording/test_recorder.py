@@ -1,53 +1,23 @@
-"""The recorded file, read by mcap's own readers and by protobuf classes made from the schemas inside it."""
+"""Recorded files, read by mcap's own readers: every row, whatever the blocks, whole to the last second."""
 
 import io
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from mcap.reader import make_reader
-from mcap.records import Attachment, Chunk, Message, Schema
+from mcap.records import Attachment, Chunk, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.foxglove_scene import body_rotation
 from logs.recording.reader import read_log
 from logs.recording.recorder import CHUNK_SIZE, Recorder
 from logs.recording.state_channel import EPOCH_NS, SECOND_NS
 from tests.logs.conftest import make_setup, make_track, record
-from world.frames import to_geo
-
-
-def message_class(schema: Schema) -> Any:
-    """From the embedded FileDescriptorSet alone."""
-    pool = descriptor_pool.DescriptorPool()
-    for file in descriptor_pb2.FileDescriptorSet.FromString(schema.data).file:
-        pool.Add(file)
-    return message_factory.GetMessageClass(pool.FindMessageTypeByName(schema.name))
-
-
-def messages(path: Path) -> dict[str, list[tuple[Message, Any]]]:
-    found: dict[str, list[tuple[Message, Any]]] = {}
-    with path.open("rb") as file:
-        reader = make_reader(file, validate_crcs=True)
-        classes: dict[int, Any] = {}
-        for schema, channel, message in reader.iter_messages():
-            assert schema is not None
-            kind = classes.setdefault(schema.id, message_class(schema))
-            found.setdefault(channel.topic, []).append((message, kind.FromString(message.data)))
-    return found
-
-
-def chunks(path: Path) -> list[Chunk]:
-    with path.open("rb") as file:
-        return [
-            item for item in StreamReader(file, emit_chunks=True, validate_crcs=True).records if isinstance(item, Chunk)
-        ]
+from tests.logs.recording.mcap_messages import chunks, messages
 
 
 def test_an_independent_reader_finds_every_row_with_its_values(log_file: Path, track: Track) -> None:
@@ -75,66 +45,6 @@ def test_every_state_field_is_filled_and_none_is_left_over(log_file: Path) -> No
     # The first leg's number is 0.
     assert {field.name for field in row.DESCRIPTOR.fields} - names == {"leg_index"}
     assert len(row.SerializeToString()) <= len(messages(log_file)["/state"][100][0].data)
-
-
-def test_the_viewer_topics(log_file: Path, setup: FlightSetup, track: Track) -> None:
-    found = messages(log_file)
-    assert sorted(found) == sorted(
-        ["/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/plan", "/scene/track"]
-    )
-    seconds = track.time[-1] - track.time[0]
-    for topic, rate in (("/tf", 5), ("/fix", 1)):
-        assert rate * seconds - 1 <= len(found[topic]) <= rate * seconds + 1
-    for message, pose in found["/tf"]:
-        row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
-        assert (pose.parent_frame_id, pose.child_frame_id) == ("map", "aircraft")
-        assert pose.timestamp.seconds * SECOND_NS + pose.timestamp.nanos == message.log_time
-        place = (pose.translation.x, pose.translation.y, pose.translation.z)
-        np.testing.assert_allclose(place, track.position[row], atol=2**-11 + 1e-12)
-        turn = (pose.rotation.x, pose.rotation.y, pose.rotation.z, pose.rotation.w)
-        np.testing.assert_allclose(turn, body_rotation(track.attitude[row]), atol=2**-21 + 1e-12)
-    message, fix = found["/fix"][5]
-    row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
-    lat, lon = to_geo(setup.scenario.origin, track.position[row, 0], track.position[row, 1])
-    assert (fix.latitude, fix.longitude, fix.altitude) == (float(lat), float(lon), track.position[row, 2])
-    mesh = found["/scene/terrain"][0][1].entities[0].triangles[0]
-    assert len(mesh.indices) % 3 == 0
-    assert max(mesh.indices) < len(mesh.points) == len(mesh.colors)
-    terrain = setup.scenario.terrain
-    assert terrain is not None
-    for point in list(mesh.points)[::501]:
-        # Points are rounded to 1/16 m, along the ground too; the steepest of this one rises 0.3 m a metre.
-        assert point.z == pytest.approx(float(terrain.height(point.x, point.y)), abs=0.05)
-    threats = found["/scene/threats"][0][1].entities[0]
-    assert [sphere.size.x for sphere in threats.spheres] == [800.0, 1600.0]
-    line = found["/scene/track"][-1][1].entities[0].lines[0]
-    assert (line.points[-1].x, line.points[-1].y) == tuple(track.position[-1, :2])
-    assert [(item.level, item.message) for _, item in found["/log"]] == [(3, "half way up"), (2, "arrived")]
-
-
-@pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (0.3, -0.2, 1.9), (-1.1, 0.7, -2.8), (math.pi, 0.1, 0.4)])
-def test_the_pose_turns_body_axes_into_the_world(attitude: tuple[float, float, float]) -> None:
-    # The usual matrix from body (forward, right, down) to north, east, down; then both sides' axes are swapped.
-    roll, pitch, yaw = attitude
-    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (math.cos, math.sin))
-    ned = np.array(
-        [
-            [cp * cy, sr * sp * cy - cr * sy, cr * sp * cy + sr * sy],
-            [cp * sy, sr * sp * sy + cr * cy, cr * sp * sy - sr * cy],
-            [-sp, sr * cp, cr * cp],
-        ]
-    )
-    to_enu = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
-    wanted = to_enu @ ned @ np.diag([1.0, -1.0, -1.0])
-    x, y, z, w = body_rotation(attitude)
-    got = np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-    np.testing.assert_allclose(got, wanted, atol=1e-12)
 
 
 def test_the_summary_agrees_with_the_data(log_file: Path, track: Track) -> None:
