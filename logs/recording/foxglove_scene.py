@@ -1,4 +1,4 @@
-"""What a 3D viewer sees: Foxglove messages of the terrain, the threats, the plan, the track and the aircraft.
+"""Foxglove messages for a 3-D viewer: the terrain, the threats, the plan, the track and the aircraft.
 
 Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is forward, left, up.
 """
@@ -115,10 +115,10 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=Color(r=0.5, g=0.5, b=0.4, a=1.0))
     mesh.indices.extend(corners[whole].ravel().tolist())
     points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1).reshape(-1, 3)
-    # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the room.
-    shown = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
+    # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the bytes.
+    rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
-    body += _doubles(_POINT, _MESH_POINTS, np.round(points * 16.0) / 16.0) + _doubles(_COLOUR, _MESH_COLOURS, shown)
+    body += _doubles(_POINT, _MESH_POINTS, np.round(points * 16.0) / 16.0) + _doubles(_COLOUR, _MESH_COLOURS, rgba)
     return _length_delimited(_ENTITY_TRIANGLES, body)
 
 
@@ -146,13 +146,13 @@ def threats_scene(time_ns: int, threats: Threats) -> bytes:
     """Missile spheres in red, radar spheres in orange, and their names."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
-        place = threats.position[k]
+        centre = threats.position[k]
         for radius, colour in ((threats.kill_radius[k], _KILL), (threats.detection_radius[k], _DETECTION)):
             if radius > 0.0:
                 side = 2.0 * float(radius)
-                entity.spheres.add(pose=_pose(place), size=Vector3(x=side, y=side, z=side), color=_colour(colour))
+                entity.spheres.add(pose=_pose(centre), size=Vector3(x=side, y=side, z=side), color=_colour(colour))
         entity.texts.add(
-            pose=_pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
+            pose=_pose(centre), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
         )
     return _update(entity)
 
@@ -198,8 +198,8 @@ def _points(points: Floats) -> Iterable[Point3]:
     return (Point3(x=x, y=y, z=z) for x, y, z in points.tolist())
 
 
-def _pose(place: ArrayLike) -> Pose:
-    x, y, z = (float(value) for value in np.asarray(place))
+def _pose(position: ArrayLike) -> Pose:
+    x, y, z = (float(value) for value in np.asarray(position))
     return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
 
 

@@ -8,11 +8,11 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from logs.recording.attachment_names import RECOVERY, RESULT, VERDICT, media_type
 from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.mcap_writer import ContainerWriter
 from logs.recording.reader import FlightLog, read_log
-from logs.recording.recorder import PROFILE, RECOVERY, RESULT, VERDICT
-from logs.recording.setup_attachments import MEDIA_TYPES
+from logs.recording.recorder import PROFILE
 
 RECOVERY_SCHEMA = "planfly.recovery/1"
 
@@ -47,10 +47,9 @@ def recover_log(path: Path) -> Recovered | None:
         except PARSE_ERRORS:
             # Where the reader stopped, too.
             break
-    lost = log.problem.removeprefix("recovered: ")
-    note = {"schema": RECOVERY_SCHEMA, "lost": lost, "rows": len(log.track), "end_time_s": log.end_time}
+    note = {"schema": RECOVERY_SCHEMA, "lost": log.lost, "rows": len(log.track), "end_time_s": log.end_time}
     text = (json.dumps(note, indent=1) + "\n").encode()
-    writer.attach(RECOVERY, MEDIA_TYPES[".json"], text, writer.last_time)
+    writer.attach(RECOVERY, media_type(RECOVERY), text, writer.last_time)
     writer.finish()
     return Recovered(out.getvalue(), log)
 

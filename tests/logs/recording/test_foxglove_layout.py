@@ -14,7 +14,7 @@ from tests.clients import need
 
 def test_the_layout_speaks_of_topics_and_fields_that_are_there() -> None:
     layout = json.loads(layout_text())
-    fields = {name for name, *_ in FIELDS}
+    fields = {field.name for field in FIELDS}
     topics = {*_CHANNELS, STATE_TOPIC}
     for name, panel in layout["configById"].items():
         for path in panel.get("paths", ()):

@@ -54,11 +54,10 @@ def test_mcap_core_on_node(log: Path, track: Track) -> None:
     assert said["counts"] == said["statistics"] == our_counts(log)
     rows = said["counts"]["/state"]
     assert [int(stamp) for stamp in said["stamps"]] == [EPOCH_NS + round(t * 1e9) for t in track.time[:rows]]
-    for name, _, field, column in FIELDS:
-        values = getattr(track, field)[:rows]
-        ours = values if values.ndim == 1 else values[:, column]
+    for field in FIELDS:
+        ours = field.of(getattr(track, field.source)[:rows])
         # A float32 as JavaScript reads it is the same number.
-        np.testing.assert_array_equal(np.array(said["sums"][name]), ours.astype(np.float64), err_msg=name)
+        np.testing.assert_array_equal(np.array(said["sums"][field.name]), ours.astype(np.float64), err_msg=field.name)
     assert "setup.json" in said["attachments"]
 
 
