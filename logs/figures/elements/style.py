@@ -115,9 +115,9 @@ def nice_step(span: float, parts: int) -> float:
 
 
 def outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal runs, in order.
+    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
 
-    values: (t,); not-a-number rows are kept out unless a run has nothing else.  Short series come back whole.
+    values: (t,); not-a-number rows are kept out unless a block has nothing else.  Short series come back whole.
     """
     series = np.asarray(values, dtype=np.float64)
     if series.size <= 2 * count:
@@ -125,10 +125,10 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     edges = np.linspace(0, series.size, count + 1).astype(int)
     kept = {0, series.size - 1}
     for low, high in itertools.pairwise(edges):
-        run = series[low:high]
-        good = np.flatnonzero(np.isfinite(run))
+        block = series[low:high]
+        good = np.flatnonzero(np.isfinite(block))
         if good.size == 0:
             kept.add(int(low))
             continue
-        kept.update((int(low + good[np.argmin(run[good])]), int(low + good[np.argmax(run[good])])))
+        kept.update((int(low + good[np.argmin(block[good])]), int(low + good[np.argmax(block[good])])))
     return np.array(sorted(kept), dtype=np.intp)
