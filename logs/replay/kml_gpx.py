@@ -57,33 +57,33 @@ def kml_text(title: str, lines: list[MapLine]) -> str:
     """KML document: a line each, heights absolute, and a placemark for each named point."""
     ElementTree.register_namespace("", KML)
     root = ElementTree.Element(f"{{{KML}}}kml")
-    document = _under(root, "Document")
-    _under(document, "name", title)
+    document = _add(root, "Document")
+    _add(document, "name", title)
     for line in lines:
-        folder = _under(document, "Folder")
-        _under(folder, "name", line.name)
-        mark = _under(folder, "Placemark")
-        _under(mark, "name", line.name)
-        string = _under(mark, "LineString")
-        _under(string, "altitudeMode", "absolute")
-        _under(string, "coordinates", " ".join(_place(line, k) for k in range(len(line.lat_deg))))
+        folder = _add(document, "Folder")
+        _add(folder, "name", line.name)
+        mark = _add(folder, "Placemark")
+        _add(mark, "name", line.name)
+        string = _add(mark, "LineString")
+        _add(string, "altitudeMode", "absolute")
+        _add(string, "coordinates", " ".join(_coordinates(line, k) for k in range(len(line.lat_deg))))
         for k, name in enumerate(line.marks):
-            mark = _under(folder, "Placemark")
-            _under(mark, "name", name)
-            point = _under(mark, "Point")
-            _under(point, "altitudeMode", "absolute")
-            _under(point, "coordinates", _place(line, k))
+            mark = _add(folder, "Placemark")
+            _add(mark, "name", name)
+            point = _add(mark, "Point")
+            _add(point, "altitudeMode", "absolute")
+            _add(point, "coordinates", _coordinates(line, k))
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _under(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
+def _add(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
     element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
     element.text = "".join(ch for ch in text if ch.isprintable() or ch == " ") if text else None
     return element
 
 
-def _place(line: MapLine, k: int) -> str:
+def _coordinates(line: MapLine, k: int) -> str:
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 
 

@@ -1,4 +1,4 @@
-"""The comparison of two flights as pictures and a page."""
+"""The comparison of two flights as files: pictures, and a page that holds them."""
 
 import base64
 from pathlib import Path
@@ -10,7 +10,7 @@ from logs.figures.elements.style import png_bytes, svg_bytes
 from logs.report.compare import Comparison, difference_rows
 from world.atomic_files import write_whole
 
-_WORDS = {
+_ALTERNATIVES = {
     "compare-map.png": "Both flights from above, over the first one's map",
     "compare-profile.png": "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
 }
@@ -41,7 +41,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
 def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
     """The page, its pictures inside."""
     pictures = [
-        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _WORDS[name])
+        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _ALTERNATIVES[name])
         for name, data in files.items()
     ]
     verdicts = [

@@ -1,4 +1,4 @@
-"""The report of a flight: one HTML page that needs nothing else, and its pictures as files.
+"""The report of a flight: one HTML page that needs no other file, and its pictures as files.
 
 The page holds its pictures, its style and one script, that of the 3-D view, which its policy names by hash; it asks
 no network for anything, and without the script a still picture stands in the view's place.
@@ -75,7 +75,7 @@ def report_html(
 ) -> str:
     """Make the page.
 
-    track: None for a plan that was not flown.  ended: how the flight ended, in the log's words; None where unknown.
+    track: None for a plan that was not flown.  ended: how the flight ended, as in its log; None where unknown.
     versions: of planfly and what it stands on.  command: the command line that makes the same flight again.
     events: the log's lines, shown with their times.
     """
