@@ -1,4 +1,4 @@
-"""Pictures of an aircraft: its envelope, its trims and modes over speed, and its answers to the controls."""
+"""Pictures of an aircraft: its envelope, its trims and modes over speed, and its responses to the controls."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -45,7 +45,15 @@ _ROWS = {
 
 
 def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
-    """Four panels: slopes over airspeed by height, level speeds over height, slopes over the ground in wind, turns."""
+    """Four panels: slopes over airspeed by height, level speeds over height, slopes over the ground in wind, turns.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from logs.recording.example_log import example_log
+    >>> figure = draw_envelope(load_aircraft("aerosonde"), example_log().setup.envelope)
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['steepest climb and descent to the air', 'level flight', 'steepest climb and dive over the ground, at 500 m',
+     'turn radius']
+    """
     with style.clean_style():
         figure = style.new_figure(8.0)
         axes = figure.subplots(2, 2)
@@ -114,7 +122,17 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
-    """Four panels: angle of attack and controls, throttle and power over airspeed; the modes' roots by airspeed."""
+    """Four panels: angle of attack and controls, throttle and power over airspeed; the modes' roots by airspeed.
+
+    trims: in order of airspeed.  modes: by airspeed, m/s.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.characteristics import modes_at, trim_table
+    >>> aircraft = load_aircraft("aerosonde")
+    >>> figure = draw_trims(aircraft, trim_table(aircraft, 3), {25.0: modes_at(aircraft, 25.0)})
+    >>> figure.axes[0].get_xlabel(), figure.axes[1].get_ylabel()
+    ('airspeed (m/s)', 'throttle (%)')
+    """
     with style.clean_style():
         figure = style.new_figure(8.0)
         axes = figure.subplots(2, 2)
@@ -180,7 +198,15 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> 
 
 
 def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """A column for each control; each panel one quantity's change from level flight, over time (s)."""
+    """A column for each control; each panel one quantity's change from level flight, over time (s).
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.characteristics import step_responses
+    >>> aircraft = load_aircraft("aerosonde")
+    >>> figure = draw_steps(aircraft, step_responses(aircraft))
+    >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
+    ['pitch (°)', 'pitch (°)', 'roll (°)', 'roll (°)']
+    """
     deep = max(len(step.rows) for step in steps)
     with style.clean_style():
         figure = style.new_figure(1.3 + 1.7 * deep)

@@ -65,5 +65,13 @@ def draw_pictures(setup: FlightSetup, track: Track | None, verdict: Verdict, *, 
 
 
 def write_png(figure: Figure, path: Path) -> None:
-    """Write the figure as a PNG, whole or not at all.  Raises OSError."""
+    """Write the figure as a PNG, whole or not at all.  Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.figures.elements.style import new_figure
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_png(new_figure(2.0), Path(folder) / "empty.png")
+    ...     (Path(folder) / "empty.png").read_bytes()[1:4]
+    b'PNG'
+    """
     write_whole(path, png_bytes(figure))

@@ -42,7 +42,14 @@ class PaperPath:
 
 
 def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
-    """All runs of one algorithm over contours, missile and radar circles (the paper's Figs. 5-8)."""
+    """Paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
+
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> figure = draw_paths(setup.scenario, "umda", [PaperPath(setup.route.waypoints, 1.01, safe=True)])
+    >>> figure.axes[0].get_title(loc="left")
+    'example: 1 runs of umda, 1 safe'
+    """
     safe = sum(path.safe for path in paths)
     title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
     with style.clean_style():
@@ -64,7 +71,17 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
 
 
 def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: int) -> Figure:
-    """One path of each encoding over the same map (the paper's Figs. 9-12)."""
+    """One path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
+
+    chosen: paths by encoding.
+
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> path = PaperPath(setup.route.waypoints, 1.01, safe=True)
+    >>> figure = draw_encodings(setup.scenario, {"rotated": path, "cartesian": path}, seed=1)
+    >>> figure.axes[0].get_title(loc="left")
+    'example: one path of each encoding, seed 1'
+    """
     with style.clean_style():
         figure, axes, around = _map(scenario, f"{scenario.name}: one path of each encoding, seed {seed}")
         handles = []
@@ -125,8 +142,13 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
     """Over generations: how many runs hold a safe path, and the length ratio of the safe ones.
 
-    histories: for each number of threats and each algorithm the runs' (g, 3) length ratio, kill exposure and
+    histories: for each number of threats and each algorithm the searches' (g, 3) length ratio, kill exposure and
     violations of the best path yet.
+
+    >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
+    >>> figure = draw_convergence({30: {"umda": [history]}})
+    >>> figure.axes[0].get_title(loc="left"), figure.axes[1].get_ylabel()
+    ('30 threats', 'length ratio of the safe ones')
     """
     count = len(histories)
     with style.clean_style():

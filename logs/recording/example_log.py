@@ -1,5 +1,7 @@
 """A flight made by formula, to try readers, figures and reports on without a simulator or a file."""
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +12,7 @@ from flight.mission_files.formats import mission_text
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import FlightLog, LogEvent
+from logs.recording.recorder import Recorder
 from logs.recording.setup_attachments import package_versions
 from world.frames import to_geo
 from world.scenario import Scenario, from_spec
@@ -75,6 +78,23 @@ def example_log() -> FlightLog:
         problem="",
         end_time=end,
     )
+
+
+def write_example_log(path: Path) -> Path:
+    """Record the flight of `example_log` as a file, replaced if it is there, and return its path.  Raises OSError.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_example_log(Path(folder) / "example.mcap").read_bytes()[1:5]
+    b'MCAP'
+    """
+    log = example_log()
+    with Recorder(path, log.setup) as recorder:
+        recorder.write(log.track)
+        for event in log.events:
+            recorder.event(event.time, event.text, event.level)
+        recorder.finish("completed")
+    return path
 
 
 def _mission(scenario: Scenario) -> Mission:

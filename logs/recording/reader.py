@@ -155,6 +155,13 @@ def read_log(path: Path) -> FlightLog:
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
     holds no whole second of flight.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log = read_log(write_example_log(Path(folder) / "example.mcap"))
+    >>> log.complete, log.ended, len(log.track), log.setup.aircraft
+    (True, 'completed', 366, 'aerosonde')
     """
     found = Container()
     messages = _MessageCollector()

@@ -76,6 +76,20 @@ class Recorder:
 
     The setup goes first; after it each whole second of flight is handed to the operating system, so that a killed
     process loses at most the last one.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.recording.reader import read_log
+    >>> flown = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "flight.mcap"
+    ...     with Recorder(path, flown.setup) as recorder:
+    ...         recorder.write(flown.track)
+    ...         recorder.event(12.0, "half way")
+    ...         recorder.finish("completed")
+    ...     log = read_log(path)
+    >>> log.ended, len(log.track), log.events[0].text
+    ('completed', 366, 'half way')
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
@@ -256,7 +270,12 @@ def _chunks(layout: Layout) -> Iterator[ChunkContent]:
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """Rows of a whole flight that a `Recorder` with this ``every`` records: one in so many, and the last."""
+    """Rows of a whole flight that a `Recorder` with this ``every`` records: one in so many, and the last.
+
+    >>> from logs.recording.example_log import example_log
+    >>> thin_track(example_log().track, 100).time
+    array([ 0. , 10. , 20. , 30. , 36.5])
+    """
     if every <= 1 or not len(track):
         return track
     kept = np.union1d(np.arange(0, len(track), every), [len(track) - 1])

@@ -87,7 +87,12 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed."""
+    """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed.
+
+    >>> versions = package_versions()
+    >>> versions["numpy"] == metadata.version("numpy")
+    True
+    """
     return dict(_versions())
 
 

@@ -147,7 +147,15 @@ class Instruments:
 
 
 def make_instruments(log: FlightLog) -> Instruments:
-    """Make a log ready for frames; its legs are found from the track, whatever was recorded."""
+    """Make a log ready for frames; its legs are found from the track, whatever was recorded.
+
+    >>> from logs.recording.example_log import example_log
+    >>> frame = make_instruments(example_log()).frame(10.0)
+    >>> print(frame[2])
+    leg 0 of 2, to waypoint 1 (item 2), 250 m to go
+    >>> print(frame[5])
+    |                         |  height       200 m AMSL, 100 m above ground
+    """
     log = replace(log, track=with_legs(log.setup, log.track))
     terrain = log.setup.scenario.terrain
     position = log.track.position

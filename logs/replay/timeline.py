@@ -49,7 +49,15 @@ class _LegRows:
 
 
 def timeline(log: FlightLog) -> list[TimelineEntry]:
-    """Tell the flight as entries in order of time; the same log always gives the same ones."""
+    """List what happened in a flight, in order of time; the same log always gives the same entries.
+
+    >>> from logs.recording.example_log import example_log
+    >>> for entry in timeline(example_log())[3:6]:
+    ...     print(entry.time, entry.kind, "-", entry.text)
+    14.7... threat - inside the missile range of Alfa (300 m)
+    20.0 turn - turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°
+    20.0 leg - leg 1 to waypoint 2 (item 3): course 076°, 412 m, slope +2.8°, 25.0 m/s
+    """
     log = replace(log, track=with_legs(log.setup, log.track))
     parts = _leg_rows(log.track, log.setup.route)
     entries = [_start(log)]
@@ -68,7 +76,11 @@ def timeline(log: FlightLog) -> list[TimelineEntry]:
 
 
 def entry_lines(entry: TimelineEntry) -> list[str]:
-    """Set an entry in lines of at most `WIDTH` columns: time in seconds, kind, text."""
+    """Set an entry in lines of at most `WIDTH` columns: time in seconds, kind, text.
+
+    >>> entry_lines(TimelineEntry(20.0, "turn", "turn left 14.0° at waypoint 1"))
+    ['    20.00 s  turn     turn left 14.0° at waypoint 1']
+    """
     head = f"{entry.time:9.2f} s  {entry.kind:<9}"
     return textwrap.wrap(
         head + entry.text, WIDTH, subsequent_indent=" " * len(head), drop_whitespace=True, break_on_hyphens=False

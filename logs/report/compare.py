@@ -48,6 +48,14 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
     """Judge and measure both flights alike.
 
     names: of the two in tables and legends; "(first)" and "(second)" are added to names that are the same.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> comparison = compare_logs(log, log, names=("one", "other"))
+    >>> comparison.differences[0]
+    Difference(name='time in the air', unit='s', first=36.5, second=36.5)
+    >>> comparison.notes
+    ('tracks: 0.00 m apart on average, 0.00 m at most',)
     """
     if names[0] == names[1]:
         names = (f"{names[0]} (first)", f"{names[1]} (second)")
@@ -171,7 +179,17 @@ def _label(verdict: Verdict) -> str:
 
 
 def difference_lines(comparison: Comparison) -> list[str]:
-    """Set the table of differences and the notes in lines for a terminal."""
+    """Set the table of differences and the notes in lines for a terminal.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> lines = difference_lines(compare_logs(log, log, names=("one", "other")))
+    >>> for line in lines[:3]:
+    ...     print(line[-42:])
+             one        other  difference
+      not flyable  not flyable
+             36.5         36.5        0.00
+    """
     head = ("", "", *(name[-24:] for name in comparison.names), "difference")
     rows = [head, *difference_rows(comparison)]
     rows = [(f"{name} ({unit})" if unit else name, *rest) for name, unit, *rest in rows]

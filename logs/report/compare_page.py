@@ -19,7 +19,17 @@ _ALTERNATIVES = {
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
     """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, made if it is missing.
 
-    svg: the pictures as SVG, too.  Returns the paths written.  Raises OSError.
+    svg: the pictures as SVG, too.  The map is left out where the flights' map origins differ.
+    Returns the paths written.  Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.report.compare import compare_logs
+    >>> log = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paths = write_comparison(Path(folder), compare_logs(log, log, names=("one", "other")))
+    >>> [path.name for path in paths]
+    ['compare-map.png', 'compare-profile.png', 'compare.html']
     """
     first, second = (
         NamedFlight(name, log.setup, log.track) for name, log in zip(comparison.names, comparison.logs, strict=True)
