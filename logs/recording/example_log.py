@@ -100,7 +100,7 @@ def write_example_log(path: Path) -> Path:
 def _mission(scenario: Scenario) -> Mission:
     lat, lon = to_geo(scenario.origin, _WAYPOINTS[:, 0], _WAYPOINTS[:, 1])
     items = tuple(
-        MissionItem(k + 1, Command.NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, 0.0), float(lat[k]), float(lon[k]), float(up))
+        MissionItem(k + 1, int(Command.NAV_WAYPOINT), 0, (0.0, 0.0, 0.0, 0.0), float(lat[k]), float(lon[k]), float(up))
         for k, up in enumerate(_WAYPOINTS[:, 2])
     )
     return Mission(None, items, source="example")

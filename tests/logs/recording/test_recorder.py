@@ -1,6 +1,5 @@
-"""Recorded files, read by mcap's own readers: every row, whatever the blocks, whole to the last second."""
+"""A recorded file is whole to its last second, and its bytes depend on setup and rows alone."""
 
-import io
 import json
 import math
 from pathlib import Path
@@ -8,43 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mcap.reader import make_reader
-from mcap.records import Attachment, Chunk, Message
-from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.records import Attachment
+from mcap.stream_reader import StreamReader
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
-from logs.recording.recorder import CHUNK_SIZE, Recorder
-from logs.recording.state_channel import EPOCH_NS, SECOND_NS
+from logs.recording.recorder import Recorder
+from logs.recording.state_channel import EPOCH_NS
 from tests.logs.conftest import make_setup, make_track, record
 from tests.logs.recording.mcap_messages import chunks, messages
-
-
-def test_an_independent_reader_finds_every_row_with_its_values(log_file: Path, track: Track) -> None:
-    rows = messages(log_file)["/state"]
-    assert len(rows) == len(track)
-    state = [row for _, row in rows]
-    assert [row.row for row in state] == list(range(len(track)))
-    assert [row.time_s for row in state] == track.time.tolist()
-    assert [row.up_amsl_m for row in state] == track.position[:, 2].tolist()
-    assert [row.north_m for row in state] == track.position[:, 1].tolist()
-    assert [row.velocity_up_mps for row in state] == track.velocity[:, 2].tolist()
-    assert [row.yaw_rate_rad_per_s for row in state] == track.rates[:, 2].tolist()
-    assert [row.beta_rad for row in state] == track.flow[:, 1].tolist()
-    assert [row.rudder_rad for row in state] == track.controls[:, 2].tolist()
-    assert [row.throttle_command_fraction for row in state] == track.commands[:, 3].tolist()
-    assert [row.leg_index for row in state] == track.leg.tolist()
-    assert [row.clearance_seen_m for row in state] == track.clearance.tolist()
-    for message, row in rows:
-        assert message.log_time == EPOCH_NS + round(row.time_s * 1e9)
-
-
-def test_every_state_field_is_filled_and_none_is_left_over(log_file: Path) -> None:
-    _, row = messages(log_file)["/state"][100]
-    names = {field.name for field, _ in row.ListFields()}
-    # The first leg's number is 0.
-    assert {field.name for field in row.DESCRIPTOR.fields} - names == {"leg_index"}
-    assert len(row.SerializeToString()) <= len(messages(log_file)["/state"][100][0].data)
 
 
 def test_the_summary_agrees_with_the_data(log_file: Path, track: Track) -> None:
@@ -62,36 +34,6 @@ def test_the_summary_agrees_with_the_data(log_file: Path, track: Track) -> None:
     assert names[0] == "setup.json"
     assert {"scenario.json", "plan.json", "mission.waypoints", "terrain.json"} < set(names)
     assert names[-2:] == ["verdict.json", "result.json"]
-
-
-@pytest.mark.filterwarnings("ignore:(start|end)_time is deprecated:DeprecationWarning")
-def test_a_message_index_points_at_its_messages(log_file: Path) -> None:
-    # A reader that seeks by log time uses the index alone.
-    with log_file.open("rb") as file:
-        reader = make_reader(file)
-        start, end = EPOCH_NS + 3 * SECOND_NS // 2, EPOCH_NS + 2 * SECOND_NS
-        found = [message for _, _, message in reader.iter_messages(topics=["/state"], start_time=start, end_time=end)]
-    assert [message.sequence for message in found] == list(range(90, 120))
-    data = log_file.read_bytes()
-    with log_file.open("rb") as file:
-        summary = make_reader(file).get_summary()
-    assert summary is not None
-    for index in summary.chunk_indexes:
-        stream = StreamReader(io.BytesIO(data[index.chunk_start_offset :]), skip_magic=True, emit_chunks=True)
-        records = stream.records
-        chunk = next(records)
-        assert isinstance(chunk, Chunk)
-        count = sum(isinstance(item, Message) for item in breakup_chunk(chunk))
-        assert count == sum(len(next(records).records) for _ in index.message_index_offsets)  # type: ignore[attr-defined]  # MessageIndex
-
-
-@pytest.mark.parametrize("rate_hz", [1.0, 60.0, 700.0])
-def test_a_chunk_holds_at_most_a_second_and_64_kib(tmp_path: Path, setup: FlightSetup, rate_hz: float) -> None:
-    path = record(tmp_path / "a.mcap", setup, make_track(3.0, rate_hz))
-    for chunk in chunks(path)[1:]:  # the first holds the scene
-        assert chunk.message_start_time // SECOND_NS == chunk.message_end_time // SECOND_NS
-        assert chunk.uncompressed_size <= CHUNK_SIZE + 4096
-    np.testing.assert_array_equal(read_log(path).track.time, make_track(3.0, rate_hz).time)
 
 
 @pytest.mark.parametrize("rows_a_block", [1, 7, 59, 100_000])

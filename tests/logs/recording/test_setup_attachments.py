@@ -21,7 +21,7 @@ from tests.logs.conftest import make_setup, record
 from tests.logs.recording.log_copies import Attachments, same
 from world import scenario as scenario_module
 from world.errors import LogError
-from world.scenario import from_spec, load_scenario
+from world.scenario import from_spec
 
 
 @pytest.mark.parametrize("with_plan", [True, False])
@@ -40,21 +40,6 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(names[Route]) == 8
     assert len(names[Envelope]) == 14
     assert len(dataclasses.fields(MissionItem)) == 8
-
-
-def test_a_dem_comes_from_the_log_and_not_from_its_file(
-    tmp_path: Path, track: Track, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    scenario = load_scenario("jacksboro")
-    assert scenario.terrain is not None
-    setup = dataclasses.replace(make_setup(with_plan=False), scenario=scenario)
-    path = record(tmp_path / "a.mcap", setup, track)
-
-    def refuse(*_: object) -> None:
-        raise AssertionError("the elevation file was opened")
-
-    monkeypatch.setattr(scenario_module, "open_raster", refuse)
-    same(read_log(path).setup.scenario, scenario)
 
 
 def test_a_foreign_mission_without_terrain(tmp_path: Path, track: Track) -> None:
