@@ -1,4 +1,4 @@
-"""Figures of the paper's experiment: paths of many runs, one path of each encoding, convergence over generations."""
+"""Figures of the paper's experiment: paths of many searches, one of each encoding, convergence over generations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 # Inches: as the map's.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND = 0.72, 7.72, 0.5, 0.55, 0.85
 _COLUMN = 8.72
-# One look for each algorithm of a figure, told apart without colour too.
+# One look for each algorithm of a figure, distinct without colour too.
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.BLUE, "linestyle": "-"},
     {"color": style.FAIL, "linestyle": (0, (5, 1.5))},
@@ -140,7 +140,7 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
-    """Over generations: how many runs hold a safe path, and the length ratio of the safe ones.
+    """Over generations: how many searches hold a safe path, and the length ratio of the safe ones.
 
     histories: for each number of threats and each algorithm the searches' (g, 3) length ratio, kill exposure and
     violations of the best path yet.
@@ -160,10 +160,10 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
         for column, (threats, groups) in enumerate(histories.items()):
             upper = figure.add_subplot(grid[0, column])
             lower = figure.add_subplot(grid[1, column], sharex=upper)
-            for (name, runs), look in zip(groups.items(), _LOOKS, strict=False):
-                _converge(upper, lower, runs, look)
+            for (name, searches), look in zip(groups.items(), _LOOKS, strict=False):
+                _converge(upper, lower, searches, look)
                 names = names if name in names else [*names, name]
-            most = max(len(runs) for runs in groups.values())
+            most = max(len(searches) for searches in groups.values())
             upper.set(ylim=(-0.04 * most, 1.06 * most), title=f"{threats} threats")
             upper.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
             upper.tick_params(labelbottom=False)
@@ -188,10 +188,12 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
     return figure
 
 
-def _converge(upper: Any, lower: Any, runs: Sequence[Floats], look: Mapping[str, Any]) -> None:
-    """One algorithm on one problem; a run that ended early keeps its last value."""
-    length = max(len(run) for run in runs)
-    stacked = np.stack([np.vstack([run, np.repeat(run[-1:], length - len(run), axis=0)]) for run in runs])
+def _converge(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
+    """One algorithm on one problem; a search that ended early keeps its last value."""
+    length = max(len(history) for history in histories)
+    stacked = np.stack(
+        [np.vstack([history, np.repeat(history[-1:], length - len(history), axis=0)]) for history in histories]
+    )
     length_ratio, kill, violations = np.moveaxis(stacked, -1, 0)
     safe = (violations == 0.0) & (kill == 0.0)
     generation = np.arange(length)

@@ -59,9 +59,9 @@ class Projection:
 
 
 def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None) -> Figure:
-    """Draw the scene from across the way from start to destination, heights stretched as the title says.
+    """Draw the scene from aside of the line from start to destination, heights stretched by the factor in the title.
 
-    Dashed and thin: behind a ridge.
+    Lines are dashed and thin behind a ridge.
     """
     bounds = scene_bounds(setup, track)
     terrain = setup.scenario.terrain

@@ -68,7 +68,7 @@ class FlightLog:
     complete: nothing is missing or damaged.
     problem: what is, in a line; empty for a complete log.
     end_time: s, of the last row.
-    lost: what of the flight is lost, in a line; as ``problem``, but that says of a recovered log that it is one.
+    lost: what of the flight is lost, in a line; ``problem`` adds to it that a recovered log is one.
     """
 
     source: str

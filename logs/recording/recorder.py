@@ -170,7 +170,7 @@ class Recorder:
     def flush(self) -> None:
         """Hand every row received to the operating system now, by the caller's clock.
 
-        For a live flight, so that a killed process loses no whole second: chunks then end where the caller says,
+        For a live flight, so that a killed process loses no whole second: chunks then end where the caller flushes,
         and the file's bytes (not its rows) depend on when that was.
         """
         self._emit(self._last_ns + 1)

@@ -1,7 +1,7 @@
 """A `FlightSetup` as attachments of a log (bytes by name), and back.
 
-`setup.json` lists every other attachment with its SHA-256, so that none can be missing or altered unseen.  Numbers are
-written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
+`setup.json` lists every other attachment with its SHA-256, so that none can be missing or altered unnoticed.  Numbers
+are written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
 """
 
 import functools
@@ -62,7 +62,7 @@ class _Setup(SetupModel):
     max_bank_rad: Annotated[float, Field(gt=0.0, lt=math.pi / 2)]
     battery_wh: Finite
     seed: Annotated[int, Field(ge=0)]
-    foreign: bool
+    external: Annotated[bool, Field(alias="foreign")]
     guidance: Guidance
     nav: Navigation
     guidance_hz: Literal[30, 60]
@@ -125,7 +125,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         max_bank_rad=setup.max_bank,
         battery_wh=setup.battery,
         seed=setup.seed,
-        foreign=setup.scenario.external,
+        external=setup.scenario.external,
         guidance=setup.guidance,
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
@@ -157,7 +157,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
             raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP}")
     listed = {name: attachments[name] for name in file.sha256}
     terrain = unpack_terrain(listed, source) if TERRAIN in listed else None
-    scenario = _scenario(listed, source, terrain, file.foreign)
+    scenario = _scenario(listed, source, terrain, file.external)
     setup = FlightSetup(
         scenario=scenario,
         mission=read_mission(file.mission),
@@ -201,7 +201,7 @@ def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
         raise LogError(f"{source}: {name}: not a text in UTF-8 (byte {error.start})") from error
 
 
-def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, foreign: bool) -> Scenario:
+def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
     where = f"{source}: {SCENARIO}"
     try:
         spec = json.loads(_text(attachments, SCENARIO, source))
@@ -209,7 +209,7 @@ def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | Non
         raise LogError(f"{where}: not valid JSON: {error}") from error
     _refuse_outside_terrain(spec, terrain, where)
     try:
-        return from_spec(spec, where, ground=terrain, external=foreign)
+        return from_spec(spec, where, ground=terrain, external=external)
     except PlanflyError as error:
         raise LogError(str(error)) from error
 

@@ -19,7 +19,7 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 
 @dataclass(slots=True)
 class LabelPlacer:
-    """Greedy placement in pixels on one axes, whose limits and place must be final.
+    """Greedy placement in pixels on one axes, whose limits and position must be final.
 
     lines: (n, 2) pixel positions that labels should not cover.  boxes: what labels already cover.
     """

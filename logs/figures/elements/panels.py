@@ -47,7 +47,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """What the panels run along: its label and values (t,), which never fall."""
+    """The common axis of the panels: its label and values (t,), which never fall."""
 
     label: str
     values: Floats

@@ -1,7 +1,7 @@
 """What all figures share: colours, sizes, the clean matplotlib settings they are drawn under, and their bytes.
 
 Colours are those of Okabe and Ito, "Color Universal Design" (2008), which people with any of the common colour
-vision deficiencies tell apart; line style, marker or fill tell the same things a second time.
+vision deficiencies tell apart; line style, marker or fill make the same distinction a second time.
 """
 
 import io
@@ -63,7 +63,7 @@ _SETTINGS: Any = {
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc says.
+    """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc holds.
 
     The settings in force before come back at the end.
     """

@@ -43,7 +43,7 @@ def test_same_data_same_bytes_1500_px_wide(draw: Any) -> None:
     ],
 )
 def test_everything_written_is_inside_the_picture(draw: Any, changes: Any, paths: Any, flown: bool) -> None:
-    """Whatever is missing, it draws, and no word is cut off or lies under the legend."""
+    """Whatever data is missing, it draws, and no text is cut off or lies under the legend."""
     figure = draw(make_scenario(**changes), **paths, track=make_track() if flown else None, verdict=FAILED)
     if "name" in changes:
         assert png_bytes(figure)

@@ -12,7 +12,7 @@ from logs.recording.state_channel import FIELDS, STATE_TOPIC
 from tests.clients import need
 
 
-def test_the_layout_speaks_of_topics_and_fields_that_are_there() -> None:
+def test_the_layout_names_only_topics_and_fields_of_a_log() -> None:
     layout = json.loads(layout_text())
     fields = {field.name for field in FIELDS}
     topics = {*_CHANNELS, STATE_TOPIC}
@@ -43,8 +43,8 @@ def test_the_layouts_settings_are_those_that_foxglove_knows() -> None:
 
     def names(kind: Any) -> set[str]:
         """Its settings as JSON spells them."""
-        words = [name.split("_") for name in inspect.signature(kind).parameters]
-        return {first + "".join(word.capitalize() for word in rest) for first, *rest in words}
+        parts = [name.split("_") for name in inspect.signature(kind).parameters]
+        return {first + "".join(word.capitalize() for word in rest) for first, *rest in parts}
 
     kinds = {
         "3D": known.ThreeDeeConfig,

@@ -13,7 +13,9 @@ from tests.logs.recording.mcap_messages import messages
 from world.frames import to_geo
 
 
-def test_the_viewer_topics(log_file: Path, setup: FlightSetup, track: Track) -> None:
+def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
+    log_file: Path, setup: FlightSetup, track: Track
+) -> None:
     found = messages(log_file)
     assert sorted(found) == sorted(
         ["/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/plan", "/scene/track"]
@@ -25,8 +27,8 @@ def test_the_viewer_topics(log_file: Path, setup: FlightSetup, track: Track) -> 
         row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
         assert (pose.parent_frame_id, pose.child_frame_id) == ("map", "aircraft")
         assert pose.timestamp.seconds * SECOND_NS + pose.timestamp.nanos == message.log_time
-        place = (pose.translation.x, pose.translation.y, pose.translation.z)
-        np.testing.assert_allclose(place, track.position[row], atol=2**-11 + 1e-12)
+        position = (pose.translation.x, pose.translation.y, pose.translation.z)
+        np.testing.assert_allclose(position, track.position[row], atol=2**-11 + 1e-12)
         turn = (pose.rotation.x, pose.rotation.y, pose.rotation.z, pose.rotation.w)
         np.testing.assert_allclose(turn, body_rotation(track.attitude[row]), atol=2**-21 + 1e-12)
     message, fix = found["/fix"][5]

@@ -62,16 +62,16 @@ def test_no_flipped_bit_is_taken_for_data(
     path = tmp_path / "bit.mcap"
     # All over the file, and densely in its last part, where the chunks with the rows are.
     flips = 2500 if SOAK else 60
-    places = [*rng.integers(0, len(whole), size=flips), *rng.integers(len(whole) - 90_000, len(whole), size=flips)]
-    for place in [*places, *range(0, 60)]:
+    positions = [*rng.integers(0, len(whole), size=flips), *rng.integers(len(whole) - 90_000, len(whole), size=flips)]
+    for position in [*positions, *range(0, 60)]:
         data = bytearray(whole)
-        data[place] ^= 1 << int(rng.integers(8))
+        data[position] ^= 1 << int(rng.integers(8))
         path.write_bytes(data)
         try:
             log = read_log(path)
         except LogError:
             continue
-        assert not log.complete, f"byte {place}"
+        assert not log.complete, f"byte {position}"
         prefix_of(track, log.track)
         same(log.setup, setup)
 
@@ -117,7 +117,7 @@ def test_many_small_bombs_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("content", "message"),
     [
         (b"", "empty"),
         (b"QGC WPL 110\n", "not an MCAP file"),
@@ -129,10 +129,10 @@ def test_many_small_bombs_are_refused(tmp_path: Path) -> None:
         (bytes(range(256)) * 50, "not an MCAP file"),
     ],
 )
-def test_what_is_no_log_is_refused_in_one_line(tmp_path: Path, content: bytes, words: str) -> None:
+def test_what_is_no_log_is_refused_in_one_line(tmp_path: Path, content: bytes, message: str) -> None:
     path = tmp_path / "bad.mcap"
     path.write_bytes(content)
-    with pytest.raises(LogError, match=words) as caught:
+    with pytest.raises(LogError, match=message) as caught:
         read_log(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)

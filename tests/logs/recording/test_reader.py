@@ -67,7 +67,7 @@ def test_any_track_comes_back_bit_for_bit(tmp_path_factory: pytest.TempPathFacto
 SMALL = make_setup(with_plan=False, terrain={"kind": "flat", "amsl_m": 10.0})
 
 
-def test_other_writers_layouts_are_read(tmp_path: Path, log_file: Path, track: Track) -> None:
+def test_messages_in_other_layouts_are_read(tmp_path: Path, log_file: Path, track: Track) -> None:
     kind = state_class()
 
     def plain(item: Any, topic: str) -> Any:
@@ -81,7 +81,7 @@ def test_other_writers_layouts_are_read(tmp_path: Path, log_file: Path, track: T
     assert log.complete
 
 
-def test_an_edited_clearance_or_verdict_is_only_what_it_says(tmp_path: Path, log_file: Path, track: Track) -> None:
+def test_an_edited_clearance_or_verdict_changes_nothing_else(tmp_path: Path, log_file: Path, track: Track) -> None:
     kind = state_class()
 
     def edit(item: Any, topic: str) -> Any:
@@ -105,7 +105,7 @@ def test_missing_files_and_folders_are_refused(tmp_path: Path) -> None:
             read_log(path)
 
 
-def test_somebody_elses_mcap_is_refused(tmp_path: Path, log_file: Path) -> None:
+def test_an_mcap_file_of_another_kind_is_refused(tmp_path: Path, log_file: Path) -> None:
     def drop(item: Any, topic: str) -> Any:
         return None if topic.endswith(".json") else item
 
@@ -114,15 +114,15 @@ def test_somebody_elses_mcap_is_refused(tmp_path: Path, log_file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("field", "value", "words"),
+    ("field", "value", "message"),
     [
         ("row", 77, "rows are missing"),
         ("time_s", 0.5, "time does not increase"),
         ("leg_index", -4, "leg does not exist"),
     ],
 )
-def test_rows_that_cannot_follow_end_the_track(
-    tmp_path: Path, log_file: Path, track: Track, field: str, value: float, words: str
+def test_the_track_ends_before_a_row_that_cannot_follow(
+    tmp_path: Path, log_file: Path, track: Track, field: str, value: float, message: str
 ) -> None:
     kind = state_class()
 
@@ -136,11 +136,11 @@ def test_rows_that_cannot_follow_end_the_track(
 
     log = read_log(rewrite(log_file, tmp_path / "b.mcap", edit))
     assert (log.complete, len(log.track)) == (False, 123)
-    assert words in log.problem
+    assert message in log.problem
     prefix_of(track, log.track)
 
 
-def test_a_hole_or_a_lost_end_is_seen(tmp_path: Path, log_file: Path) -> None:
+def test_rows_missing_at_the_end_are_counted(tmp_path: Path, log_file: Path) -> None:
     def lose(item: Any, topic: str) -> Any:
         return None if topic == "/state" and item.sequence >= 470 else item
 

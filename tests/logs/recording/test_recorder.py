@@ -60,15 +60,15 @@ def test_an_exception_leaves_a_readable_unfinished_file(tmp_path: Path, setup: F
 
 
 def test_a_killed_process_loses_at_most_the_last_second(tmp_path: Path, setup: FlightSetup, track: Track) -> None:
-    path, seen = tmp_path / "live.mcap", tmp_path / "seen.mcap"
+    path, copy = tmp_path / "live.mcap", tmp_path / "copy.mcap"
     with Recorder(path, setup) as recorder:
         for first in range(0, 400, 13):
             recorder.write(track.rows(first, first + 13))
-            # What another process sees of the file now is what a kill would leave.
-            seen.write_bytes(path.read_bytes())
+            # What another process reads of the file now is what a kill would leave.
+            copy.write_bytes(path.read_bytes())
             whole = int(track.time[first + 12]) * 60
             if whole:
-                log = read_log(seen)
+                log = read_log(copy)
                 assert (len(log.track), log.complete) == (whole, False)
 
 
@@ -86,13 +86,13 @@ def test_what_cannot_be_recorded_is_refused(tmp_path: Path, setup: FlightSetup, 
         Recorder(tmp_path / "none" / "a.mcap", setup)
 
 
-def test_the_setup_names_every_piece_and_every_package(log_file: Path) -> None:
+def test_the_setup_lists_every_attachment_and_every_package(log_file: Path) -> None:
     with log_file.open("rb") as file:
-        pieces = {item.name: item.data for item in StreamReader(file).records if isinstance(item, Attachment)}
-    setup = json.loads(pieces["setup.json"])
-    assert set(setup["sha256"]) == set(pieces) - {"setup.json", "result.json", "verdict.json"}
+        attachments = {item.name: item.data for item in StreamReader(file).records if isinstance(item, Attachment)}
+    setup = json.loads(attachments["setup.json"])
+    assert set(setup["sha256"]) == set(attachments) - {"setup.json", "result.json", "verdict.json"}
     assert {"python", "numpy", "jsbsim", "mcap", "protobuf"} < set(setup["versions"])
-    assert json.loads(pieces["result.json"]) == {
+    assert json.loads(attachments["result.json"]) == {
         "schema": "planfly.result/1",
         "ended": "completed",
         "rows": 480,
@@ -102,7 +102,9 @@ def test_the_setup_names_every_piece_and_every_package(log_file: Path) -> None:
 
 @pytest.mark.parametrize("every", [2, 3, 7])
 @pytest.mark.parametrize("rows_a_block", [1, 60, 100_000])
-def test_one_row_in_so_many_and_the_last(tmp_path: Path, setup: FlightSetup, every: int, rows_a_block: int) -> None:
+def test_a_thinned_log_holds_one_row_in_so_many_and_the_last(
+    tmp_path: Path, setup: FlightSetup, every: int, rows_a_block: int
+) -> None:
     whole = make_track(3.0)
     with Recorder(tmp_path / "thin.mcap", setup, every=every) as recorder:
         for first in range(0, len(whole), rows_a_block):

@@ -42,7 +42,7 @@ def test_no_field_of_a_setup_is_left_behind() -> None:
     assert len(dataclasses.fields(MissionItem)) == 8
 
 
-def test_a_foreign_mission_without_terrain(tmp_path: Path, track: Track) -> None:
+def test_an_external_mission_without_terrain_comes_back(tmp_path: Path, track: Track) -> None:
     spec = make_setup().scenario.to_json() | {"terrain": {"kind": "none"}, "threats": []}
     setup = dataclasses.replace(make_setup(with_plan=False), scenario=from_spec(spec, "t", external=True))
     log = read_log(record(tmp_path / "a.mcap", setup, track))
@@ -52,14 +52,14 @@ def test_a_foreign_mission_without_terrain(tmp_path: Path, track: Track) -> None
 
 
 def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Attachments:
-    pieces = pack_setup(setup)
-    data = json.loads(pieces["setup.json"])
+    attachments = pack_setup(setup)
+    data = json.loads(attachments["setup.json"])
     change(data)
-    return pieces | {"setup.json": json.dumps(data).encode()}
+    return attachments | {"setup.json": json.dumps(data).encode()}
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    ("change", "message"),
     [
         (lambda data: data["route"]["items"].append(3), r"route\.items: 5 values: 4 are expected"),
         (lambda data: data["envelope"]["climb_rad"].pop(), r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\]"),
@@ -76,8 +76,8 @@ def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Att
         (lambda data: data["sha256"].pop("terrain-000.heights"), r"terrain\.json: parts"),
     ],
 )
-def test_a_setup_that_does_not_fit_is_refused(change: Callable[[dict[str, Any]], None], words: str) -> None:
-    with pytest.raises(LogError, match=words) as caught:
+def test_a_setup_that_does_not_fit_is_refused(change: Callable[[dict[str, Any]], None], message: str) -> None:
+    with pytest.raises(LogError, match=message) as caught:
         unpack_setup(altered(make_setup(), change), "x.mcap")
     assert "\n" not in str(caught.value)
 
@@ -87,13 +87,13 @@ def test_a_log_does_not_make_its_reader_open_files(track: Track, monkeypatch: py
         raise AssertionError("a file was opened")
 
     setup = make_setup(with_plan=False)
-    pieces = pack_setup(setup)
-    spec = json.loads(pieces["scenario.json"]) | {"terrain": {"kind": "dem", "path": "/etc/passwd"}}
-    pieces["scenario.json"] = json.dumps(spec).encode()
-    data = json.loads(pieces["setup.json"])
-    data["sha256"]["scenario.json"] = hashlib.sha256(pieces["scenario.json"]).hexdigest()
+    attachments = pack_setup(setup)
+    spec = json.loads(attachments["scenario.json"]) | {"terrain": {"kind": "dem", "path": "/etc/passwd"}}
+    attachments["scenario.json"] = json.dumps(spec).encode()
+    data = json.loads(attachments["setup.json"])
+    data["sha256"]["scenario.json"] = hashlib.sha256(attachments["scenario.json"]).hexdigest()
     del data["sha256"]["terrain.json"]
-    pieces["setup.json"] = json.dumps(data).encode()
+    attachments["setup.json"] = json.dumps(data).encode()
     monkeypatch.setattr(scenario_module, "open_raster", trap)
     with pytest.raises(LogError, match=r"terrain\.kind: 'dem'"):
-        unpack_setup(pieces, "x.mcap")
+        unpack_setup(attachments, "x.mcap")

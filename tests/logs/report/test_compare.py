@@ -16,7 +16,7 @@ def compared(first: FlightLog, second: FlightLog) -> tuple[Comparison, dict[str,
     return found, {item.name: item for item in found.differences}
 
 
-def test_a_flight_and_itself(log_file: Path) -> None:
+def test_a_flight_does_not_differ_from_itself(log_file: Path) -> None:
     log = read_log(log_file)
     found, items = compared(log, log)
     assert all(item.first == item.second or math.isnan(item.first) for item in items.values())
@@ -24,7 +24,7 @@ def test_a_flight_and_itself(log_file: Path) -> None:
     assert compare_logs(log, log, names=("x", "x")).names == ("x (first)", "x (second)")
 
 
-def test_what_differs_is_told(log_file: Path, other: FlightLog, track: Track) -> None:
+def test_differences_and_notes_state_what_differs(log_file: Path, other: FlightLog, track: Track) -> None:
     found, items = compared(read_log(log_file), other)
     assert items["time in the air"].second - items["time in the air"].first == pytest.approx(0.5)
     assert items["energy used"].second == pytest.approx(2 * items["energy used"].first)

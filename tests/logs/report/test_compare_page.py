@@ -8,7 +8,9 @@ from logs.report.compare import compare_logs
 from logs.report.compare_page import write_comparison
 
 
-def test_pictures_and_page(log_file: Path, other: FlightLog, tmp_path: Path) -> None:
+def test_pictures_and_page_are_whole_and_the_same_bytes_each_time(
+    log_file: Path, other: FlightLog, tmp_path: Path
+) -> None:
     found = compare_logs(read_log(log_file), other, names=("a.mcap", "b.mcap"))
     files = write_comparison(tmp_path / "out", found, svg=True)
     assert [file.name for file in files] == [

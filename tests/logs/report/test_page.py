@@ -21,7 +21,7 @@ from tests.logs.report.report_data import ARGUMENTS, EVIL, FINDINGS, PNG, VERDIC
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures cost most of a second; most tests here read words."""
+    """Leave pictures undrawn: they cost most of a second, and most tests here read text."""
 
     def draw(
         setup: FlightSetup, track: Track | None, verdict: Verdict | None, *, svg: bool = False
@@ -33,7 +33,7 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_page_is_whole_and_asks_nobody() -> None:
+def test_page_is_whole_and_loads_nothing() -> None:
     html = report_html(make_setup(), make_track(), VERDICT, **ARGUMENTS)
     page = Page(html)
     names = [name for name, _ in page.tags]
@@ -79,8 +79,8 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "The failing first",
         "planfly run small",
     ]
-    places = [text.index(words) for words in order]
-    assert places == sorted(places)
+    positions = [text.index(part) for part in order]
+    assert positions == sorted(positions)
     tables = [row for row in page.rows if row[0] in ("fail", "pass", "unjudged") and len(row[1]) == 10]
     assert [state for state, _ in tables] == ["fail", "pass", "pass", "unjudged"]
     assert tables[0][1][:9] == ["leg 1", "slope", "✗ fails", "4.00", "11.2", "7.80", "−3.45", "°", "aircraft"]
@@ -91,7 +91,7 @@ def test_verdict_comes_first_then_what_fails() -> None:
 
 
 @pytest.mark.usefixtures("undrawn")
-def test_hostile_words_stay_words() -> None:
+def test_hostile_names_stay_text() -> None:
     setup = make_setup(name=EVIL, description=EVIL)
     setup = replace(setup, mission=replace(setup.mission, source=EVIL, warnings=(EVIL,)), aircraft=EVIL)
     verdict = Verdict(

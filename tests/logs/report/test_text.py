@@ -12,7 +12,7 @@ from tests.logs.report.report_data import FINDINGS, finding
 
 
 @pytest.mark.parametrize(
-    ("flyable", "complete", "level", "findings", "word"),
+    ("flyable", "complete", "level", "findings", "label"),
     [
         (True, True, "flown", FINDINGS[:2], "Flyable"),
         (True, True, "geometric", FINDINGS[:2], "Flyable on paper, not flown"),
@@ -22,9 +22,11 @@ from tests.logs.report.report_data import FINDINGS, finding
         (False, False, "plan", FINDINGS, "Not flyable: no feasible plan"),
     ],
 )
-def test_badge(flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], word: str) -> None:
+def test_badge_states_the_verdict(
+    flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], label: str
+) -> None:
     badge = badge_of(Verdict(findings, flyable, complete, "", level))
-    assert badge.word == word
+    assert badge.word == label
     assert badge.state == ("pass" if flyable else "fail")
 
 
@@ -39,7 +41,7 @@ def test_numbers_keep_their_value(value: float) -> None:
     assert text.lstrip("−0.").strip() or not text.startswith("−")
 
 
-def test_numbers_with_units() -> None:
+def test_numbers_are_shown_with_their_units() -> None:
     assert number(None) == number(math.nan) == number(math.inf) == "–"
     assert number(12345.6) == "12\u2009346"
     assert number(-0.001, digits=1) == "0.0"

@@ -39,7 +39,7 @@ def test_paths_that_lie_on_each_other_do_not_differ() -> None:
     assert paths_differ(ROUTE, ROUTE[:-1], 1.0)
 
 
-def test_places_are_read_from_findings() -> None:
+def test_failures_are_found_at_their_legs_and_waypoints() -> None:
     found = failures(make_verdict(("slope", "leg 1"), ("clearance", "leg 1"), ("turn", "waypoint 3 (item 7)")), 4)
     assert found.legs == {1: ("slope", "clearance")}
     assert found.waypoints == {3: ("turn",)}
