@@ -103,12 +103,10 @@ def _put_head(out: Bytes, at: int, size: int, channel: int, log_time: int) -> in
 
 
 @compiled
-def _stamped(
-    log_times: Ints, channel: int, tag: int, template: Bytes, slots: Ints, values: Bytes
-) -> tuple[Bytes, Ints]:
-    count = len(log_times)
+def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[Bytes, Ints]:
+    count, body_size = bodies.shape
     # The timestamp takes at most 2 + 12 bytes: its tag and length, two tags, two varints of five bytes.
-    out = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + len(template)), dtype=np.uint8)
+    out = np.empty(count * (FRAME_SIZE + MESSAGE_HEADER + 14 + body_size), dtype=np.uint8)
     offsets = np.zeros(count + 1, dtype=np.int64)
     timestamp = np.empty(16, dtype=np.uint8)
     at = 0
@@ -118,34 +116,25 @@ def _stamped(
         size = _put_varint(timestamp, 1, log_time // _SECOND_NS)
         timestamp[size] = 0x10
         size = _put_varint(timestamp, size + 1, log_time % _SECOND_NS)
-        at = _put_head(out, at, 2 + size + len(template), channel, log_time)
+        at = _put_head(out, at, 2 + size + body_size, channel, log_time)
         out[at], out[at + 1] = tag, size
         at += 2
-        for j in range(size):
-            out[at + j] = timestamp[j]
+        out[at : at + size] = timestamp[:size]
         at += size
-        for j in range(len(template)):
-            out[at + j] = template[j]
-        for j in range(len(slots)):
-            for byte in range(8):
-                out[at + slots[j] + byte] = values[k, 8 * j + byte]
-        at += len(template)
+        out[at : at + body_size] = bodies[k]
+        at += body_size
         offsets[k + 1] = at
     return out[:at], offsets
 
 
-def stamped_records(
-    log_times: Ints, channel: int, tag: int, template: bytes, slots: list[int], values: Floats
-) -> MessageRecords:
-    """Messages that are a timestamp followed by ``template`` with doubles put into it, as records.
+def stamped_records(log_times: Ints, channel: int, timestamp_field: int, bodies: Bytes) -> MessageRecords:
+    """Messages that are a timestamp followed by bytes of one size, as records.
 
-    log_times: (n,) ns since 1970.  tag: of the timestamp's field.  slots: (m,) where each double starts in the
-    template.  values: (n, m).
+    log_times: (n,) ns since 1970.  timestamp_field: the timestamp's field number.  bodies: (n, size) what follows it,
+    in protobuf's encoding.
     """
-    doubles = np.ascontiguousarray(values, dtype="<f8").view(np.uint8).reshape(len(log_times), 8 * len(slots))
-    blob, offsets = _stamped(
-        np.ascontiguousarray(log_times), channel, tag, np.frombuffer(template, np.uint8), np.array(slots), doubles
-    )
+    tag = timestamp_field << 3 | 2  # length-delimited
+    blob, offsets = _stamped(np.ascontiguousarray(log_times), channel, tag, bodies)
     return MessageRecords(channel, log_times, offsets, blob)
 
 

@@ -9,6 +9,14 @@ from numpy.typing import NDArray
 
 from logs.recording import foxglove_scene as scene
 from logs.recording.chunk_layout import MessageRecords, single_record, stamped_records
+from logs.recording.protobuf_arrays import (
+    Encoded,
+    as_bytes,
+    fill_doubles,
+    fill_submessage,
+    submessage,
+    tagged_doubles,
+)
 from logs.recording.state_channel import EPOCH_NS, SECOND_NS
 from world.frames import GeoOrigin, to_geo
 
@@ -18,35 +26,20 @@ Ints = NDArray[np.int64]
 TF_TOPIC, FIX_TOPIC, TRACK_TOPIC = "/tf", "/fix", "/scene/track"
 
 _SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
-# The fields behind the timestamp, in protobuf's encoding, with eight bytes for each double; through message objects
-# these cost as much as all of the state.
-_TF_TAG, _FIX_TAG = 0x0A, 0x32
-_DOUBLE = bytes(8)
-_TF = (
-    FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True),
-    b"\x22\x1b" + b"".join(bytes([tag]) + _DOUBLE for tag in (0x09, 0x11, 0x19)),
-    b"\x2a\x24" + b"".join(bytes([tag]) + _DOUBLE for tag in (0x09, 0x11, 0x19, 0x21)),
+_XYZ, _XYZW, _GEO = "xyz", "xyzw", ("latitude", "longitude", "altitude")
+# The messages behind their timestamps, in protobuf's encoding.
+_TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
+    deterministic=True
 )
-_FIX = (
-    LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True),
-    b"".join(bytes([tag]) + _DOUBLE for tag in (0x09, 0x11, 0x19)),
+_TRANSFORM = np.dtype(
+    [
+        ("names", np.uint8, (len(_TRANSFORM_NAMES),)),
+        ("translation", submessage(_XYZ)),
+        ("rotation", submessage(_XYZW)),
+    ]
 )
-
-
-def _slots(parts: tuple[bytes, ...]) -> tuple[bytes, list[int]]:
-    """The template of these parts, and where its doubles start: behind the names, one after each tag."""
-    template = b"".join(parts)
-    slots, at = [], len(parts[0])
-    for part in parts[1:]:
-        count = len(part) // 9
-        head = len(part) - 9 * count
-        slots += [at + head + 9 * k + 1 for k in range(count)]
-        at += len(part)
-    return template, slots
-
-
-_TF_TEMPLATE, _TF_SLOTS = _slots(_TF)
-_FIX_TEMPLATE, _FIX_SLOTS = _slots(_FIX)
+_FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True)
+_FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)])
 
 
 def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
@@ -56,9 +49,13 @@ def transform_messages(channel: int, log_times: Ints, position: Floats, attitude
     their size in the log; the state's own message is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        rounded = np.round(position * 1024.0) / 1024.0
-    turns = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
-    return stamped_records(log_times, channel, _TF_TAG, _TF_TEMPLATE, _TF_SLOTS, np.hstack([rounded, turns]))
+        translation = np.round(position * 1024.0) / 1024.0
+    rotation = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
+    out: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM)
+    out["names"] = np.frombuffer(_TRANSFORM_NAMES, np.uint8)
+    fill_submessage(out["translation"], FrameTransform.TRANSLATION_FIELD_NUMBER, _XYZ, translation)
+    fill_submessage(out["rotation"], FrameTransform.ROTATION_FIELD_NUMBER, _XYZW, rotation)
+    return stamped_records(log_times, channel, FrameTransform.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
 
 
 def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Floats) -> MessageRecords:
@@ -66,9 +63,12 @@ def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Flo
 
     position: (n, 3).
     """
-    lat, lon = to_geo(origin, position[:, 0], position[:, 1])
-    values = np.stack([lat, lon, position[:, 2]], axis=1)
-    return stamped_records(log_times, channel, _FIX_TAG, _FIX_TEMPLATE, _FIX_SLOTS, values)
+    east, north, up = position.T
+    lat, lon = to_geo(origin, east, north)
+    out: Encoded = np.zeros(len(log_times), dtype=_FIX)
+    out["names"] = np.frombuffer(_FIX_NAMES, np.uint8)
+    fill_doubles(out, _GEO, np.stack([lat, lon, up], axis=1))
+    return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
 
 
 class Poses:

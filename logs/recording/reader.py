@@ -147,7 +147,7 @@ class _MessageCollector:
 
     def rows(self) -> Rows:
         """All state rows in the order of the file, (t,) of `RECORD`."""
-        return join_rows(self.parts)
+        return join_rows(self.parts, RECORD)
 
 
 def read_log(path: Path) -> FlightLog:

@@ -23,6 +23,7 @@ from flight.simulation.track import COLUMNS, Track, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording.attachment_names import RESULT, VERDICT, media_type
 from logs.recording.chunk_layout import (
+    CHUNK,
     NOT_INCREASING,
     OUT_OF_RANGE,
     Layout,
@@ -33,17 +34,18 @@ from logs.recording.chunk_layout import (
 )
 from logs.recording.foxglove_poses import FIX_TOPIC, TF_TOPIC, TRACK_TOPIC, Poses
 from logs.recording.mcap_writer import ChannelIndex, ChunkContent, ContainerWriter
+from logs.recording.protobuf_arrays import as_bytes
 from logs.recording.setup_attachments import pack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
     FLOWN_ROW,
-    RECORD,
     SECOND_NS,
     STATE_NAME,
     STATE_TOPIC,
     Rows,
     encode_rows,
+    join_rows,
     named_rows,
     schema_of,
     state_schema,
@@ -233,7 +235,7 @@ class Recorder:
 
     def _emit(self, until: int | None) -> None:
         """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
-        rows = np.concatenate([_NO_ROWS, *self._pending])
+        rows = join_rows(self._pending, FLOWN_ROW)
         log_times = times_ns(rows["time"])
         stop = len(rows) if until is None else int(np.searchsorted(log_times, until))
         self._pending = [rows[stop:]] if stop < len(rows) else []
@@ -248,24 +250,27 @@ class Recorder:
         channel = self._channels[STATE_TOPIC]
         encoded = encode_rows(rows, self._written, channel)
         self._written += len(rows)
-        data = encoded.view(np.uint8).reshape(len(rows), RECORD.itemsize)
-        layout = lay_out(data, log_times, channel, others, self._writer.front(), CHUNK_SIZE)
+        layout = lay_out(as_bytes(encoded), log_times, channel, others, self._writer.front(), CHUNK_SIZE)
         for content in _chunks(layout):
             self._writer.chunk(content)
 
 
 def _chunks(layout: Layout) -> Iterator[ChunkContent]:
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    for chunk, channels in zip(layout.chunks, layout.channels, strict=True):
+    # Lists first: a field of one chunk at a time costs a microsecond.
+    bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
+    offsets, messages = layout.channels["offset"].tolist(), layout.channels["messages"].tolist()
+    for k in range(len(layout.chunks)):
         yield ChunkContent(
-            records=records[chunk["start"] : chunk["stop"]],
-            index=index[chunk["index_start"] : chunk["index_stop"]],
+            records=records[bounds["start"][k] : bounds["stop"][k]],
+            index=index[bounds["index_start"][k] : bounds["index_stop"][k]],
             channels=tuple(
-                ChannelIndex(k, int(channels[k]["offset"]), int(channels[k]["messages"]))
-                for k in np.flatnonzero(channels["messages"]).tolist()
+                ChannelIndex(channel, offset, count)
+                for channel, (offset, count) in enumerate(zip(offsets[k], messages[k], strict=True))
+                if count
             ),
-            start=int(chunk["first_ns"]),
-            end=int(chunk["last_ns"]),
+            start=bounds["first_ns"][k],
+            end=bounds["last_ns"][k],
         )
 
 

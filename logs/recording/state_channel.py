@@ -208,11 +208,11 @@ def encode_rows(rows: Rows, first_row: int, channel: int) -> Rows:
     return records
 
 
-def join_rows(parts: list[Rows]) -> Rows:
-    """Join arrays of `RECORD`; as bytes, since numpy compares structured types name by name."""
+def join_rows(parts: list[Rows], kind: np.dtype[np.void]) -> Rows:
+    """Join arrays of one structured type; as bytes, since numpy compares structured types name by name."""
     if not parts:
-        return np.zeros(0, dtype=RECORD)
-    return np.concatenate([part.view(np.uint8) for part in parts]).view(RECORD)
+        return np.zeros(0, dtype=kind)
+    return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)
 
 
 def decode_rows(records: Rows) -> Track:
