@@ -54,7 +54,7 @@ def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
     return figure
 
 
-def draw_overlay(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
+def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
     """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle."""
     flown = [_distance(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)

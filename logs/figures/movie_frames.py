@@ -32,7 +32,16 @@ _TRAIL = 4000
 
 @dataclass(frozen=True, slots=True)
 class MovieFrames:
-    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown."""
+    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> movie = MovieFrames(log.setup, log.track, 0.0, log.end_time, speed=10.0)
+    >>> len(movie), movie.times()[:2]
+    (45, array([0. , 0.83333333]))
+    >>> next(movie.frames()).shape
+    (726, 1000, 3)
+    """
 
     setup: FlightSetup
     track: Track

@@ -63,8 +63,10 @@ class MessageRecords:
 class Layout:
     """Chunks of message records, and the message indexes of each.
 
-    records: all chunks' records, one chunk after the other.  index: all their message index records.
-    chunks: (c,) of `CHUNK`.  channels: (c, channels + 1) of `CHANNEL_INDEX`, by chunk and channel number.
+    records: all chunks' records, one chunk after the other.
+    index: all their message index records.
+    chunks: (c,) of `CHUNK`.
+    channels: (c, channels + 1) of `CHANNEL_INDEX`, by chunk and channel number.
     """
 
     records: Bytes

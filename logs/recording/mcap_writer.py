@@ -53,8 +53,10 @@ class ChannelIndex(NamedTuple):
 class ChunkContent:
     """Message records one after the other, and the message index records to stand behind them.
 
-    start, end: log time of the oldest and the newest message, ns.  channels: those with messages here, each with where
-    its record starts in ``index``.
+    records: of the messages, and of schemas and channels before them.
+    index: message index records.
+    channels: those with messages here, each with where its record starts in ``index``.
+    start, end: log time of the oldest and the newest message, ns.
     """
 
     records: bytes | memoryview

@@ -69,8 +69,10 @@ _KINDS = {
 class StateField(NamedTuple):
     """A field of the message.
 
-    name: with its unit.  kind: its numpy type.  source: the field of `Track` that it holds.  component: which of that
-    field's columns; None for a field of one.
+    name: with its unit.
+    kind: its numpy type.
+    source: the field of `Track` that it holds.
+    component: which of that field's columns; None for a field of one.
     """
 
     name: str

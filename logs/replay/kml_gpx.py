@@ -25,7 +25,13 @@ EVERY = 0.5
 
 @dataclass(frozen=True, slots=True)
 class MapLine:
-    """A line on the map: (n,) degrees, and metres above mean sea level; marks: a name for each point, or none."""
+    """A line on the map.
+
+    name: of the line.
+    lat_deg, lon_deg: (n,).
+    amsl: (n,) m above mean sea level.
+    marks: a name for each point, or none.
+    """
 
     name: str
     lat_deg: Floats

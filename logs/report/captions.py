@@ -25,6 +25,13 @@ class ReportPicture:
     data: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Caption:
+    title: str
+    alternative: str
+    caption: str
+
+
 def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, bytes]) -> list[ReportPicture]:
     """List the page's pictures in its order; what was not drawn is left out.
 
@@ -43,20 +50,13 @@ def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, byte
     ]
 
 
-@dataclass(frozen=True, slots=True)
-class _Caption:
-    title: str
-    alternative: str
-    caption: str
-
-
 def _captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
-    """Captions by picture, in the page's order."""
+    """Captions by the picture's name, in the page's order."""
     return _route_captions(setup, flown) | _FLIGHT_CAPTIONS
 
 
 def _route_captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
-    """Of the pictures of route and terrain, which are of a plan alone where nothing was flown."""
+    """Captions of the pictures of route and terrain, which a plan has, too, that was not flown."""
     legs, threats = setup.route.legs, len(setup.scenario.threats)
     ground = "shaded terrain" if setup.scenario.terrain is not None else "no terrain"
     track = " and the flown track" if flown else ""

@@ -35,7 +35,12 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two flights with their names and verdicts, and what differs."""
+    """Two flights and what differs.
+
+    logs, names, verdicts: of the first and the second flight.
+    differences: each quantity that was measured, differing or not.
+    notes: what the flights do not share, and how far apart their tracks are, in sentences.
+    """
 
     logs: tuple[FlightLog, FlightLog]
     names: tuple[str, str]
@@ -130,7 +135,7 @@ def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
 
 
 def _notes(first: FlightLog, second: FlightLog) -> list[str]:
-    """Say what the two flights do not share, and how far apart their tracks are."""
+    """Note what the two flights do not share, and how far apart their tracks are."""
     a, b = first.setup, second.setup
     notes = []
     for name, left, right in (

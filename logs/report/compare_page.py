@@ -5,7 +5,7 @@ from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_overlay
+from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_both_over_distance
 from logs.figures.elements.style import png_bytes, svg_bytes
 from logs.report.compare import Comparison, difference_rows
 from world.atomic_files import write_whole
@@ -34,7 +34,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     first, second = (
         NamedFlight(name, log.setup, log.track) for name, log in zip(comparison.names, comparison.logs, strict=True)
     )
-    figures = {"compare-profile": draw_overlay((first, second))}
+    figures = {"compare-profile": draw_both_over_distance((first, second))}
     if first.setup.scenario.origin == second.setup.scenario.origin:
         figures = {"compare-map": draw_both_on_map((first, second)), **figures}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}

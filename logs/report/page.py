@@ -90,8 +90,10 @@ def report_html(
 ) -> str:
     """Make the page.
 
-    track: None for a plan that was not flown.  ended: how the flight ended, as in its log; None where unknown.
-    versions: of planfly and the packages it depends on.  command: the command line that makes the same flight again.
+    track: None for a plan that was not flown.
+    ended: how the flight ended, as in its log; None where unknown.
+    versions: of planfly and the packages it depends on.
+    command: the command line that makes the same flight again.
     events: the log's lines, shown with their times.
     """
     from logs.figures.draw_all import draw_pictures

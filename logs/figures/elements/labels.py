@@ -54,8 +54,11 @@ class LabelPlacer:
     ) -> None:
         """Write the text beside data position (x, y), where it disturbs least.
 
-        gap: pixels.  prefer: the direction tried first; (0, 0) centres the text on the position.  optional: left out
-        where it would cover another label.  style: of the text; one with a box gets a line to its point.
+        size: of the font, points.
+        gap: pixels between text and position.
+        prefer: the direction tried first; (0, 0) centres the text on the position.
+        optional: left out where it would cover another label.
+        style: of the text; one with a box gets a line to its point.
         """
         (px, py) = self._pixels([x], [y])[0]
         if not (math.isfinite(px) and math.isfinite(py)):

@@ -21,7 +21,13 @@ _BLOCKS = 700
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """One series of a panel: values (t,), and how its line looks in panel and legend; filled: down to zero."""
+    """One series of a panel.
+
+    label: in the legend.
+    values: (t,) in the panel's unit.
+    color, width, dashes: how its line looks, in matplotlib's terms.
+    filled: from the line down to zero.
+    """
 
     label: str
     values: Floats
@@ -33,8 +39,12 @@ class Series:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One quantity: its axis label with unit, its series, level limits (label, value), and the least span it shows.
+    """One quantity.
 
+    title: the axis label, with the unit.
+    series: its lines.
+    limits: level lines, label and value.
+    least_span: the least range of values that it shows.
     held: (t,) rows that are shaded, where a control stands at its limit.
     """
 
