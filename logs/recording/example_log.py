@@ -9,7 +9,7 @@ from aircraft.envelope import Envelope
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import Route
 from flight.mission_files.formats import mission_text
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import FlightLog, LogEvent
 from logs.recording.recorder import Recorder
@@ -57,10 +57,8 @@ def example_log() -> FlightLog:
             items=np.array([item.seq for item in mission.items]),
             started="Started in the air at waypoint 0.",
         ),
-        envelope=_envelope(),
+        limits=make_limits(scenario, _envelope(), _AIRSPEED, 0.5),
         aircraft="aerosonde",
-        airspeed=_AIRSPEED,
-        max_bank=0.5,
         battery=200.0,
         seed=1,
     )
