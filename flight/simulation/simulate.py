@@ -91,7 +91,7 @@ def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
     speeds = []
     for leg, airspeed in enumerate(setup.route.airspeed):
-        table = limits.packed(float(airspeed))
+        table = limits.performance(float(airspeed))
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
     return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0
 
