@@ -66,3 +66,15 @@ def default_folder(name: str, seed: int) -> Path:
     """Where results go that nobody named a place for: ``runs/<name>-seed<N>``."""
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
     return RUNS / f"{safe}-seed{seed}"
+
+
+def named_or_default(named: str | None, default: Path, overwrite: bool, source: Path) -> Path:
+    """The target file that was named, or the default, which is replaced.
+
+    source: the input, which no target may be.  Raises PlanflyError for a named one that `refuse_existing` refuses.
+    """
+    if named is None:
+        return default
+    target = Path(named)
+    refuse_existing(target, overwrite, source)
+    return target

@@ -1,6 +1,5 @@
-"""``planfly export``, and the options of ``fly`` and ``check``, from the command line."""
+"""``planfly export``: plans, missions and logs in every form."""
 
-import json
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -94,35 +93,3 @@ def test_unknown_suffixes(plan_file: Path, tmp_path: Path, capsys: pytest.Captur
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / name)]) == 2
     assert "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx" in capsys.readouterr().err
     assert not (tmp_path / "a.plan").exists()
-
-
-def test_aircraft_and_airspeed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    name = str(MISSIONS / "by_hand.waypoints")
-    log = tmp_path / "f.mcap"
-    assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
-    assert (read_log(log).setup.route.airspeed == 21.0).all()
-    capsys.readouterr()
-    for options, words in (
-        (["--aircraft", "boeing"], "flight.aircraft: no aircraft called 'boeing'"),
-        (["--airspeed", "70"], "airspeed_mps: 70"),
-        (["--airspeed", "28"], None),
-        (["--airspeed", "-3"], "a number above 0"),
-    ):
-        try:
-            code = main(["check", name, *options])
-        except SystemExit as stop:
-            code = int(str(stop.code))
-        said = capsys.readouterr().err
-        assert (code == 2) == (words is not None)
-        assert words is None or words in said
-    assert main(["check", str(log), "--airspeed", "20"]) == 2
-    assert "--airspeed: a log is judged" in capsys.readouterr().err
-
-
-def test_check_names_px4s_rules(tmp_path: Path) -> None:
-    target = tmp_path / "v.json"
-    assert main(["check", str(MISSIONS / "mission_planner_land.waypoints"), "--json", str(target)]) == 4
-    findings = json.loads(target.read_text())["findings"]
-    reasons = [finding["reason"] for finding in findings if finding["rule"] == "mission" and finding["ok"] is False]
-    assert any("(PX4 checkFixedWindLandApproach)" in reason for reason in reasons)
-    assert any("(PX4 checkMissionItemValidity)" in reason for reason in reasons)

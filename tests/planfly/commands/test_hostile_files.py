@@ -22,8 +22,8 @@ MAGIC = b"\x89MCAP0\r\n"
 # Runs one command under the limits; imports stand before them, since it is the file that is limited, not Python.
 CHILD = """
 import json, resource, sys, time
-import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.dispatch, planfly.commands.log_commands
-import planfly.open_mission, world.raster
+import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.check
+import planfly.commands.recover, planfly.commands.replay, planfly.commands.report, world.raster
 from planfly.cli import main
 def kib(name):
     with open("/proc/self/status") as file:

@@ -8,23 +8,9 @@ from pathlib import Path
 import pytest
 
 from planfly.cli import main
+from planfly.commands.registry import COMMANDS
 
-ROOT = Path(__file__).parents[2]
-COMMANDS = [
-    "run",
-    "plan",
-    "export",
-    "fly",
-    "check",
-    "aircraft",
-    "serve",
-    "replay",
-    "recover",
-    "report",
-    "compare",
-    "paper",
-    "scenarios",
-]
+ROOT = Path(__file__).parents[1]
 
 
 def test_the_import_contracts_hold() -> None:
