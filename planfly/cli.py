@@ -25,11 +25,11 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
     from planfly.commands.registry import find_command
-    from planfly.terminal.output import patient_output
+    from planfly.terminal.output import tolerate_closed_output
     from world.errors import PlanflyError
 
     try:
-        with patient_output():
+        with tolerate_closed_output():
             return find_command(args.command)(args)
     except PlanflyError as error:
         return _fail(BAD_INPUT, error)

@@ -21,7 +21,7 @@ from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, load_scenario
 
-# How far a stage is: done, whole, a remark.
+# Takes how far a stage is: done, whole, a remark.
 Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
@@ -30,7 +30,17 @@ BATCH = 60
 
 @dataclass(frozen=True, slots=True)
 class PlanThenFly:
-    """What `plan_then_fly` returns; track is None where there was no feasible plan to fly."""
+    """What `plan_then_fly` returns.
+
+    plan: the path, with its certificate.
+    mission: the plan as mission items.
+    track: the flight, a row a guidance tick; None where there was no feasible plan to fly.
+    verdict: whether it flies, with a finding for every rule and place.
+
+    >>> result = plan_then_fly("paper-07", seed=1)
+    >>> len(result.plan.waypoints), len(result.mission.items), round(float(result.track.time[-1]))
+    (10, 11, 530)
+    """
 
     plan: Plan
     mission: Mission
@@ -44,6 +54,10 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     scenario: an embedded name, a TOML file's path, or a `Scenario`.  seed: of planner and turbulence; None takes
     the scenario's, or 1.  log: where to write the flight as MCAP, replaced if it exists; None writes none.
     Raises a `world.errors.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
+
+    >>> result = plan_then_fly("tight", seed=1)
+    >>> result.plan.safe, result.verdict.flyable
+    (True, False)
     """
     world = load_scenario(scenario) if isinstance(scenario, str) else scenario
     number = choose_seed(world, seed)
@@ -100,7 +114,7 @@ def make_setup(
 
 
 def flight_events(track: Track, ended: str) -> list[LogEvent]:
-    """What a log tells of a flight beside its rows."""
+    """Events of a simulated flight: how it ended, at its last row."""
     end = float(track.time[-1]) if len(track) else 0.0
     return [LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")]
 
@@ -113,15 +127,15 @@ def fly(
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     """
 
-    def tell(done: float, whole: float) -> None:
+    def report(done: float, whole: float) -> None:
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
 
     if log is None:
-        flown = simulate(setup, airframe.aircraft, progress=tell)
+        flown = simulate(setup, airframe.aircraft, progress=report)
         return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=tell)
+        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=report)
         track = thin_track(flown.track, every)
         verdict = judge_flight(setup, track, flown.ended)
         for event in flight_events(track, flown.ended):

@@ -7,12 +7,12 @@ from planfly.paper.files import file_names, table_text, write_figures, write_tab
 from planfly.paper.seeded_plans import PROBLEMS, plan_section, table
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.progress import progress
-from planfly.terminal.targets import RUNS, prepare_folder, refuse_folder
+from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
 
 
 def paper(args: argparse.Namespace) -> int:
-    """Plan, write and print; 0 whatever the table says: no path in it is an answer too."""
-    folder = Path(args.out) if args.out else RUNS / "paper"
+    """Plan, write and print; 0 whatever the table holds: no path in it is an answer too."""
+    folder = Path(args.out) if args.out else RESULTS / "paper"
     if args.out:
         refuse_folder(folder, args.overwrite)
     with progress("planning") as advance:

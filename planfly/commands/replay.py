@@ -1,4 +1,4 @@
-"""``planfly replay``: a flight told again from its log, on the terminal, as a film, or to other programs."""
+"""``planfly replay``: a flight from its log, on the terminal, as a film, or to other programs."""
 
 import argparse
 import shutil

@@ -34,9 +34,9 @@ def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     targets = [tmp_path / f"a.{kind}" for kind in ("waypoints", "plan", "fence", "rally", "kml", "gpx")]
     assert main(["export", str(plan_file), *map(str, targets)]) == 0
-    said = capsys.readouterr()
-    assert "a fence has no height" in said.err
-    assert said.out.count("\n") == len(targets)
+    printed = capsys.readouterr()
+    assert "a fence has no height" in printed.err
+    assert printed.out.count("\n") == len(targets)
     waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
     assert waypoints.items == plan.items
     assert plan.fences == fence.fences

@@ -69,7 +69,7 @@ def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "printed"),
     [
         (["--problems", "8"], "7,15,30,60"),
         (["--problems", ""], "7,15,30,60"),
@@ -78,12 +78,12 @@ def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
         (["--jobs", "-1"], "1 to 1,000"),
     ],
 )
-def test_bad_options_get_one_line(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_options_get_one_line(options: list[str], printed: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["paper", *options])
     assert stopped.value.code == 2
     line = capsys.readouterr().err
-    assert said in line
+    assert printed in line
     assert line.count("\n") == 1
 
 

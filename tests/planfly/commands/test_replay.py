@@ -21,7 +21,7 @@ def on_a_terminal(*argv: str, cwd: Path) -> tuple[int, str]:
         env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "90", "LINES": "40"},
     )  # fmt: skip
     os.close(theirs)
-    said = b""
+    printed = b""
     while True:
         try:
             data = os.read(ours, 65536)
@@ -29,25 +29,25 @@ def on_a_terminal(*argv: str, cwd: Path) -> tuple[int, str]:
             break
         if not data:
             break
-        said += data
+        printed += data
     os.close(ours)
-    return process.wait(), said.decode()
+    return process.wait(), printed.decode()
 
 
 def test_replay_on_a_terminal_shows_instruments(flight: Path, tmp_path: Path) -> None:
     log = flight / "flight.mcap"
-    code, said = on_a_terminal("replay", str(log), "--speed", "40", "--from", "10", "--to", "50", cwd=tmp_path)
+    code, printed = on_a_terminal("replay", str(log), "--speed", "40", "--from", "10", "--to", "50", cwd=tmp_path)
     assert code == 0
-    assert said.count("\x1b[H") >= 4
+    assert printed.count("\x1b[H") >= 4
     # The terminal is as it was, and the last moment stays on it.
-    assert said.index("\x1b[?1049h") < said.index("\x1b[H") < said.index("\x1b[?25h\x1b[?1049l")
-    last = said.rpartition("\x1b[?1049l")[2]
+    assert printed.index("\x1b[?1049h") < printed.index("\x1b[H") < printed.index("\x1b[?25h\x1b[?1049l")
+    last = printed.rpartition("\x1b[?1049l")[2]
     assert "\x1b" not in last
     assert "50.0 of" in last
     assert "airspeed" in last
-    code, said = on_a_terminal("replay", str(log), "--at-once", cwd=tmp_path)
-    assert "\x1b" not in said
-    assert "leg 0 to waypoint 1" in said
+    code, printed = on_a_terminal("replay", str(log), "--at-once", cwd=tmp_path)
+    assert "\x1b" not in printed
+    assert "leg 0 to waypoint 1" in printed
 
 
 def test_replay_of_a_part(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
