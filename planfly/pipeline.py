@@ -48,6 +48,22 @@ class PlanThenFly:
     verdict: Verdict
 
 
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """A flight from its first tick to its verdict.
+
+    track: the rows that are recorded, all of them where there is no log.
+    ended: how it ended, "completed" or the reason why not.
+    verdict: on these rows.
+    events: what the log holds beside them.
+    """
+
+    track: Track
+    ended: str
+    verdict: Verdict
+    events: tuple[LogEvent, ...]
+
+
 def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
     """Plan a path, fly it in JSBSim and judge the flight.
 
@@ -67,8 +83,8 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
     setup = make_setup(world, airframe, mission, number, plan=plan)
-    track, _, verdict = fly(setup, airframe, None if log is None else Path(log))
-    return PlanThenFly(plan, mission, track, verdict)
+    flown = fly(setup, airframe, None if log is None else Path(log))
+    return PlanThenFly(plan, mission, flown.track, flown.verdict)
 
 
 def make_plan(
@@ -113,16 +129,10 @@ def make_setup(
     )
 
 
-def flight_events(track: Track, ended: str) -> list[LogEvent]:
-    """Events of a simulated flight: how it ended, at its last row."""
-    end = float(track.time[-1]) if len(track) else 0.0
-    return [LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")]
-
-
 def fly(
     setup: FlightSetup, airframe: Airframe, log: Path | None, advance: Advance | None = None, *, every: int = 1
-) -> tuple[Track, str, Verdict]:
-    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict.
+) -> JudgedFlight:
+    """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     """
@@ -133,12 +143,17 @@ def fly(
 
     if log is None:
         flown = simulate(setup, airframe.aircraft, progress=report)
-        return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
+        return _judged(setup, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
         flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=report)
-        track = thin_track(flown.track, every)
-        verdict = judge_flight(setup, track, flown.ended)
-        for event in flight_events(track, flown.ended):
+        judged = _judged(setup, thin_track(flown.track, every), flown.ended)
+        for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(flown.ended, verdict)
-    return track, flown.ended, verdict
+        recorder.finish(judged.ended, judged.verdict)
+    return judged
+
+
+def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:
+    end = float(track.time[-1]) if len(track) else 0.0
+    event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
+    return JudgedFlight(track, ended, judge_flight(setup, track, ended), (event,))

@@ -21,7 +21,7 @@ def fly(args: argparse.Namespace) -> int:
     print_warnings(opened.setup.mission.warnings)
     target.parent.mkdir(parents=True, exist_ok=True)
     with progress("flying") as advance:
-        _, _, verdict = pipeline.fly(opened.setup, opened.airframe, target, advance, every=60 // args.log_hz)
-    print_verdict(verdict, opened.setup.route.notes)
+        flown = pipeline.fly(opened.setup, opened.airframe, target, advance, every=60 // args.log_hz)
+    print_verdict(flown.verdict, opened.setup.route.notes)
     print(f"log       {target}")
-    return FLYABLE if verdict.flyable else NOT_FLYABLE
+    return FLYABLE if flown.verdict.flyable else NOT_FLYABLE

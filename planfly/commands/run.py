@@ -10,7 +10,7 @@ from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
-from planfly.pipeline import flight_events, fly, make_plan, make_setup
+from planfly.pipeline import fly, make_plan, make_setup
 from planfly.refine import refine
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
@@ -87,13 +87,13 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
         return verdict, False
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with progress("flying") as advance:
-        track, ended, verdict = fly(setup, airframe, folder / "flight.mcap", advance)
-    write_verdict(folder / "verdict.json", verdict)
+        flown = fly(setup, airframe, folder / "flight.mcap", advance)
+    write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):
-        write_pictures(folder, setup, track, verdict, ended, task.command, events=flight_events(track, ended))
-    print_verdict(verdict, setup.route.notes)
+        write_pictures(folder, setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)
+    print_verdict(flown.verdict, setup.route.notes)
     print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
-    return verdict, True
+    return flown.verdict, True
 
 
 def _keep(folder: Path, number: int) -> None:
