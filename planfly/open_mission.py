@@ -84,10 +84,10 @@ def open_mission(
     if scenario_name is not None:
         scenario = change(load_scenario(scenario_name, terrain))
     else:
-        scenario = change(implied_scenario(mission, terrain, on_the_spot=True))
+        scenario = change(implied_scenario(mission, terrain, vertical_legs=True))
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
-    return OpenedMission(make_setup(scenario, airframe, mission, number, on_the_spot=True), airframe, path.stem)
+    return OpenedMission(make_setup(scenario, airframe, mission, number, vertical_legs=True), airframe, path.stem)
 
 
 def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _unchanged) -> OpenedPlan:
