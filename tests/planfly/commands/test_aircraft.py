@@ -30,7 +30,7 @@ def _rows(text: str, title: str) -> list[list[str]]:
     return [line.split() for line in block.splitlines()[1:] if line.split()[0].replace(".", "").isdigit()]
 
 
-def test_the_aerosonde(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_aerosonde_is_printed_and_drawn_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "aerosonde", "--out", "shown"]) == 0
     text = capsys.readouterr().out
     assert sorted(path.name for path in Path("shown").iterdir()) == PICTURES
@@ -68,7 +68,9 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["aerosonde", "--out", "full"], "exists and is not empty"),
     ],
 )
-def test_bad_input(argv: list[str], printed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_name_or_folder_is_one_line(
+    argv: list[str], printed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("keep", encoding="utf-8")
     assert main(["aircraft", *argv]) == 2

@@ -89,7 +89,9 @@ def test_a_mission_from_form_to_form(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])
-def test_unknown_suffixes(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_an_unknown_suffix_is_refused_with_the_known_ones(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / name)]) == 2
     assert "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx" in capsys.readouterr().err
     assert not (tmp_path / "a.plan").exists()

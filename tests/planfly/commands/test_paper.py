@@ -95,7 +95,7 @@ def test_an_unknown_algorithm_is_refused_before_anything_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_rows_count_and_order() -> None:
+def test_the_table_counts_plans_in_the_order_they_were_made() -> None:
     def run(algorithm: str, seed: int, length: float, kill: float, bad: int = 0) -> SeededPlan:
         numbers = ((bad, 0, 0, 0), (length, kill, 2.0 * seed, 5.0), kill == 0.0, 0.1 * (kill > 0), 0.2)
         return SeededPlan(7, algorithm, seed, np.zeros((3, 3)), *numbers, 100, np.zeros((2, 3)), float(seed))

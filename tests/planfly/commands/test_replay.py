@@ -50,7 +50,7 @@ def test_replay_on_a_terminal_shows_instruments(flight: Path, tmp_path: Path) ->
     assert "leg 0 to waypoint 1" in printed
 
 
-def test_replay_of_a_part(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_part_is_printed_as_in_the_whole(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = str(flight / "flight.mcap")
     assert main(["replay", log]) == 0
     whole = capsys.readouterr().out.splitlines()
