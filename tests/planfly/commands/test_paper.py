@@ -11,7 +11,7 @@ from planfly.cli import main
 from planfly.paper.files import file_names, table_text
 from planfly.paper.seeded_plans import SeededPlan, exposure_probability, plan_section, problem_name, table
 from planfly.terminal.targets import prepare_folder
-from tests.planner.conftest import small_scenario
+from tests.setups import small_scenario
 from world.scenario import load_scenario
 
 STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")
