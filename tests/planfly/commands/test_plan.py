@@ -1,4 +1,4 @@
-"""A real Ctrl-C during ``planfly plan``: the best plan so far is written."""
+"""``planfly plan``: a real Ctrl-C leaves the best plan so far."""
 
 import json
 import signal

@@ -1,4 +1,4 @@
-"""Planning at the command line: budgets, Ctrl-C with the best plan so far, and planning again in flight."""
+"""``planfly plan``: a path alone, within a budget or until Ctrl-C, anew or again in flight."""
 
 import argparse
 import math
@@ -8,24 +8,40 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
 
-from planfly.airframe import Airframe
-from planner.plan import Objective, Plan, read_plan
+from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.progress import progress
+from planfly.terminal.targets import default_folder, named_or_default
+from planner.plan import Objective, Plan, plan_json, read_plan
 from planner.search.explain_failure import what_blocks
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, same_mission
-from planner.search.search_state import Stop
+from planner.search.search_state import Progress, Stop
+from world.atomic_files import write_whole
 from world.errors import ScenarioError
-from world.scenario import Scenario
+from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_planner, with_threats
 
-if TYPE_CHECKING:
-    from planfly.pipeline import Advance
+
+def plan(args: argparse.Namespace) -> int:
+    """Plan, and write the plan file; 4 where the plan is not safe."""
+    scenario, old = _prepare(args, load_scenario(args.scenario))
+    seed = choose_seed(scenario, args.seed)
+    default = default_folder(scenario.name, seed) / ("plan.json" if old is None else "replan.json")
+    target = named_or_default(args.out, default, args.overwrite, Path(args.scenario))
+    airframe = load_airframe(scenario)
+    with progress(f"planning {scenario.name}") as advance:
+        made = _make_plan(args, scenario, old, airframe, seed, advance)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(target, plan_json(made))
+    _print_plan(made)
+    print(f"plan      {target}")
+    return FLYABLE if made.safe else NOT_FLYABLE
 
 
 @contextmanager
-def best_so_far(seconds: float | None) -> Iterator[Stop]:
+def _best_so_far(seconds: float | None) -> Iterator[Stop]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
     A second Ctrl-C ends the process.
@@ -51,7 +67,7 @@ def best_so_far(seconds: float | None) -> Iterator[Stop]:
         signal.signal(signal.SIGINT, before)
 
 
-def prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Plan | None]:
+def _prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Plan | None]:
     """Scenario with what the command line adds to it, and the plan to start from, if any.
 
     Threats that the old plan knew stay known.  Raises ScenarioError or MissionError.
@@ -75,12 +91,12 @@ def prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Pla
     return with_threats(scenario, args.add_threat or [], "--add-threat", kept), old
 
 
-def make_plan(
-    args: argparse.Namespace, scenario: Scenario, old: Plan | None, airframe: Airframe, seed: int, advance: "Advance"
+def _make_plan(
+    args: argparse.Namespace, scenario: Scenario, old: Plan | None, airframe: Airframe, seed: int, advance: Progress
 ) -> Plan:
     """Plan as the command line asks."""
     limits = airframe.limits
-    with best_so_far(args.budget[1] if args.budget else None) as stop:
+    with _best_so_far(args.budget[1] if args.budget else None) as stop:
         if old is None:
             return plan_path(scenario, limits, seed=seed, algorithm=args.algorithm, progress=advance, stop=stop)
         return replan(
@@ -88,18 +104,18 @@ def make_plan(
         )
 
 
-def print_plan(plan: Plan) -> None:
+def _print_plan(made: Plan) -> None:
     """A plan on the terminal."""
-    state = "safe" if plan.safe else "feasible, but inside a missile's reach" if plan.feasible else "no feasible plan"
-    length = float(plan.objectives[Objective.LENGTH_RATIO])
-    print(f"{state}: {len(plan.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {plan.algorithm}")
-    if plan.ended != "completed":
-        why = "at its budget" if plan.ended == "budget" else "by Ctrl-C"
-        print(f"  note    the search was ended {why}, after {plan.evaluations:,} evaluations: the best plan so far")
-    if plan.flown_legs:
-        print(f"  note    legs 0..{plan.flown_legs - 1} are flown and kept; judged is what follows them")
-    for problem in plan.certificate.problems:
+    state = "safe" if made.safe else "feasible, but inside a missile's reach" if made.feasible else "no feasible plan"
+    length = float(made.objectives[Objective.LENGTH_RATIO])
+    print(f"{state}: {len(made.waypoints)} waypoints, {length:.3f} times the straight line, algorithm {made.algorithm}")
+    if made.ended != "completed":
+        why = "at its budget" if made.ended == "budget" else "by Ctrl-C"
+        print(f"  note    the search was ended {why}, after {made.evaluations:,} evaluations: the best plan so far")
+    if made.flown_legs:
+        print(f"  note    legs 0..{made.flown_legs - 1} are flown and kept; judged is what follows them")
+    for problem in made.certificate.problems:
         print(f"  failed  {problem}")
-    if not plan.feasible:
-        for line in what_blocks(plan):
+    if not made.feasible:
+        for line in what_blocks(made):
             print(f"  note    {line}")

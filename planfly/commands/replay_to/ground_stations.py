@@ -13,15 +13,16 @@ from flight.mission.items import Home
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
 from planfly.terminal.link_options import Stopped, link_access, stop_signals
+from planfly.terminal.stored_logs import CUT_SHORT
 from world.errors import FlightError
 
 # Seconds to wait for a ground station unless told otherwise.
-_PATIENCE = 10.0
+_TIMEOUT = 10.0
 
 
 def play(log: FlightLog, args: argparse.Namespace) -> None:
     """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
-    link, wait = Link(link_access(args)), _PATIENCE if args.wait is None else args.wait
+    link, wait = Link(link_access(args)), _TIMEOUT if args.wait is None else args.wait
     snapshots = SnapshotMaker(log.setup)
     track = log.track
     rows = track_rows(track)
@@ -37,7 +38,7 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
             if not link.peers:
                 raise FlightError(f"--to {args.to}: no ground station has answered within {wait:g} s")
             begun, k = time.monotonic(), 0
-            player.say(f"replay of {args.log} at {args.speed or 1.0:g}x")
+            player.announce(f"replay of {args.log} at {args.speed or 1.0:g}x")
             while k < len(rows) - 1 and not stopped():
                 k = min(
                     len(rows) - 1,
@@ -51,7 +52,7 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
             if log.ended == "completed" and k == len(rows) - 1:
                 status.mission_state = COMPLETE
             status.armed = status.flying = False
-            player.say(f"replay over: {log.ended or 'the log ends before the flight does'}")
+            player.announce(f"replay over: {log.ended or CUT_SHORT}")
             player.rest(1.5, stopped)
     finally:
         link.close()
@@ -66,7 +67,7 @@ class _Player:
         self._hello = 0.0
         self._texts = 0
 
-    def say(self, text: str) -> None:
+    def announce(self, text: str) -> None:
         """Send a text to the stations, and print it."""
         print(text, flush=True)
         self._texts += 1
@@ -74,9 +75,9 @@ class _Player:
             for piece in status_texts(text, INFO, self._texts):
                 self._link.send(piece, peer)
 
-    def wait(self, patience: float, stopped: Stopped) -> None:
-        """Call stations until one answers, or ``patience`` seconds are over."""
-        end = time.monotonic() + patience
+    def wait(self, timeout: float, stopped: Stopped) -> None:
+        """Call stations until one answers, or ``timeout`` seconds are over."""
+        end = time.monotonic() + timeout
         while not self._link.peers and time.monotonic() < end and not stopped():
             self.step(0.05)
 
@@ -86,8 +87,8 @@ class _Player:
         while time.monotonic() < end and not stopped():
             self.step(0.02)
 
-    def step(self, nap: float) -> None:
-        """Read what stations say, send what is due, sleep a little."""
+    def step(self, pause: float) -> None:
+        """Read what stations send, send them what is due, and pause, s."""
         now = time.monotonic()
         self._status.boot, self._status.wall = now - self._born, time.time()
         self._link.receive()
@@ -99,4 +100,4 @@ class _Player:
                 if now >= due:
                     self._link.send(telemetry_message(name, self._status), peer)
                     peer.due[name] = max(due + PERIODS[name], now - PERIODS[name])
-        time.sleep(nap)
+        time.sleep(pause)

@@ -104,15 +104,18 @@ def _mp4(film: MovieFrames) -> bytes:
     frames = film.frames()
     first = next(frames)
     height, width = first.shape[:2]
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as words:
+    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as messages:
         out = Path(folder) / "film.mp4"
         command = [
             "ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
             "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),
         ]  # fmt: skip
-        with progress("drawing") as advance, subprocess.Popen(command, stdin=subprocess.PIPE, stderr=words) as encoder:
+        with (
+            progress("drawing") as advance,
+            subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,
+        ):
             entry = encoder.stdin
-            # Where it ends before us, its status says why.
+            # Where it ends before us, its status gives the reason.
             with contextlib.suppress(BrokenPipeError):
                 for number, frame in enumerate(itertools.chain([first], frames), 1):
                     if entry is not None:
@@ -121,8 +124,8 @@ def _mp4(film: MovieFrames) -> bytes:
                 if entry is not None:
                     entry.close()
             status = encoder.wait()
-        words.seek(0)
-        said = words.read().decode("utf-8", "replace").strip().splitlines()
+        messages.seek(0)
+        lines = messages.read().decode("utf-8", "replace").strip().splitlines()
         if status or not out.exists():
-            raise OSError(errno.EIO, f"status {status}: {said[-1] if said else 'it says nothing'}", "ffmpeg")
+            raise OSError(errno.EIO, f"status {status}: {lines[-1] if lines else 'it says nothing'}", "ffmpeg")
         return out.read_bytes()

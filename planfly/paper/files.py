@@ -8,13 +8,13 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-from planfly.commands.paper import PaperRun, Row, problem_name
+from planfly.paper.seeded_plans import SeededPlan, TableRow, problem_name
 from planner.plan import Objective, Violation
 from world.atomic_files import write_whole
 from world.scenario import load_scenario
 
 SCHEMA = "planfly.paper/1"
-# Files that any run may write; older ones of these names are cleared first.
+# Files that any command may write; older ones of these names are cleared first.
 FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
 
 
@@ -24,7 +24,7 @@ def file_names(problems: Sequence[int]) -> list[str]:
     return [*FILES, *pictures]
 
 
-def table_text(rows: Sequence[Row]) -> str:
+def table_text(rows: Sequence[TableRow]) -> str:
     """The table for a terminal."""
     head = (
         f"{'threats':>7}  {'algorithm':<15}{'safe':>7}{'certified':>11}  {'PLR median':>10}  {'worst':>6}"
@@ -49,27 +49,27 @@ def _number(value: float | None, digits: int) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def write_tables(folder: Path, rows: Sequence[Row], done: Sequence[PaperRun]) -> None:
+def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededPlan]) -> None:
     """table.csv, runs.csv and runs.json, the same bytes for the same seeds; times.csv, which is not."""
-    columns = [item.name for item in fields(Row) if item.name != "seconds_median"]
+    columns = [item.name for item in fields(TableRow) if item.name != "seconds_median"]
     write_whole(folder / "table.csv", _csv(columns, ([getattr(row, name) for name in columns] for row in rows)))
-    write_whole(folder / "runs.csv", _csv(_RUN_COLUMNS, (list(_run_row(item).values()) for item in done)))
-    times = ([item.threats, item.algorithm, item.seed, f"{item.seconds:.3f}"] for item in done)
+    write_whole(folder / "runs.csv", _csv(_PLAN_COLUMNS, (list(_plan_row(item).values()) for item in plans)))
+    times = ([item.threats, item.algorithm, item.seed, f"{item.seconds:.3f}"] for item in plans)
     write_whole(folder / "times.csv", _csv(["threats", "algorithm", "seed", "cpu_s"], times))
     kept = [{key: value for key, value in asdict(row).items() if key != "seconds_median"} for row in rows]
     runs = [
-        _run_row(item)
+        _plan_row(item)
         | {
             "waypoints_east_north_amsl_m": item.waypoints.tolist(),
             "history_length_kill_violations": item.history.tolist(),
         }
-        for item in done
+        for item in plans
     ]
     text = json.dumps({"schema": SCHEMA, "table": kept, "runs": runs}, allow_nan=False, indent=1)
     write_whole(folder / "runs.json", text + "\n")
 
 
-def _run_row(item: PaperRun) -> dict[str, Any]:
+def _plan_row(item: SeededPlan) -> dict[str, Any]:
     row: dict[str, Any] = {
         "threats": item.threats,
         "algorithm": item.algorithm,
@@ -86,7 +86,7 @@ def _run_row(item: PaperRun) -> dict[str, Any]:
     }
 
 
-_RUN_COLUMNS = [
+_PLAN_COLUMNS = [
     "threats",
     "algorithm",
     "seed",
@@ -108,26 +108,26 @@ def _csv(columns: Sequence[str], rows: Any) -> str:
     return buffer.getvalue()
 
 
-def write_figures(folder: Path, done: Sequence[PaperRun]) -> None:
+def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
     """Figures as the paper's 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
     from logs.figures.draw_all import write_png
     from logs.figures.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
-    by_problem: dict[int, dict[str, list[PaperRun]]] = {}
-    for item in done:
+    by_problem: dict[int, dict[str, list[SeededPlan]]] = {}
+    for item in plans:
         by_problem.setdefault(item.threats, {}).setdefault(item.algorithm, []).append(item)
     for threats, groups in by_problem.items():
         scenario = load_scenario(problem_name(threats))
         first = next(iter(groups))
         lines = {
-            name: [PaperPath(run.waypoints, run.objectives[Objective.LENGTH_RATIO], run.safe) for run in group]
+            name: [PaperPath(item.waypoints, item.objectives[Objective.LENGTH_RATIO], item.safe) for item in group]
             for name, group in groups.items()
         }
         write_png(draw_paths(scenario, first, lines[first]), folder / f"paths-{threats:02d}.png")
         chosen = {name: group[0] for name, group in lines.items()}
         write_png(draw_encodings(scenario, chosen, seed=1), folder / f"encodings-{threats:02d}.png")
     histories = {
-        threats: {name: [run.history for run in group] for name, group in groups.items()}
+        threats: {name: [item.history for item in group] for name, group in groups.items()}
         for threats, groups in by_problem.items()
     }
     write_png(draw_convergence(histories), folder / "convergence.png")

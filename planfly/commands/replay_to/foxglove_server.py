@@ -14,14 +14,14 @@ from planfly.terminal.link_options import Stopped, stop_signals
 from world.errors import FlightError, PlanflyError
 
 _HOST = "127.0.0.1"
-# Of a pause between looks at the clock and at who is listening, s; and until a new subscription stands.
-_NAP, _SETTLES = 0.005, 0.05
+# Time between looks at the clock and at who is listening, s, and until a new subscription is active, s.
+_POLL, _SUBSCRIBING = 0.005, 0.05
 
 
 def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
     """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
 
-    It waits for the first client that subscribes.  Who subscribes later is given the scenes as they are then.
+    It waits for the first client that subscribes.  Who subscribes later is sent the scenes as they are then.
     Raises PlanflyError where foxglove-sdk is not installed, FlightError where nobody comes in time, OSError for a
     port in use.
     """
@@ -32,34 +32,34 @@ def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
             "--foxglove: the package foxglove-sdk is not installed (extra: planfly[foxglove])"
         ) from error
     log = Path(args.log)
-    stage = _Stage(foxglove, log_channels(log))
+    broadcast = _Broadcast(foxglove, log_channels(log))
     try:
         server = foxglove.start_server(
-            name=f"planfly {Path(args.log).name}", host=_HOST, port=args.port, server_listener=stage,
-            capabilities=[foxglove.Capability.Time], context=stage.context,
+            name=f"planfly {Path(args.log).name}", host=_HOST, port=args.port, server_listener=broadcast,
+            capabilities=[foxglove.Capability.Time], context=broadcast.context,
         )  # fmt: skip
     except RuntimeError as error:
         raise OSError(0, str(error), f"{_HOST}:{args.port}") from error
     print(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket)", flush=True)
     try:
         with stop_signals() as stopped:
-            messages = stage.up_to(log_messages(log), round(start * 1e9) + EPOCH_NS)
-            _wait(stage, args.wait, stopped)
-            _play(stage, server, messages, round(end * 1e9) + EPOCH_NS, args.speed or 1.0, stopped)
+            messages = broadcast.up_to(log_messages(log), round(start * 1e9) + EPOCH_NS)
+            _wait(broadcast, args.wait, stopped)
+            _play(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, args.speed or 1.0, stopped)
     finally:
         server.stop()
 
 
-def _wait(stage: "_Stage", patience: float | None, stopped: Stopped) -> None:
+def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
     begun = time.monotonic()
-    while not stage.listeners and not stopped():
-        if patience is not None and time.monotonic() - begun > patience:
-            raise FlightError(f"--foxglove: nobody has subscribed within {patience:g} s")
-        time.sleep(_NAP)
+    while not broadcast.listeners and not stopped():
+        if timeout is not None and time.monotonic() - begun > timeout:
+            raise FlightError(f"--foxglove: nobody has subscribed within {timeout:g} s")
+        time.sleep(_POLL)
 
 
 def _play(
-    stage: "_Stage", server: Any, messages: Iterator[LogMessage], end_ns: int, speed: float, stopped: Stopped
+    broadcast: "_Broadcast", server: Any, messages: Iterator[LogMessage], end_ns: int, speed: float, stopped: Stopped
 ) -> None:
     begun, first, newest = time.monotonic(), None, 0
     for message in messages:
@@ -67,22 +67,22 @@ def _play(
             break
         first = message.log_time if first is None else first
         while (ahead := (message.log_time - first) / 1e9 / speed - (time.monotonic() - begun)) > 0.0 and not stopped():
-            stage.greet()
-            time.sleep(min(ahead, _NAP))
+            broadcast.catch_up()
+            time.sleep(min(ahead, _POLL))
         if stopped():
             return
         # An event that was noted afterwards stands later in the file than its time.
         if message.log_time > newest:
             newest = message.log_time
             server.broadcast_time(newest)
-        stage.show(message)
+        broadcast.show(message)
     # What is under way, and who came last, is served before the server goes.
-    time.sleep(2.0 * _SETTLES)
-    stage.greet()
-    time.sleep(_SETTLES)
+    time.sleep(2.0 * _SUBSCRIBING)
+    broadcast.catch_up()
+    time.sleep(_SUBSCRIBING)
 
 
-class _Stage:
+class _Broadcast:
     """The log's topics, the newest message of each scene, and who listens: a listener in Foxglove's sense."""
 
     def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
@@ -112,22 +112,22 @@ class _Stage:
 
     def show(self, message: LogMessage) -> None:
         """Send a message to those who listen."""
-        self.greet()
+        self.catch_up()
         self._note(message)
         channel = self._channels.get(message.channel.topic)
         if channel is not None:
             channel.log(message.data, log_time=message.log_time)
 
-    def greet(self) -> None:
-        """Give those who came a moment ago the scenes as they are."""
+    def catch_up(self) -> None:
+        """Send those who have just subscribed the scenes as they are."""
         while not self._arrivals.empty():
             self._waiting.append(self._arrivals.get())
         now = time.monotonic()
         for came, topic in self._waiting:
             scene = self._scenes.get(topic)
-            if scene is not None and now - came >= _SETTLES:
+            if scene is not None and now - came >= _SUBSCRIBING:
                 self._channels[topic].log(scene.data, log_time=scene.log_time)
-        self._waiting = [item for item in self._waiting if now - item[0] < _SETTLES]
+        self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIBING]
 
     def _note(self, message: LogMessage) -> None:
         if message.channel.topic.startswith("/scene/"):

@@ -1,4 +1,4 @@
-"""A mission that climbs on the spot is judged, not refused: its slope is 90 degrees."""
+"""``planfly check``: PX4's rules by name, and a climb on the spot, which is judged and not refused."""
 
 import json
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 
 from planfly.cli import main
 
+MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
 MISSION = """QGC WPL 110
 0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t100\t1
 1\t0\t3\t16\t0\t0\t0\t0\t46.00\t8.00\t200\t1
@@ -17,7 +18,9 @@ MISSION = """QGC WPL 110
 
 
 @pytest.mark.parametrize(("up", "verb"), [(350, "climbs"), (80, "falls"), (1434, "climbs"), (201.5, "climbs")])
-def test_it_is_judged_and_not_flyable(up: float, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_climb_on_the_spot_is_judged_and_not_flyable(
+    up: float, verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     mission = tmp_path / "up.waypoints"
     mission.write_text(MISSION.format(up=up), encoding="utf-8")
     assert main(["check", str(mission), "--json", str(tmp_path / "verdict.json")]) == 4
@@ -30,3 +33,12 @@ def test_it_is_judged_and_not_flyable(up: float, verb: str, tmp_path: Path, caps
     assert "m long; it goes nowhere now" in failed[0]["suggestion"]
     assert main(["fly", str(mission), "--log", str(tmp_path / "flight.mcap")]) == 4
     assert "on the spot" in capsys.readouterr().out
+
+
+def test_check_names_px4s_rules(tmp_path: Path) -> None:
+    target = tmp_path / "v.json"
+    assert main(["check", str(MISSIONS / "mission_planner_land.waypoints"), "--json", str(target)]) == 4
+    findings = json.loads(target.read_text())["findings"]
+    reasons = [finding["reason"] for finding in findings if finding["rule"] == "mission" and finding["ok"] is False]
+    assert any("(PX4 checkFixedWindLandApproach)" in reason for reason in reasons)
+    assert any("(PX4 checkMissionItemValidity)" in reason for reason in reasons)

@@ -58,8 +58,8 @@ class Viewer:
         except TimeoutError:
             return False
         if isinstance(data, str):
-            told = json.loads(data)
-            for channel in told.get("channels", ()):
+            message = json.loads(data)
+            for channel in message.get("channels", ()):
                 self.channels[channel["topic"]] = channel
         elif data[0] == 1:
             number, stamp = struct.unpack_from("<IQ", data, 1)
@@ -142,9 +142,9 @@ def test_only_this_machine_is_served_and_a_port_in_use_is_said(
         taken.listen()
         port = taken.getsockname()[1]
         assert main(["replay", str(log_path), "--foxglove", "--port", str(port)]) == 1
-    said = capsys.readouterr().err.strip()
-    assert f"127.0.0.1:{port}" in said
-    assert len(said.splitlines()) == 1
+    printed = capsys.readouterr().err.strip()
+    assert f"127.0.0.1:{port}" in printed
+    assert len(printed.splitlines()) == 1
     assert main(["replay", str(log_path), "--foxglove", "--port", "0", "--wait", "0.1"]) == 2
     assert "nobody has subscribed within 0.1 s" in capsys.readouterr().err
 

@@ -80,7 +80,7 @@ def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("target", "more", "words"),
+    ("target", "more", "message"),
     [
         ("film.avi", (), ".gif, .mp4 or a folder is expected"),
         ("film.mp4", (), "needs ffmpeg, which is not installed"),
@@ -91,14 +91,14 @@ def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
     ],
 )
 def test_what_cannot_be_filmed(
-    target: str, more: tuple[str, ...], words: str, log_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
+    target: str, more: tuple[str, ...], message: str, log_path: Path, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     assert main(["replay", str(log_path), "--movie", target, *more]) == 2
-    said = capsys.readouterr().err.strip().splitlines()
-    assert words in said[-1]
+    printed = capsys.readouterr().err.strip().splitlines()
+    assert message in printed[-1]
     assert list(tmp_path.iterdir()) == []
 
 
