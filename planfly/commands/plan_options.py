@@ -16,7 +16,7 @@ from planner.plan import Objective, Plan, read_plan
 from planner.search.explain_failure import what_blocks
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, same_mission
-from planner.search.search_state import Stop
+from planner.search.search_state import StopCondition
 from world.errors import ScenarioError
 from world.scenario import Scenario
 from world.scenario_variants import with_planner, with_threats
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def best_so_far(seconds: float | None) -> Iterator[Stop]:
+def best_so_far(seconds: float | None) -> Iterator[StopCondition]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
     A second Ctrl-C ends the process.

@@ -9,6 +9,7 @@ import pytest
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
+from planner.evaluation.problem import Problem, make_problem
 from world.scenario import Scenario, from_spec
 
 
@@ -80,6 +81,11 @@ def scenario() -> Scenario:
 @pytest.fixture(scope="session")
 def limits(scenario: Scenario) -> Limits:
     return limits_of(scenario)
+
+
+@pytest.fixture(scope="session")
+def problem(scenario: Scenario, limits: Limits) -> Problem:
+    return make_problem(scenario, limits)
 
 
 @pytest.fixture(scope="session")
