@@ -20,8 +20,8 @@ class MarkovChain(Umda):
 
     >>> def rank(scores):
     ...     return np.argsort(np.argsort(scores[:, 0]))
-    >>> search = MarkovChain(np.full(6, -2.0), np.full(6, 6.0), rank, 60, np.random.default_rng(1))
-    >>> for generation in range(80):
+    >>> search = MarkovChain(np.full(6, -2.0), np.full(6, 6.0), rank, 400, np.random.default_rng(1))
+    >>> for generation in range(30):
     ...     samples = search.ask()
     ...     search.tell((samples**2).sum(axis=1)[:, None])
     >>> bool(search.scores.min() < 1e-4)
