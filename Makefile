@@ -1,12 +1,13 @@
 # make demo: set up, then plan over real terrain, export, fly, log, check, report
 # make test: set up, then run every check and test
+# make dev: set up what a developer needs, and nothing more
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 TESTED := $(VENV)/.ready-test
 
-.PHONY: demo test bench soak setup clients clean
+.PHONY: demo test bench soak dev setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
@@ -23,6 +24,8 @@ bench: $(TESTED)
 
 soak: $(TESTED) clients
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest -n 2
+
+dev: $(TESTED)
 
 setup: $(READY)
 

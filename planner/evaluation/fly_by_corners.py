@@ -5,8 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import BLEND_ACCELERATION, turn_tangents
-from planner.evaluation.aircraft_limits import half_blend_length
+from aircraft.path_limits import BLEND_ACCELERATION, PerformanceTable, turn_tangents, wind_speed_at
 from planner.evaluation.problem_arrays import ProblemArrays
 from world.geometry import turning_angle
 from world.kernels import compiled, inlined
@@ -17,9 +16,17 @@ Floats = NDArray[np.float64]
 ARC_STEP = math.radians(15.0)
 
 
+@inlined
+def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+    """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
+    speed = aircraft.airspeed + wind_speed_at(aircraft, amsl)
+    length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
+    return length
+
+
 @compiled
 def fly_by_vertices(
-    aircraft: Floats, before: Floats, at: Floats, after: Floats, radius: float
+    aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
     """Vertices (k, 3) of the way that a flight takes past the waypoint `at`, at least as low as the flight.
 
@@ -27,8 +34,6 @@ def fly_by_vertices(
     tangent point, and a point on the next leg where the blend ends.  Height is even along the arc; where the slope
     breaks downwards a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
     Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
-
-    aircraft: packed limits.
     """
     run_in = math.hypot(at[0] - before[0], at[1] - before[1])
     run_out = math.hypot(after[0] - at[0], after[1] - at[1])
@@ -48,7 +53,7 @@ def fly_by_vertices(
     available_in, available_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
     beside = 0.5 * arc if chords > 0 else min(available_in, available_out)
     available_in, available_out = min(available_in, beside), min(available_out, beside)
-    blend = half_blend_length(aircraft, at[2], BLEND_ACCELERATION)
+    blend = half_blend_length(aircraft, at[2])
     half_in = min(abs(slope_in - slope) * blend, available_in)
     half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
     deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import BLEND_ACCELERATION
-from planner.evaluation.aircraft_limits import half_blend_length
+from aircraft.path_limits import PerformanceTable
 from planner.evaluation.clearance_buffer import RequiredClearance
-from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices
+from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length
 from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
 from planner.evaluation.leg_geometry import CORNER, LEG, measure_corners, measure_legs
 from planner.evaluation.missile_index import MissileIndex, kill_density
@@ -178,7 +177,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
 
 @compiled_views
 def _measure_flown(
-    aircraft: Floats,
+    aircraft: PerformanceTable,
     legs_hold_turns: bool,
     fly_over: bool,
     path: Floats,
@@ -200,7 +199,7 @@ def _measure_flown(
         slope_in = slope_out
         slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1e-6)
         crest = max(0.0, slope_in - slope_out)
-        blend = half_blend_length(aircraft, path[i, 2], BLEND_ACCELERATION)
+        blend = half_blend_length(aircraft, path[i, 2])
         aside = math.sqrt(radius * radius + tangent * tangent) - radius
         aside += min(aside, radius * CHORD_RISE)
         drop = 0.5 * tangent * crest + 0.25 * crest * crest * blend + aside * max(abs(slope_in), abs(slope_out))

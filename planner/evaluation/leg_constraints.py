@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import arc_slope, downwind, slopes_along, wind_speed_at
-from planner.evaluation.aircraft_limits import airspeed_of, least_air_angles
 from planner.evaluation.clearance_buffer import RequiredClearance, required_clearance
 from planner.evaluation.leg_geometry import Wind, courses_at, roll_length, settling_length, turn_length
 from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
@@ -47,11 +46,10 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
     """What holds for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
     by_aircraft = math.isnan(climb) or math.isnan(dive)
-    air_climb, air_dive = least_air_angles(data.aircraft)
     if math.isnan(climb):
-        climb = _slope_everywhere(data, air_climb)
+        climb = _slope_everywhere(data, data.aircraft.climb)
     if math.isnan(dive):
-        dive = _slope_everywhere(data, air_dive)
+        dive = _slope_everywhere(data, data.aircraft.descent)
     return PrecomputedLimits(
         # A turn cannot exceed half a circle, whatever rounding says.
         math.cos(data.max_turn) if data.max_turn < math.pi else -2.0,
@@ -65,13 +63,15 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
 
 
 @compiled_views
-def _slope_everywhere(data: ProblemArrays, air_angle: float) -> float:  # pragma: no cover - compiled
-    """Slope (rad) of this angle through the air on any course between floor and ceiling; -1 for none.
+def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # pragma: no cover - compiled
+    """Slope (rad) that the aircraft can fly on any course between floor and ceiling; -1 for none.
 
-    It is least with the strongest wind behind.
+    air_angles: (h,) to the air, of its heights.  The slope over the ground is least with the strongest wind behind.
     """
     wind = max(wind_speed_at(data.aircraft, data.floor), wind_speed_at(data.aircraft, data.ceiling))
-    speed = airspeed_of(data.aircraft)
+    speed, air_angle = data.aircraft.airspeed, math.inf
+    for k in range(air_angles.size):
+        air_angle = min(air_angle, air_angles[k])
     if not air_angle > 0.0 or wind >= 0.99 * speed * math.cos(air_angle):
         return -1.0
     return math.atan2(speed * math.sin(air_angle), speed * math.cos(air_angle) + wind)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import corner_tangent, fly_over_run, reversal_room
+from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, reversal_room
 from planner.evaluation.problem_arrays import ProblemArrays, Records
 from world.kernels import compiled, compiled_views, inlined
 
@@ -95,12 +95,9 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: n
 
 @compiled
 def roll_length(
-    aircraft: Floats, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
+    aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
-    """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side.
-
-    aircraft: packed limits.
-    """
+    """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side."""
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import Limits
-from planner.evaluation.aircraft_limits import aircraft_with_share
+from aircraft.path_limits import Limits, derated
 from planner.evaluation.encoding import Space
 from planner.evaluation.missile_index import make_missile_index
 from planner.evaluation.problem_arrays import ProblemArrays, SlopeBounds, sphere_records, threat_records
@@ -31,6 +30,8 @@ SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
 CERTIFIED_END_SHARE = 0.75
 # More buffer for each attempt after the first, m: the search had not seen all ground between its samples.
 ATTEMPT_BUFFER = 5.0
+# Of the aircraft's steepest climb and dive, the share that a plan uses: holding a path in gusts takes the rest.
+TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
 # m inside the map, and inside floor and ceiling, that a search keeps where the fixed ends do.
 MAP_MARGIN, HEIGHT_MARGIN = 10.0, 4.0
 
@@ -87,7 +88,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         to_pixel=terrain.to_pixel.packed,
         threats=units,
         spheres=sphere_records(units),
-        aircraft=aircraft_with_share(limits, scenario.wind.turbulence),
+        aircraft=derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence]),
         bounds=scenario.bounds,
         start=scenario.start,
         destination=scenario.destination,

@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.path_limits import PerformanceTable
 from planner.evaluation.missile_index import MissileIndex
 from planner.evaluation.threat_grid import ThreatCells
 from planner.plan import Objective, Violation
@@ -55,7 +56,7 @@ class ProblemArrays(NamedTuple):
     heights: raster of the ground.
     to_pixel: packed map from positions to its pixels.
     threats: `THREAT` records (m,), and spheres the same as `SPHERE` records.
-    aircraft: packed limits of the aircraft.
+    aircraft: what it can do, of which turbulence leaves a plan a share.
     bounds: (2, 2) map; floor and ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.
     max_turn: largest course change.
@@ -76,7 +77,7 @@ class ProblemArrays(NamedTuple):
     to_pixel: Floats
     threats: Records
     spheres: Records
-    aircraft: Floats
+    aircraft: PerformanceTable
     bounds: Floats
     start: Floats
     destination: Floats

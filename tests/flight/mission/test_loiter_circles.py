@@ -16,7 +16,7 @@ from flight.guidance.fly_by_path import fly_by_path, sample_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.route import Route
 from flight.mission.routing import make_route
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
@@ -58,9 +58,9 @@ def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> Flight
     blank = Route(
         np.array([[0.0, 0, 400], [500, 0, 400]]), np.array([25.0]), np.zeros(2), np.zeros(2, bool), np.arange(2), ""
     )
-    envelope = load_envelope(aircraft)
-    setup = FlightSetup(scenario, read, "", blank, envelope, "aerosonde", 25.0, bank, 888.0, 1)
-    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, limits_of(setup)))
+    limits = make_limits(scenario, load_envelope(aircraft), 25.0, bank)
+    setup = FlightSetup(scenario, read, "", blank, limits, "aerosonde", 888.0, 1)
+    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, setup.limits))
 
 
 @settings(max_examples=60, deadline=None)
@@ -87,7 +87,7 @@ def test_the_path_is_the_circle(
     reach = np.hypot(*(corners - middle).T)
     assert reach == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
     setup = replace(FLAT, route=flown)
-    drawn = sample_path(fly_by_path(flown, limits_of(setup)), 5.0)[:, :2]
+    drawn = sample_path(fly_by_path(flown, setup.limits), 5.0)[:, :2]
     near = np.hypot(*(drawn - middle).T)
     # No point of the path is inside the circle, and the arcs lie on it.
     assert near.min() > radius - 0.05

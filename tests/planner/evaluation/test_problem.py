@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planner.evaluation.aircraft_limits import TURBULENCE_SHARE
-from planner.evaluation.problem import ANGLE_MARGIN, make_problem
+from planner.evaluation.problem import ANGLE_MARGIN, TURBULENCE_SHARE, make_problem
 from planner.plan import Violation
 from tests.planner.evaluation.violations import violations_of
 from world.scenario import Scenario

@@ -1,0 +1,34 @@
+"""The same plans, missions, tracks and verdicts as before modules were moved into their rooms, byte for byte."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import planfly
+from flight.mission_files.formats import mission_text
+from logs.recording.reader import read_log
+from logs.verdict.findings import verdict_json
+from planfly.cli import main
+from planner.plan import plan_json
+from tests.authorities.make_digests import FILE, PAPER_FILES, RUNS, digest, track_digests, verdict_digest
+
+KEPT: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_plan_missions_track_and_verdict_of_a_run(name: str, tmp_path: Path) -> None:
+    log = tmp_path / "flight.mcap"
+    done = planfly.plan_then_fly(name.partition("-")[0], seed=RUNS[name], log=log)
+    kept = KEPT["runs"][name]
+    assert digest(plan_json(done.plan).encode()) == kept["plan.json"]
+    assert digest(mission_text(done.mission, "waypoints").encode()) == kept["mission.waypoints"]
+    assert digest(mission_text(done.mission, "plan").encode()) == kept["mission.plan"]
+    assert track_digests(read_log(log).track) == kept["track"]
+    assert verdict_digest(json.loads(verdict_json(done.verdict))) == kept["verdict"]
+
+
+def test_tables_of_the_paper(tmp_path: Path) -> None:
+    assert main(["paper", "--problems", "7,60", "--runs", "3", "--out", str(tmp_path / "paper")]) == 0
+    assert {name: digest((tmp_path / "paper" / name).read_bytes()) for name in PAPER_FILES} == KEPT["paper"]
