@@ -170,15 +170,7 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
         'kind = "peaks"',
         "",
     ]
-    for pe, pn, height, sigma in PEAKS:
-        lines += [
-            "[[terrain.peak]]",
-            f"east_m = {pe}",
-            f"north_m = {pn}",
-            f"height_m = {height}",
-            f"sigma_m = {sigma}",
-            "",
-        ]
+    lines += _peak_lines()
     lines += [
         "[area]",
         "east_m = [0, 10000]",
@@ -205,6 +197,25 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
         'aircraft = "aerosonde"',
         "airspeed_mps = 25",
     ]
+    return "\n".join(lines + _threat_lines(instance)) + "\n"
+
+
+def _peak_lines() -> list[str]:
+    lines = []
+    for pe, pn, height, sigma in PEAKS:
+        lines += [
+            "[[terrain.peak]]",
+            f"east_m = {pe}",
+            f"north_m = {pn}",
+            f"height_m = {height}",
+            f"sigma_m = {sigma}",
+            "",
+        ]
+    return lines
+
+
+def _threat_lines(instance: Instance) -> list[str]:
+    lines = []
     for number, (place, radius) in enumerate(zip(instance.positions, instance.radii, strict=True), 1):
         lines += [
             "",
@@ -217,7 +228,7 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
             f"detection_radius_m = {1.5 * radius:.0f}",
             f"detection_scale_m = {0.75 * radius:.0f}",
         ]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def random_scenario(seed: int, threats: int = 60) -> str:

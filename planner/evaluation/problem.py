@@ -28,7 +28,7 @@ SEARCH_BUFFER, CERTIFIED_BUFFER = 8.0, 5.0
 SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
 # Of what a fixed end leaves of the buffer, the share that the certificate asks for.
 CERTIFIED_END_SHARE = 0.75
-# More buffer for each attempt after the first, m: the search had not seen all ground between its samples.
+# More buffer for each attempt after the first, m: the search had not sampled all ground.
 ATTEMPT_BUFFER = 5.0
 # Of the aircraft's steepest climb and dive, the share that a plan uses: holding a path in gusts takes the rest.
 TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}

@@ -72,11 +72,21 @@ def plan_path(
 ) -> Plan:
     """Plan a path.  The same scenario, limits, algorithm and seed give the same plan.
 
-    algorithm: a name of `planner.search.algorithms`; None takes the scenario's, or the default.  progress: called with
-    generations done, generations in all, and a short text.  stop: asked between generations; a text such as
-    "interrupted" ends the search with the best path yet, and stands in the plan.  improved: called with each path
-    (w, 3) that meets the constraints better than all before it, not yet certified.  first_safe: end with the first
-    safe path.  previous: (w, 3) an older path of the same ends and number of waypoints to start from.
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> plan.safe, plan.waypoints.shape
+    (True, (10, 3))
+
+    algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
+    progress: called with generations done, generations in all, and a short text.
+    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
+    the plan.
+    improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
+    first_safe: end with the first safe path.
+    previous: (w, 3) an older path of the same ends and number of waypoints to start from.
+
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)

@@ -38,7 +38,20 @@ def replan(
     scenario: with the threats known now (`world.scenario.with_threats`).  The turn at that waypoint counts from the
     course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
     The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
-    Raises MissionError for a leg that the old plan has not or that begins in a missile's reach, and for a plan of
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> from world.scenario_variants import with_threats
+    >>> scenario = load_scenario("hard-07")
+    >>> limits = load_airframe(scenario).limits
+    >>> old = plan_path(scenario, limits, seed=1)
+    >>> east, north, _ = old.waypoints[6]
+    >>> now = with_threats(scenario, [(east, north, 300.0, 0.0)], "--add-threat")
+    >>> new = replan(now, limits, old, 3, seed=1)
+    >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
+    (True, 3, True)
+
+    Raises MissionError for a leg that the old plan has not or that begins in a missile's kill sphere, and for a plan of
     another mission; ScenarioError as `plan_path`.
     """
     count = len(old.waypoints)
@@ -59,7 +72,17 @@ def replan(
 
 
 def same_mission(scenario: Scenario, old: Plan) -> None:
-    """Raise MissionError if a plan has not the scenario's ends."""
+    """Raise MissionError if a plan has not the scenario's ends.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> same_mission(scenario, plan)
+    >>> same_mission(load_scenario("tight"), plan)
+    Traceback (most recent call last):
+    world.errors.MissionError: tight: start: 742 m from that of the plan; it is another mission's
+    """
     for name, planned, asked in (
         ("start", old.waypoints[0], scenario.start),
         ("destination", old.waypoints[-1], scenario.destination),

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.grid_kernels import Grid, cheapest_route
+from planner.seeding.grid_kernels import cheapest_route
+from planner.seeding.grid_prices import Grid
 
 Floats = NDArray[np.float64]
 

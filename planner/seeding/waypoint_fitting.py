@@ -12,7 +12,7 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.missile_index import kill_density
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.evaluation.terrain_clearance import segment_pixels, terrain_excess
-from planner.seeding.grid_kernels import KILL_COST
+from planner.seeding.grid_prices import KILL_COST
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, make_problem
-from planner.seeding.grid_kernels import COARSE, COARSE_GROWTH, KILL_COST, SIDEWAYS, Grid
+from planner.seeding.grid_kernels import SIDEWAYS
+from planner.seeding.grid_prices import COARSE, COARSE_GROWTH, KILL_COST, Grid
 from planner.seeding.grid_routes import grid_route, make_grid
 from world.scenario import Scenario
 
