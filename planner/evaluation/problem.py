@@ -53,7 +53,7 @@ class Problem:
 
 
 def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Problem:
-    """Put a scenario into the form of compiled code.  Raises ScenarioError if nothing can be planned on it.
+    """A scenario in the form of compiled code.  Raises ScenarioError if nothing can be planned on it.
 
     attempt: how many searches have failed; each adds to the clearance that the next one keeps.
     """
@@ -137,7 +137,7 @@ def _slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _inset(data: ProblemArrays) -> ProblemArrays:
-    """Shrink the map and the heights by the margins, or by what the ends leave of them."""
+    """Arrays with the map and the heights shrunk by the margins, or by what the ends leave of them."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
     bounds = data.bounds.copy()

@@ -14,20 +14,22 @@ Records = NDArray[Any]
 
 # Side of a cell, as a share of the median radius; and cells of one grid, at most.
 CELL_SIDE = 0.2
-MOST_CELLS = 300_000
+MOST_THREAT_CELLS = 300_000
 # Highest whole metre that a cell notes.
-MOST = 2_000_000_000
+HIGHEST_METRE = 2_000_000_000
 # Ground beyond the map that the grid covers, as a share of the map's sides.
 BEYOND = 0.1
 # A cell: where its units begin in the list of units, their number, and the lowest and the highest place (m) that any of
 # them reaches.
-CELL = np.dtype([("first", np.int32), ("count", np.int32), ("lowest", np.int32), ("highest", np.int32)], align=True)
+THREAT_CELL = np.dtype(
+    [("first", np.int32), ("count", np.int32), ("lowest", np.int32), ("highest", np.int32)], align=True
+)
 
 
 class ThreatCells(NamedTuple):
     """Lists of units by the cells that they reach, in the form that the compiled functions take.
 
-    cells: `CELL` records (c,), row by row; the last stands for all places outside the grid and holds every unit.
+    cells: `THREAT_CELL` records (c,), row by row; the last stands for all places outside the grid and holds every unit.
     units: of one cell after the other, in increasing order.
     west, south, side: of the grid and of its cells, m.
     columns, rows: cells across and up.
@@ -50,16 +52,16 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
     low, high = bounds[:, 0], bounds[:, 1]
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
     size = high - low
-    side = math.sqrt(float(size[0] * size[1]) / MOST_CELLS)
+    side = math.sqrt(float(size[0] * size[1]) / MOST_THREAT_CELLS)
     armed = radius[radius > 0.0]
     if armed.size:
         side = min(max(side, CELL_SIDE * float(np.median(armed))), float(size.max()))
     columns, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
     first, units = _lists(np.ascontiguousarray(position), radius, float(low[0]), float(low[1]), side, columns, rows)
     # Whole metres, a hair wider, for what rounding would leave out.
-    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -MOST, MOST).astype(np.int32)
-    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -MOST, MOST).astype(np.int32)
-    cells = np.zeros(first.size - 1, dtype=CELL)
+    lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
+    highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
+    cells = np.zeros(first.size - 1, dtype=THREAT_CELL)
     _fill_cells(first, units, lowest, highest, cells)
     for array in (cells, units):
         array.setflags(write=False)

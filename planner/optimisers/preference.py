@@ -39,7 +39,7 @@ class Level:
 
 
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Count the rows preferred to each row (n, c) -> (n,), split by level.
+    """How many rows of scores (n, c) are preferred to each, (n,), counted level by level.
 
     With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
     Pareto dominance on the level, and only rows equal on it go on to the next: a component outside U is at its

@@ -18,11 +18,11 @@ from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
 from planner.search.score_table import (
+    CONSTRAINTS,
     DETECTION,
     HEIGHT,
     KILL,
     LENGTH,
-    VIOLATIONS,
     best_first,
     no_scores,
     safe,
@@ -160,8 +160,8 @@ def _levels(search: Search) -> tuple[Level, ...]:
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
     if search.algorithm.graded:
-        return VIOLATIONS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
-    return VIOLATIONS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
+        return CONSTRAINTS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
+    return CONSTRAINTS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 
 
 def _retry(search: Search, number: int) -> None:
@@ -260,7 +260,7 @@ def _starts(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats
 
 
 def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRoute]:
-    """Find the grids' routes; the archive takes a path that is quickly fitted to each as soon as it is found.
+    """The grids' routes; the archive takes a path that is quickly fitted to each as soon as it is found.
 
     Those with the best such paths come first.
     """
@@ -292,7 +292,7 @@ def _best_row(scores: Floats) -> Floats:
 def _make_optimiser(
     search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
 ) -> Umda | DifferentialEvolution:
-    """Make the optimiser that the algorithm names."""
+    """The optimiser that the algorithm names."""
     lower, upper = search.encoding.lower, search.encoding.upper
     if search.algorithm.optimiser == "differential":
         return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)

@@ -105,7 +105,7 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:
-    """Split the longest legs of a path (w, 3) until it has `count` waypoints."""
+    """A path (w, 3) whose longest legs are split until it has `count` waypoints."""
     points = [np.asarray(point, dtype=np.float64) for point in path]
     while len(points) < count:
         longest = int(np.argmax(leg_runs(np.array(points))))

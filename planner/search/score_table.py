@@ -12,9 +12,9 @@ Flags = NDArray[np.bool_]
 
 COLUMNS = len(Violation) + len(Objective)
 LENGTH, KILL, DETECTION, HEIGHT = (len(Violation) + item for item in Objective)
-VIOLATIONS = Level(tuple(Violation), (0.0,) * len(Violation))
+CONSTRAINTS = Level(tuple(Violation), (0.0,) * len(Violation))
 # The order of an archive: what meets the constraints, then least kill exposure, then the shortest.
-ARCHIVE_LEVELS = (VIOLATIONS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
+ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
 
 
 def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:

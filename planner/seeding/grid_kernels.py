@@ -24,7 +24,7 @@ Records = NDArray[Any]
 # Steps across a grid's cell that one stage forward may make.
 SIDEWAYS = 3
 # A cell of a route: its places among those across and among the layers.
-CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
+ROUTE_CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
 # Layers that one step may climb and sink.
 _STEP_LAYERS = np.dtype([("climb", np.int64), ("sink", np.int64)], align=True)
 # First and last place across, of a layer, that has a cost; first > last for none.
@@ -137,7 +137,7 @@ def _prune(
 def cheapest_route(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float
 ) -> tuple[Records, float]:  # pragma: no cover - compiled
-    """`CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty where none is.
+    """`ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty where none is.
 
     extra: (stages + 1, across) added to the cost per m.  bound: the most that it may cost; a route that costs more is
     not looked for.
@@ -170,15 +170,15 @@ def cheapest_route(
         _prune(after, spans, ahead, rises, bound, low, last)
         cost, after = after, cost
     if spans[goal].first > home or spans[goal].last < home or cost[goal, home] == np.inf:
-        return np.zeros(0, dtype=CELL), np.inf
+        return np.zeros(0, dtype=ROUTE_CELL), np.inf
     return _trace_back(came, goal, home), cost[goal, home]
 
 
 @compiled
 def _trace_back(came: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
-    """`CELL` records from the start to this cell of the last stage; came: (stages + 1, layers, across)."""
+    """`ROUTE_CELL` records from the start to this cell of the last stage; came: (stages + 1, layers, across)."""
     wide = came.shape[2]
-    cells = np.zeros(came.shape[0], dtype=CELL)
+    cells = np.zeros(came.shape[0], dtype=ROUTE_CELL)
     for stage in range(came.shape[0] - 1, -1, -1):
         cells[stage].across = across
         cells[stage].layer = layer

@@ -41,7 +41,7 @@ class GridRoute:
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """Make a grid of this many stages, square in the plane, its layers passing through the start's height.
+    """A grid of this many stages, square in the plane, its layers passing through the start's height.
 
     span: lowest and highest place across, m.  The pitch grows where the grid would get too large.
     """
