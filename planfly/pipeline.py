@@ -71,16 +71,16 @@ def make_setup(
     seed: int,
     *,
     plan: Plan | None = None,
-    on_the_spot: bool = False,
+    vertical_legs: bool = False,
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario.
 
-    on_the_spot: of `flight.mission.routing.make_route`.
+    vertical_legs: as for `flight.mission.routing.make_route`.
     """
     limits = airframe.limits
     fly_over = scenario.flight.fly_over
     route = make_route(
-        mission, scenario.origin, scenario.terrain, airframe.airspeed, fly_over, limits, on_the_spot=on_the_spot
+        mission, scenario.origin, scenario.terrain, airframe.airspeed, fly_over, limits, vertical_legs=vertical_legs
     )
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(

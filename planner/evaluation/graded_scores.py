@@ -27,6 +27,7 @@ from planner.evaluation.problem_arrays import (
     as_columns,
 )
 from planner.evaluation.terrain_clearance import TERRAIN_LEG, sample_terrain, segment_pixels, terrain_excess
+from world.frames import PolyMapRecord
 from world.kernels import compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
@@ -210,7 +211,7 @@ def _measure_flown(
 
 @compiled_views
 def _corner_depth(
-    heights: Heights, slope_bounds: SlopeBounds, to_pixel: Floats, required: RequiredClearance, vertices: Floats
+    heights: Heights, slope_bounds: SlopeBounds, to_pixel: PolyMapRecord, required: RequiredClearance, vertices: Floats
 ) -> float:  # pragma: no cover - compiled
     """Depth below the required clearance along a flown corner (k, 3), m x km."""
     total = 0.0

@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, reversal_room
+from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, roll_reversal_length
 from planner.evaluation.problem_arrays import ProblemArrays, Records
 from world.kernels import compiled, compiled_views, inlined
 
@@ -104,5 +104,7 @@ def roll_length(
     into, onward = legs[i - 1].east * uy - legs[i - 1].north * ux, ux * legs[i + 1].north - uy * legs[i + 1].east
     if into * onward >= 0.0 or math.isinf(corners[i].tangent + corners[i + 1].tangent):
         return 0.0
-    length: float = reversal_room(aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1])
+    length: float = roll_reversal_length(
+        aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1]
+    )
     return length

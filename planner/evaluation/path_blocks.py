@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.problem_arrays import Record
+from world.frames import PolyMapRecord
 from world.kernels import compiled_views
 
 Floats = NDArray[np.float64]
@@ -87,7 +88,7 @@ def divide_legs(
 
 @compiled_views
 def load_waypoints(
-    to_pixel: Floats, paths: Floats, begin: int, i: int, size: int, block: Record
+    to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record
 ) -> None:  # pragma: no cover - compiled
     """Fill in waypoint i of each path, and take it to the raster: `polymap`, for all of them at once."""
     end, x, y, inner = block.end, block.x, block.y, block.inner
@@ -96,28 +97,25 @@ def load_waypoints(
         east[b] = paths[begin + b, i, 0]
         north[b] = paths[begin + b, i, 1]
         up[b] = paths[begin + b, i, 2]
-    # The packed map's middle and half-widths, and the coefficients of its columns and of its rows.
-    middle_x, middle_y, half_x, half_y = to_pixel[0, 0], to_pixel[0, 1], to_pixel[1, 0], to_pixel[1, 1]
+    middle_x, middle_y, half_x, half_y = to_pixel.centre_x, to_pixel.centre_y, to_pixel.half_x, to_pixel.half_y
     for b in range(size):
         x[b] = (east[b] - middle_x) / half_x
         y[b] = (north[b] - middle_y) / half_y
-    degrees = to_pixel.shape[1]
-    _horner(to_pixel[2 : 2 + degrees], size, x, y, inner, end.column)
-    _horner(to_pixel[2 + degrees :], size, x, y, inner, end.row)
+    _horner(to_pixel.u, to_pixel.size, size, x, y, inner, end.column)
+    _horner(to_pixel.v, to_pixel.size, size, x, y, inner, end.row)
 
 
 @compiled_views
 def _horner(
-    coefficients: Floats, size: int, x: Floats, y: Floats, inner: Floats, out: Floats
+    coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Sum coefficients (k, k)[i, j] x^i y^j, i + j < k, for each path; inner is scratch."""
+    """Fill out with the sum of coefficients[i, j] x^i y^j, i + j < terms, of each path; inner is scratch."""
     for b in range(size):
         out[b] = 0.0
-    degrees = coefficients.shape[0]
-    for i in range(degrees - 1, -1, -1):
+    for i in range(terms - 1, -1, -1):
         for b in range(size):
             inner[b] = 0.0
-        for j in range(degrees - 1 - i, -1, -1):
+        for j in range(terms - 1 - i, -1, -1):
             coefficient = coefficients[i, j]
             for b in range(size):
                 inner[b] = inner[b] * y[b] + coefficient

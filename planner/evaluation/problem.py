@@ -85,7 +85,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     buffer, share = CERTIFIED_BUFFER, CERTIFIED_END_SHARE
     return ProblemArrays(
         heights=terrain.heights,
-        to_pixel=terrain.to_pixel.packed,
+        to_pixel=terrain.to_pixel.record,
         threats=units,
         spheres=sphere_records(units),
         aircraft=derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence]),

@@ -9,6 +9,7 @@ from aircraft.path_limits import PerformanceTable
 from planner.evaluation.missile_index import MissileIndex
 from planner.evaluation.threat_grid import ThreatCells
 from planner.plan import Objective, Violation
+from world.frames import PolyMapRecord
 from world.threats import Threats
 
 Floats = NDArray[np.float64]
@@ -54,7 +55,7 @@ class ProblemArrays(NamedTuple):
     """What paths are evaluated against; lengths in m, angles in rad.
 
     heights: raster of the ground.
-    to_pixel: packed map from positions to its pixels.
+    to_pixel: map from positions to its pixels.
     threats: `THREAT` records (m,), and spheres the same as `SPHERE` records.
     aircraft: what it can do, of which turbulence leaves a plan a share.
     bounds: (2, 2) map; floor and ceiling: lowest and highest waypoint.
@@ -74,7 +75,7 @@ class ProblemArrays(NamedTuple):
     """
 
     heights: Heights
-    to_pixel: Floats
+    to_pixel: PolyMapRecord
     threats: Records
     spheres: Records
     aircraft: PerformanceTable

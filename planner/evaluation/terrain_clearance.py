@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
 from planner.evaluation.problem_arrays import Records, SlopeBounds
-from world.frames import polymap
+from world.frames import PolyMapRecord, polymap
 from world.kernels import compiled_views, inlined
 from world.terrain import TILE, pixel_height
 
@@ -113,7 +113,7 @@ def terrain_excess(
 
 @compiled_views
 def _begin_legs(
-    to_pixel: Floats, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
+    to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:  # pragma: no cover - compiled
     """Fill `TERRAIN_LEG` records (w - 1,) as they are before the first sample."""
     column, row = polymap(to_pixel, path[0, 0], path[0, 1])
@@ -137,7 +137,7 @@ def _begin_legs(
 def sample_terrain(
     heights: Heights,
     slope_bounds: SlopeBounds,
-    to_pixel: Floats,
+    to_pixel: PolyMapRecord,
     required: RequiredClearance,
     path: Floats,
     legs: Records,
@@ -183,7 +183,7 @@ def sample_terrain(
 
 
 @inlined
-def segment_pixels(to_pixel: Floats, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
+def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
     """Columns and rows of both ends of a segment."""
     column_a, row_a = polymap(to_pixel, ax, ay)
     column_b, row_b = polymap(to_pixel, bx, by)
