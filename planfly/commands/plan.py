@@ -17,7 +17,7 @@ from planner.plan import Objective, Plan, plan_json, read_plan
 from planner.search.explain_failure import what_blocks
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, same_mission
-from planner.search.search_state import Progress, Stop
+from planner.search.search_state import Progress, StopCondition
 from world.atomic_files import write_whole
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
@@ -41,7 +41,7 @@ def plan(args: argparse.Namespace) -> int:
 
 
 @contextmanager
-def _best_so_far(seconds: float | None) -> Iterator[Stop]:
+def _best_so_far(seconds: float | None) -> Iterator[StopCondition]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
     A second Ctrl-C ends the process.
