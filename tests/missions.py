@@ -19,7 +19,8 @@ from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.simulation.flight_setup import FlightSetup
-from planfly.pipeline import Vehicle, load_vehicle, make_setup
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import make_setup
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario, from_spec
 from world.wind import Wind
@@ -59,7 +60,7 @@ class MadeMission:
     """
 
     setup: FlightSetup
-    vehicle: Vehicle
+    vehicle: Airframe
     kind: str
     where: tuple[str, ...]
 
@@ -152,7 +153,7 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     steps = runs[:, None] * np.stack([np.sin(draft.courses), np.cos(draft.courses)], axis=1)
     points = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heights])
     scenario = _scenario(draft, points, numbers, f"{kind or 'feasible'} {number}")
-    vehicle = load_vehicle(scenario)
+    vehicle = load_airframe(scenario)
     mission = _mission(points, draft.speeds, scenario.origin)
     setup = make_setup(scenario, vehicle, mission, number)
     return MadeMission(setup, vehicle, kind, _where(draft))

@@ -19,7 +19,7 @@ from flight.dynamics.fdm import Fdm
 from world.errors import FlightError
 try:
     fdm = Fdm(read_aircraft(Path(sys.argv[1])), tried=True)
-    fdm.place(500.0)
+    fdm.move_to(500.0)
     fdm.balance(fdm.first_guess())
     fdm.step(10)
     del fdm

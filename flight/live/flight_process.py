@@ -11,17 +11,14 @@ from multiprocessing.connection import Connection
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.live.snapshot import Moment, Watcher
 from flight.mission.items import Home, Mission
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import TICK, Flight, as_track
-from flight.simulation.track import Track
+from flight.simulation.simulate import TICK, Flight
+from flight.simulation.track import Rows, Track, as_track
 from world.errors import PlanflyError
-
-Floats = NDArray[np.float64]
 
 # Moments a second that are told; the log is handed to the operating system this often, s.
 MOMENTS = 60.0
@@ -181,7 +178,7 @@ def _in_step(connection: Connection, flight: Flight, watcher: Watcher, log: LogS
     """Step the flight by the clock: how it ended, and whether the process goes on."""
     clock = time.monotonic
     started = begun = clock()
-    pending: list[Floats] = []
+    pending: list[Rows] = []
     ticks, flushed, beat = 0, started, 0
     ended, go_on = "", True
     while not ended:

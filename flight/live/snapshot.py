@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.local_map import Chart
-from flight.simulation.track import COLUMNS
+from flight.simulation.local_map import LocalMap
+from flight.simulation.track import TRACK_ROW
 from world.frames import GeoOrigin, to_geo
+from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
@@ -61,41 +62,29 @@ class Moment:
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 
-def _columns() -> dict[str, int]:
-    found, at = {}, 0
-    for name, width in COLUMNS.items():
-        found[name] = at
-        at += width
-    return found
-
-
-_AT = _columns()
-
-
 class Watcher:
-    """Makes moments of the rows of one flight, in the order of `flight.simulation.track.COLUMNS`."""
+    """Makes moments of the rows of one flight, of `flight.simulation.track.TRACK_ROW`."""
 
     def __init__(self, setup: FlightSetup) -> None:
         self._origin: GeoOrigin = setup.scenario.origin
-        self._chart = Chart.around(setup)
+        self._map = LocalMap.around(setup)
 
-    def moment(self, row: Floats) -> Moment:
-        """Moment of a row (35,)."""
-        at = _AT
-        east, north, amsl = (float(value) for value in row[at["position"] : at["position"] + 3])
+    def moment(self, row: Record) -> Moment:
+        """Moment of a row, a record of `flight.simulation.track.TRACK_ROW`."""
+        east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course and this.
-        turn = self._chart.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
-        v_east, v_north, v_up = _turned(row[at["velocity"] : at["velocity"] + 3], turn)
-        wind_east, wind_north, _ = _turned(row[at["wind"] : at["wind"] + 3], turn)
-        roll, pitch, yaw = (float(value) for value in row[at["attitude"] : at["attitude"] + 3])
-        p, q, r = (float(value) for value in row[at["rates"] : at["rates"] + 3])
+        turn = self._map.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
+        v_east, v_north, v_up = _turned(row.velocity, turn)
+        wind_east, wind_north, _ = _turned(row.wind, turn)
+        roll, pitch, yaw = (float(value) for value in row.attitude)
+        p, q, r = (float(value) for value in row.rates)
         return Moment(
-            time=float(row[at["time"]]),
+            time=float(row.time),
             lat_deg=lat,
             lon_deg=lon,
             amsl=amsl,
-            height=float(row[at["clearance"]]),
+            height=float(row.clearance),
             v_north=v_north,
             v_east=v_east,
             v_down=-v_up,
@@ -105,27 +94,27 @@ class Watcher:
             p=p,
             q=q,
             r=r,
-            airspeed=float(row[at["airspeed"]]),
-            throttle=float(row[at["controls"] + 3]),
+            airspeed=float(row.airspeed),
+            throttle=float(row.controls[3]),
             wind_north=wind_north,
             wind_east=wind_east,
-            current=float(row[at["current"]]),
-            energy=float(row[at["energy"]]),
-            leg=float(row[at["leg"]]),
+            current=float(row.current),
+            energy=float(row.energy),
+            leg=float(row.leg),
         )
 
     def before_start(self, setup: FlightSetup) -> Moment:
         """Moment of an aircraft that waits at the route's start."""
         points = setup.route.waypoints
         step = points[1] - points[0]
-        row = np.zeros(sum(COLUMNS.values()))
-        row[_AT["position"] : _AT["position"] + 3] = points[0]
-        row[_AT["attitude"] + 2] = math.atan2(step[0], step[1])
+        row: Record = np.zeros(1, TRACK_ROW)[0]
+        row.position = points[0]
+        row.attitude[2] = math.atan2(step[0], step[1])
         terrain = setup.scenario.terrain
-        row[_AT["clearance"]] = (
+        row.clearance = (
             math.nan if terrain is None else points[0, 2] - float(terrain.height(points[0, 0], points[0, 1]))
         )
-        row[_AT["leg"]] = -1.0
+        row.leg = -1.0
         return self.moment(row)
 
 

@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.track import COLUMNS, Track, track_rows
+from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording.chunk_layout import (
     FIRST_NS,
@@ -58,11 +58,7 @@ PROFILE = "planfly"
 LONGEST = 1e7  # s
 
 _BUFFER = 2**20
-_ROW = sum(COLUMNS.values())
-_AT = {name: sum(list(COLUMNS.values())[:k]) for k, name in enumerate(COLUMNS)}
-_POSITION = slice(_AT["position"], _AT["position"] + 3)
-_ATTITUDE = slice(_AT["attitude"], _AT["attitude"] + 3)
-_NO_ROWS, _NO_STAMPS = np.empty((0, _ROW)), np.empty(0, dtype=np.int64)
+_NO_ROWS, _NO_STAMPS = np.empty(0, TRACK_ROW), np.empty(0, dtype=np.int64)
 _CHANNELS: dict[str, Any] = {
     TF_TOPIC: FrameTransform,
     FIX_TOPIC: LocationFix,
@@ -71,7 +67,6 @@ _CHANNELS: dict[str, Any] = {
     TRACK_TOPIC: SceneUpdate,
 }
 
-Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
@@ -91,10 +86,10 @@ class Recorder:
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
-        self._skipped: Floats | None = None  # the newest row, if it was not recorded
+        self._skipped: Rows | None = None  # the newest row, if it was not recorded
         self._seen = 0  # rows, recorded or not
         pieces = pack_setup(setup)
-        self._pending: list[Floats] = []  # rows to record
+        self._pending: list[Rows] = []  # rows to record
         self._events: list[Messages] = []
         self._written = 0  # rows
         self._last_ns = EPOCH_NS - 1  # of the rows recorded
@@ -129,15 +124,15 @@ class Recorder:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
         self.write_rows(track_rows(block))
 
-    def write_rows(self, rows: Floats) -> None:
-        """Record rows (t, columns) in the order of `flight.simulation.track.COLUMNS`, as a flight hands them on."""
+    def write_rows(self, rows: Rows) -> None:
+        """Record rows, (t,) of `flight.simulation.track.TRACK_ROW`, as a flight hands them on."""
         if not len(rows):
             return
-        newest = last_stamp(np.ascontiguousarray(rows[:, 0]), self._newest_ns, EPOCH_NS, LONGEST)
+        newest = last_stamp(np.ascontiguousarray(rows["time"]), self._newest_ns, EPOCH_NS, LONGEST)
         if newest == -1:
-            raise ValueError(f"time {rows[0, 0]}..{rows[-1, 0]} s: 0..{LONGEST:g} is expected")
+            raise ValueError(f"time {rows[0].time}..{rows[-1].time} s: 0..{LONGEST:g} is expected")
         if newest == -2:
-            raise ValueError(f"rows from {rows[0, 0]} s on: times must increase by at least 1 ns a row")
+            raise ValueError(f"rows from {rows[0].time} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
         # One row in `every`, counted from the flight's first.
         kept = rows[-self._seen % self._every :: self._every]
@@ -146,9 +141,9 @@ class Recorder:
         if len(kept):
             self._append(kept)
 
-    def _append(self, rows: Floats) -> None:
+    def _append(self, rows: Rows) -> None:
         self._pending.append(rows)
-        before, self._last_ns = self._last_ns, round(rows[-1, 0] * 1e9) + EPOCH_NS
+        before, self._last_ns = self._last_ns, round(rows[-1].time * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
 
@@ -218,17 +213,17 @@ class Recorder:
 
     def _emit(self, until: int | None) -> None:
         """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
-        rows = np.concatenate([np.empty((0, _ROW)), *self._pending])
-        stamps = times_ns(rows[:, 0])
+        rows = np.concatenate([_NO_ROWS, *self._pending])
+        stamps = times_ns(rows["time"])
         stop = len(rows) if until is None else int(np.searchsorted(stamps, until))
         self._pending = [rows[stop:]] if stop < len(rows) else []
         events = [item for item in self._events if until is None or item.stamps[0] < until]
         self._events = [item for item in self._events if until is not None and item.stamps[0] >= until]
         rows, stamps = rows[:stop], stamps[:stop]
-        self._write([*self._poses.take(stamps, rows[:, _POSITION], rows[:, _ATTITUDE]), *events], rows, stamps)
+        self._write([*self._poses.take(stamps, rows["position"], rows["attitude"]), *events], rows, stamps)
         self._writer.flush()
 
-    def _write(self, others: list[Messages], rows: Floats = _NO_ROWS, stamps: Ints = _NO_STAMPS) -> None:
+    def _write(self, others: list[Messages], rows: Rows = _NO_ROWS, stamps: Ints = _NO_STAMPS) -> None:
         """Write rows and other messages in order of time; at one time the row comes last."""
         channel = self._channels[STATE_TOPIC]
         encoded = encode_rows(rows, self._written, channel)

@@ -164,14 +164,14 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def encode_rows(rows: NDArray[np.float64], first_row: int, channel: int) -> Rows:
+def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> Rows:
     """Encode flown rows as MCAP message records (t,) of `RECORD`.
 
-    rows: (t, columns) in the order of `flight.simulation.track.COLUMNS`.
+    rows: (t,) of `flight.simulation.track.TRACK_ROW`.
 
     first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
     """
-    stamps = times_ns(rows[:, 0])
+    stamps = times_ns(rows["time"])
     records: Rows = np.repeat(_TEMPLATE, len(stamps))
     numbers = np.arange(first_row, first_row + len(stamps)).astype(np.uint32)
     records["channel"] = channel
@@ -181,8 +181,9 @@ def encode_rows(rows: NDArray[np.float64], first_row: int, channel: int) -> Rows
     state = records["state"]
     state["row"] = numbers
     with np.errstate(over="ignore", invalid="ignore"):
-        for column, (name, _, _, _) in enumerate(FIELDS):
-            state[name] = rows[:, column]
+        for name, _, field, column in FIELDS:
+            values = rows[field]
+            state[name] = values if values.ndim == 1 else values[:, column]
     return records
 
 

@@ -14,8 +14,8 @@ from flight.live.flight_process import Judge, Landed, Ready, Up, Words, answer, 
 from flight.live.snapshot import Watcher
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import Flight, as_track
-from flight.simulation.track import Track, join_tracks
+from flight.simulation.simulate import Flight
+from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
