@@ -60,7 +60,7 @@ class MadeMission:
     """
 
     setup: FlightSetup
-    vehicle: Airframe
+    airframe: Airframe
     kind: str
     where: tuple[str, ...]
 
@@ -153,10 +153,10 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     steps = runs[:, None] * np.stack([np.sin(draft.courses), np.cos(draft.courses)], axis=1)
     points = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heights])
     scenario = _scenario(draft, points, numbers, f"{kind or 'feasible'} {number}")
-    vehicle = load_airframe(scenario)
+    airframe = load_airframe(scenario)
     mission = _mission(points, draft.speeds, scenario.origin)
-    setup = make_setup(scenario, vehicle, mission, number)
-    return MadeMission(setup, vehicle, kind, _where(draft))
+    setup = make_setup(scenario, airframe, mission, number)
+    return MadeMission(setup, airframe, kind, _where(draft))
 
 
 def _where(draft: _Draft) -> tuple[str, ...]:

@@ -1,8 +1,8 @@
-"""One moment of a flight as a ground station sees it, packed to pass between processes."""
+"""State snapshot of a flight for ground stations, packed to pass between processes."""
 
 import math
 import struct
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,14 @@ from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
-_FORM = struct.Struct("<21d")
-
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """Where the aircraft is and what it does; SI and radians, north and east true, heights AMSL.
+class Snapshot:
+    """Where the aircraft is and what it does at one time; SI and radians, north and east true, heights AMSL.
 
-    height: above ground, NaN where unknown.  energy: Wh used.  leg: the active one, -1 before the start.
+    height: above ground, NaN where unknown.  v_north, v_east, v_down: over the ground.  p, q, r: body rates.
+    throttle: 0..1.  wind_north, wind_east: the way the air moves.  current: A.  energy: Wh used.  leg: the active one,
+    -1 before the start.
     """
 
     time: float
@@ -30,47 +30,71 @@ class Moment:
     lon_deg: float
     amsl: float
     height: float
-    v_north: float
-    v_east: float
-    v_down: float
-    roll: float
-    pitch: float
-    yaw: float
-    p: float
-    q: float
-    r: float
-    airspeed: float
-    throttle: float
-    wind_north: float
-    wind_east: float
-    current: float
-    energy: float
-    leg: float
+    v_north: float = 0.0
+    v_east: float = 0.0
+    v_down: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    p: float = 0.0
+    q: float = 0.0
+    r: float = 0.0
+    airspeed: float = 0.0
+    throttle: float = 0.0
+    wind_north: float = 0.0
+    wind_east: float = 0.0
+    current: float = 0.0
+    energy: float = 0.0
+    leg: float = -1.0
 
     def pack(self) -> bytes:
-        """Give the moment as bytes of one size."""
+        """Bytes of the snapshot, always as many.
+
+        >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
+        >>> Snapshot.unpack(parked.pack()) == parked
+        True
+        """
         return _FORM.pack(*astuple(self))
 
     @staticmethod
-    def unpack(data: bytes) -> "Moment":
-        """Read what `pack` gave.  Raises struct.error for another size."""
-        return Moment(*_FORM.unpack(data))
+    def unpack(data: bytes) -> "Snapshot":
+        """Snapshot of the bytes that `pack` gave.  Raises struct.error for another number of bytes."""
+        return Snapshot(*_FORM.unpack(data))
 
     @property
     def finite(self) -> bool:
-        """Whether it can be told to a station: a flight may end in numbers that are none."""
+        """Whether it can be sent to a station: a flight may end in numbers that are none."""
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 
-class Watcher:
-    """Makes moments of the rows of one flight, of `flight.simulation.track.TRACK_ROW`."""
+_FORM = struct.Struct(f"<{len(fields(Snapshot))}d")
+
+
+class SnapshotMaker:
+    """Makes snapshots of the rows of one flight.
+
+    Positions become latitude and longitude, and vectors and courses on the map become true ones.
+    """
 
     def __init__(self, setup: FlightSetup) -> None:
         self._origin: GeoOrigin = setup.scenario.origin
         self._map = LocalMap.around(setup)
 
-    def moment(self, row: Record) -> Moment:
-        """Moment of a row, a record of `flight.simulation.track.TRACK_ROW`."""
+    def before_start(self, setup: FlightSetup) -> Snapshot:
+        """Snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
+        points = setup.route.waypoints
+        step = points[1] - points[0]
+        terrain = setup.scenario.terrain
+        ground = math.nan if terrain is None else float(terrain.height(points[0, 0], points[0, 1]))
+        row: Record = np.zeros(1, TRACK_ROW)[0]
+        row.position = points[0]
+        row.attitude[2] = math.atan2(step[0], step[1])
+        row.clearance = points[0, 2] - ground
+        row.leg = -1.0
+        return self.snapshot(row)
+
+    def snapshot(self, row: Record) -> Snapshot:
+        """Snapshot of a flown row, a record of `flight.simulation.track.TRACK_ROW`."""
         east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course and this.
@@ -79,7 +103,7 @@ class Watcher:
         wind_east, wind_north, _ = _turned(row.wind, turn)
         roll, pitch, yaw = (float(value) for value in row.attitude)
         p, q, r = (float(value) for value in row.rates)
-        return Moment(
+        return Snapshot(
             time=float(row.time),
             lat_deg=lat,
             lon_deg=lon,
@@ -102,20 +126,6 @@ class Watcher:
             energy=float(row.energy),
             leg=float(row.leg),
         )
-
-    def before_start(self, setup: FlightSetup) -> Moment:
-        """Moment of an aircraft that waits at the route's start."""
-        points = setup.route.waypoints
-        step = points[1] - points[0]
-        row: Record = np.zeros(1, TRACK_ROW)[0]
-        row.position = points[0]
-        row.attitude[2] = math.atan2(step[0], step[1])
-        terrain = setup.scenario.terrain
-        row.clearance = (
-            math.nan if terrain is None else points[0, 2] - float(terrain.height(points[0, 0], points[0, 1]))
-        )
-        row.leg = -1.0
-        return self.moment(row)
 
 
 def _turned(vector: Floats, turn: float) -> tuple[float, float, float]:

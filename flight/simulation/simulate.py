@@ -19,7 +19,7 @@ from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.guidance.reference_laws import WAYPOINT
 from flight.mission.route import Route
 from flight.simulation.dryden import start_gusts
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.loop import make_loop
 from flight.simulation.tick import ENDS, tick
@@ -96,7 +96,7 @@ def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
     speeds = []
     for leg, airspeed in enumerate(setup.route.airspeed):
-        table = limits.packed(float(airspeed))
+        table = limits.performance(float(airspeed))
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
     return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0
 
@@ -121,7 +121,7 @@ class Flight:
     """
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> None:
-        limits, gains = limits_of(setup), load_gains(aircraft)
+        limits, gains = setup.limits, load_gains(aircraft)
         self.path = fly_by_path(setup.route, limits)
         self._ground = Ground(setup.scenario.terrain)
         self._map = LocalMap.around(setup)

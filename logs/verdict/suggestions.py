@@ -171,7 +171,7 @@ def _slope_speed(shape: RouteDemands, leg: int, slope: float) -> float | None:
     course, side = float(shape.courses[leg]), 0 if shape.slopes[leg] >= 0.0 else 1
     heights = (float(shape.points[leg, 2]), float(shape.points[leg + 1, 2]))
     for speed in _speeds(shape, max(heights), float(shape.setup.route.airspeed[leg])):
-        table = shape.limits.packed(speed)
+        table = shape.limits.performance(speed)
         if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
             return speed
     return None
@@ -186,7 +186,7 @@ def _turn_speed(shape: RouteDemands, i: int) -> float | None:
         max(shape.runs[i] - shape.before[i + 1], 0.5 * shape.runs[i]) - shape.reversal[i],
     )
     for speed in sorted((v for v in _speeds(shape, float(shape.points[i, 2]), now) if v < now), reverse=True):
-        table = shape.limits.packed(speed)
+        table = shape.limits.performance(speed)
         radius = turn_radius_between(table, shape.courses[i - 1], shape.courses[i], float(shape.points[i, 2]))
         used = turn_room(abs(float(shape.turns[i])), radius, bool(shape.setup.route.fly_over[i]))
         if max(used) + SPARE_LENGTH <= room:

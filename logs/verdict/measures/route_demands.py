@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import (
     BLEND_ACCELERATION,
     Limits,
+    PerformanceTable,
     aircraft_slopes,
     downwind,
     fly_over_run,
@@ -16,7 +17,7 @@ from aircraft.path_limits import (
     reversal_room,
     turn_radius_between,
 )
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from world.geometry import arc_cut, arc_reach, leg_courses, leg_runs, leg_slopes, signed_turns
 
 Floats = NDArray[np.float64]
@@ -94,10 +95,10 @@ class RouteDemands:
 
 def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     """Work out a route's shape.  ``envelope=False`` leaves the aircraft's limits out, for flown evidence alone."""
-    route, limits = setup.route, limits_of(setup)
+    route, limits = setup.route, setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     count, legs = len(points), len(points) - 1
-    packed = {float(v): limits.packed(float(v)) for v in route.airspeed}
+    tables = {float(v): limits.performance(float(v)) for v in route.airspeed}
     courses, runs = leg_courses(points), leg_runs(points)
     turns = np.zeros(count)
     if count > 2:
@@ -105,19 +106,19 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     tightest, radius, before, after = (np.zeros(count) for _ in range(4))
     for i in range(1, count - 1):
         speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
-        tightest[i] = turn_radius_between(packed[speed], courses[i - 1], courses[i], points[i, 2])
+        tightest[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
         radius[i] = route.arcs[i] or tightest[i]
         before[i], after[i] = turn_room(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
     climb, dive, speeds = np.full(legs, math.inf), np.full(legs, math.inf), np.zeros(legs)
     for leg in range(legs):
-        table, course = packed[float(route.airspeed[leg])], float(courses[leg])
+        table, course = tables[float(route.airspeed[leg])], float(courses[leg])
         heights = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
         speeds[leg] = min(ground_speed_on(table, course, up) for up in heights)
         if any(math.isnan(ground_speed_on(table, course, up)) for up in heights):
             speeds[leg] = math.nan
         if envelope:
             climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
-    reversal = _reversals(setup, packed, courses, turns, radius, points[:, 2])
+    reversal = _reversals(setup, tables, courses, turns, radius, points[:, 2])
     blend, sag = _blends(setup, points, runs, turns, radius, after)
     cut = np.zeros(count)
     for i in np.flatnonzero(np.isfinite(radius) & ~route.fly_over).tolist():
@@ -182,14 +183,19 @@ def turn_room(turn: float, radius: float, fly_over: bool) -> tuple[float, float]
 
 
 def _reversals(
-    setup: FlightSetup, packed: dict[float, Floats], courses: Floats, turns: Floats, radius: Floats, up: Floats
+    setup: FlightSetup,
+    tables: dict[float, PerformanceTable],
+    courses: Floats,
+    turns: Floats,
+    radius: Floats,
+    up: Floats,
 ) -> Floats:
     """Length of each leg that the roll from one bank into the other uses, (w - 1,) m; 0 between turns of one side."""
     out = np.zeros(len(courses))
     for leg in range(1, len(courses) - 1):
         flown_by = not setup.route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
         if turns[leg] * turns[leg + 1] < 0.0 and flown_by:
-            table = packed[float(setup.route.airspeed[leg])]
+            table = tables[float(setup.route.airspeed[leg])]
             ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
             lower = float(min(up[leg], up[leg + 1]))
             out[leg] = reversal_room(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))

@@ -16,7 +16,7 @@ from flight.guidance.lateral import guide
 from flight.guidance.memory import GUIDANCE_MEMORY
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.reference_laws import WAYPOINT
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from world.geometry import signed_turns
 from world.kernels import Record
 
@@ -27,7 +27,7 @@ class Tick:
     """One call of the core on a straight level path to the north at 500 m."""
 
     def __init__(self, setup: FlightSetup, gains: Gains) -> None:
-        self.path = fly_by_path(setup.route, limits_of(setup))
+        self.path = fly_by_path(setup.route, setup.limits)
         way = setup.route.waypoints
         self.waypoints = np.zeros(len(way), WAYPOINT)
         self.waypoints["east"], self.waypoints["north"] = way[:, 0], way[:, 1]

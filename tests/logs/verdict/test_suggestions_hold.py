@@ -93,6 +93,6 @@ def test_taken_until_none_is_left_the_mission_flies(number: int) -> None:
         if not wrong:
             break
         setup = taken(setup, wrong[0], wrong[0].suggestion.split(", or ")[0])
-    flown = simulate(setup, made.vehicle.aircraft)
+    flown = simulate(setup, made.airframe.aircraft)
     still = failed(made, judge_flight(setup, flown.track, flown.ended))
     assert not still, [item.reason for item in still]

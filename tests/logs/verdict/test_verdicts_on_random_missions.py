@@ -20,7 +20,7 @@ INSIDE = range(100) if SOAK else range(8)
 
 def levels(made: MadeMission) -> dict[str, Verdict]:
     """Verdicts by geometry, of the flight, and of the flight without the aircraft's envelope."""
-    flown = simulate(made.setup, made.vehicle.aircraft)
+    flown = simulate(made.setup, made.airframe.aircraft)
     return {
         "geometric": judge_geometry(made.setup),
         "flown": judge_flight(made.setup, flown.track, flown.ended),
