@@ -88,6 +88,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
     >>> slow.trim.airspeed, fast.trim.airspeed
     (18.0, 31.0)
     >>> print(f"{slow.power:.0f} W for {slow.endurance / 3600:.1f} hours, or {fast.power:.0f} W")
+    190 W for 3.7 hours, or 622 W
     """
     fdm = Fdm(aircraft)
     rows = []
@@ -107,6 +108,11 @@ def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = AMSL) -> tuple[M
     >>> from aircraft.catalog import load_aircraft
     >>> for mode in modes_at(load_aircraft("aerosonde"), 25.0):
     ...     print(f"{mode.name}: {mode.root:.3g}")
+    short period: -4.51+9.48j
+    phugoid: -0.132+0.484j
+    Dutch roll: -1.07+4.48j
+    roll: -20.6+0j
+    spiral: 0.0917+0j
     """
     fdm = Fdm(aircraft)
     found = straight(fdm, airspeed, amsl)
@@ -148,6 +154,10 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     >>> for step in step_responses(load_aircraft("aerosonde")):
     ...     most = abs(step.change[:, 0]).max()
     ...     print(f"{step.control} {step.size:+.3f}: {step.quantities[0]} by up to {most:.2f} rad")
+    elevator -0.052: pitch by up to 0.15 rad
+    throttle +0.100: pitch by up to 0.13 rad
+    aileron +0.052: roll by up to 0.87 rad
+    rudder +0.052: roll by up to 0.49 rad
     """
     elevator, aileron, rudder = (
         0.1 * most for most in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)

@@ -32,7 +32,7 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     >>> from aircraft.catalog import load_aircraft
     >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)
     >>> print(f"{math.degrees(climb):.1f} degrees up, {math.degrees(descent):.1f} down")
-    13.7 degrees up, 7.8 down
+    13.6 degrees up, 7.7 down
     """
     file = cache_file(aircraft, motor_braking)
     key = _key(aircraft, motor_braking)
@@ -140,7 +140,7 @@ def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Float
 
 
 def _write(file: Path, key: dict[str, Any], tables: dict[str, Floats]) -> None:
-    """Write a cache file whole or not at all; without room or permission, do nothing."""
+    """Write a cache file whole or not at all; without disk space or permission, do nothing."""
     values: dict[str, object] = {}
     for name, table in tables.items():
         entries = table.astype(object)

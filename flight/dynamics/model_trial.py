@@ -31,8 +31,8 @@ except FlightError:
 def try_model(aircraft: Aircraft) -> None:
     """Load and step a model in another process, once for each version of it.
 
-    Raises FlightError where that process dies.  Where it only refuses the model, nothing is said: loading it here will
-    refuse it again, with the reason.
+    Raises FlightError where that process dies.  Where it only refuses the model, nothing is raised:
+    loading it here will refuse it again, with the reason.
     """
     code = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:

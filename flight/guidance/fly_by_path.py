@@ -49,7 +49,18 @@ class FlyByPath:
 def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
     """Join the legs of a route.  The route has at least one leg, and no leg without horizontal length.
 
-    >>> from planfly.pipeline import load_task
+    A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from flight.simulation.flight_setup import make_limits
+    >>> from world.scenario import load_scenario
+    >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
+    >>> way = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 520.0]])
+    >>> no = np.zeros(3, dtype=bool)
+    >>> path = fly_by_path(Route(way, np.full(2, 25.0), np.zeros(3), no, np.arange(3), ""), limits)
+    >>> path.pieces["length"].round().tolist(), round(1.0 / path.pieces["curvature"][1])
+    ([883.0, 183.0, 883.0], 117)
     """
     points = route.waypoints
     courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
@@ -153,6 +164,12 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     """The path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
 
     Chords of arcs turn by at most `CHORD`; on a 160 m radius they leave the arc by 0.15 m.
+
+    >>> level = np.array([(0.0, 500.0, 0.0, 0.0), (900.0, 500.0, 0.0, 0.0)], NODE)
+    >>> north = np.array([(0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)], PIECE)
+    >>> points, legs = path_polyline(FlyByPath(north, level, 900.0))
+    >>> points.tolist(), legs.tolist()
+    ([[0.0, 0.0, 500.0], [0.0, 900.0, 500.0]], [0])
     """
     stops = [0.0, path.length]
     for piece in path.pieces:

@@ -24,15 +24,13 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
 
-import numpy as np
-
 from aircraft.catalog import Aircraft
 from flight.live.snapshot import Snapshot, SnapshotMaker
 from flight.live.status_text import CRITICAL, StatusText
 from flight.mission.items import Home, Mission
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import TICK, Flight
-from flight.simulation.track import Rows, Track, as_track
+from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import PlanflyError
 
 # Snapshots a second that are sent; the log is handed to the operating system this often, s.
@@ -241,7 +239,7 @@ def _in_step(
                 ended = ended or (SHUT_DOWN if order.quit else STOPPED)
                 go_on = not order.quit
         if pending and (ended or now - flushed >= FLUSH_PERIOD):
-            log.write(as_track(np.concatenate(pending)))
+            log.write(as_track(join_rows(pending)))
             pending.clear()
             flushed = now
         if not ended:

@@ -17,6 +17,10 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
     >>> for name, limit in control_limits("aerosonde"):
     ...     print(f"{name} {limit:.2f}")
+    elevator 0.52
+    aileron 0.52
+    rudder 0.52
+    throttle 1.00
     """
     try:
         known = load_aircraft(aircraft)

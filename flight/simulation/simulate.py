@@ -23,7 +23,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.loop import make_loop
 from flight.simulation.tick import ENDS, tick
-from flight.simulation.track import TRACK_ROW, Rows, Track, as_track, quantised
+from flight.simulation.track import Rows, Track, as_track, join_rows, quantised
 from flight.simulation.workspace import BLOCK_TICKS, READ_FIELDS, Workspace
 from world.errors import FlightError
 from world.frames import to_geo
@@ -77,6 +77,19 @@ def simulate(
     variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
 
     Raises FlightError for a flight that cannot start.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from flight.mission.items import Mission
+    >>> from flight.simulation.flight_setup import make_limits
+    >>> from world.scenario import load_scenario
+    >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
+    >>> way = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])
+    >>> route = Route(way, np.array([25.0]), np.zeros(2), np.zeros(2, dtype=bool), np.arange(2), "")
+    >>> limits = make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
+    >>> flown = simulate(FlightSetup(scenario, Mission(None, ()), "", route, limits, "aerosonde", 888.0, 1), aerosonde)
+    >>> flown.ended, round(float(flown.track.time[-1])), bool(abs(flown.track.cross_track).max() < 0.1)
+    ('completed', 12, True)
     """
     flight = Flight(setup, aircraft, variation)
     blocks: list[Rows] = []
@@ -88,7 +101,7 @@ def simulate(
             sink(rows)
         if progress is not None:
             progress(min(flight.memory.distance, flight.path.length), flight.path.length)
-    return SimulatedFlight(as_track(np.concatenate(blocks)), ended, flight.path)
+    return SimulatedFlight(as_track(join_rows(blocks)), ended, flight.path)
 
 
 def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
@@ -230,7 +243,7 @@ class Flight:
             rows, ended = self._fill_workspace(min(count, BLOCK_TICKS))
             parts.append(rows)
             count -= BLOCK_TICKS
-        return (parts[0] if len(parts) == 1 else np.concatenate([np.empty(0, TRACK_ROW), *parts])), ended
+        return (parts[0] if len(parts) == 1 else join_rows(parts)), ended
 
     def _fill_workspace(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks, as many as the workspace has rows at most: as `block`."""

@@ -95,7 +95,7 @@ class Workspace:
     """One flight's record, and plain views of the parts that pass to and from JSBSim.
 
     array: (1,) of `WORKSPACE`, for compiled code.
-    record: the same, for Python.
+    record: its one record, for Python.
     path: of `PATH_ROW`, as many as there are pieces, nodes or waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.

@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, track_rows
+from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording.chunk_layout import (
     FIRST_NS,
@@ -213,7 +213,7 @@ class Recorder:
 
     def _emit(self, until: int | None) -> None:
         """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
-        rows = np.concatenate([_NO_ROWS, *self._pending])
+        rows = join_rows(self._pending)
         stamps = times_ns(rows["time"])
         stop = len(rows) if until is None else int(np.searchsorted(stamps, until))
         self._pending = [rows[stop:]] if stop < len(rows) else []
