@@ -141,10 +141,9 @@ class Flight:
         self._steps = round(FDM_HZ / setup.guidance_hz)
         self.dt = self._steps / FDM_HZ
         self._workspace = Workspace(gains, self.path, _waypoints(setup.route))
-        self._workspace.copy_map("position_map", self._map.position)
-        self._workspace.copy_map("north_map", self._map.angle)
-        self._workspace.copy_map("pixel_map", self._ground.to_pixel)
         self._work = self._workspace.record
+        self._work.position_map, self._work.north_map = self._map.position.record, self._map.angle.record
+        self._work.pixel_map = self._ground.to_pixel.record
         self.memory = self._work.memory
         braking = setup.scenario.flight.motor_braking
         self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=braking, variation=variation)
@@ -164,7 +163,7 @@ class Flight:
     def _disturb(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation's error."""
         wind, work = setup.scenario.wind, self._work
-        to = wind.from_course + math.pi
+        to = wind.to_course
         w20 = W20[wind.turbulence]
         work.wind = (wind.speed, math.cos(to), math.sin(to), wind.gradient, wind.reference_amsl, w20)
         self._windy = bool(wind.speed or wind.gradient or w20)

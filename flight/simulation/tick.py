@@ -16,6 +16,7 @@ from world.frames import polymap
 from world.geometry import wrap
 from world.kernels import Record, compiled, compiled_views, field_names
 from world.terrain import Heights, pixel_height
+from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
 
@@ -53,15 +54,15 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
     # About the local map's middle, so that a flight may cross the 180th meridian.
     state.longitude = settings.middle + wrap(state.longitude - settings.middle)
     # Map course of true north.
-    north, _ = _map(work.north_map, state.latitude, state.longitude)
+    north, _ = polymap(work.north_map, state.latitude, state.longitude)
     cos, sin = math.cos(north), math.sin(north)
     state.yaw = wrap(state.yaw + north)
-    true.east, true.north = _map(work.position_map, state.latitude, state.longitude)
+    true.east, true.north = polymap(work.position_map, state.latitude, state.longitude)
     true.up = state.amsl
     true.velocity_east = state.velocity_east * cos + state.velocity_north * sin
     true.velocity_north = state.velocity_north * cos - state.velocity_east * sin
     true.velocity_up = -state.velocity_down
-    column, row = _map(work.pixel_map, true.east, true.north)
+    column, row = polymap(work.pixel_map, true.east, true.north)
     ground = pixel_height(heights, column, row)
     clearance = true.up - ground
     noise = work.noise[timing.row]
@@ -82,12 +83,6 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
     timing.row += 1
     _output(work.output, work.commands, air, work.scale_above, work.scale_below)
     return _status(state, memory, clearance, settings.slowest)
-
-
-@compiled_views
-def _map(copy: Record, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Both components of a map, a record of `flight.simulation.workspace.MAP_COPY`."""
-    return polymap(copy.packed[: copy.rows, : copy.columns], x, y)
 
 
 @compiled
@@ -135,7 +130,7 @@ def _blow(
     turn_sin: float, air: Record, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
     """Mean wind at this height and the next gust, true north, east and down, into ``air``."""
-    speed = max(0.0, wind.speed + wind.gradient * (up - wind.reference_amsl))
+    speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The angle less the map course of true north.
     cos = wind.cos * turn_cos + wind.sin * turn_sin
     sin = wind.sin * turn_cos - wind.cos * turn_sin

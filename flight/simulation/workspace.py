@@ -17,7 +17,7 @@ from flight.guidance.path_kernels import NODE, PIECE, Records
 from flight.guidance.reference_laws import WAYPOINT
 from flight.simulation.dryden import GUST_FILTERS
 from flight.simulation.track import TRACK_ROW
-from world.frames import PolyMap
+from world.frames import POLYMAP
 from world.kernels import Record, field_names, record_dtype
 
 Floats = NDArray[np.float64]
@@ -49,8 +49,6 @@ TIMING = record_dtype(
     ("row", np.int64),  # row of the block that is filled next
     "dt",  # s
 )
-# A copy of a `world.frames.PolyMap`, in the first rows and columns of an array that holds any.
-MAP_COPY = record_dtype(("rows", np.int64), ("columns", np.int64), ("packed", np.float64, (22, 10)))
 SETTINGS = record_dtype(
     "slowest",  # m/s, slower is a departure
     "navigation_sigma",  # m
@@ -80,9 +78,9 @@ WORKSPACE = record_dtype(
     ("gains", GAINS),
     ("timing", TIMING),
     ("settings", SETTINGS),
-    ("position_map", MAP_COPY),  # latitude and longitude to east and north
-    ("north_map", MAP_COPY),  # latitude and longitude to the map course of true north
-    ("pixel_map", MAP_COPY),  # east and north to column and row of the terrain
+    ("position_map", POLYMAP),  # latitude and longitude to east and north
+    ("north_map", POLYMAP),  # latitude and longitude to the map course of true north
+    ("pixel_map", POLYMAP),  # east and north to column and row of the terrain
     ("output", OUTPUT),  # in JSBSim's units
     ("scale_above", OUTPUT),  # take an SI value above zero to JSBSim's
     ("scale_below", OUTPUT),  # and one that is not
@@ -121,12 +119,6 @@ class Workspace:
         self.turbulence: Floats = self.array["noise"]["turbulence"][0]
         self.navigation: Floats = self.array["noise"]["navigation"][0]
         self.rows: Records = self.array["rows"][0]
-
-    def copy_map(self, field: str, source: PolyMap) -> None:
-        """Put a map where compiled code finds it."""
-        copy: Record = getattr(self.record, field)
-        copy.rows, copy.columns = source.packed.shape
-        copy.packed[: copy.rows, : copy.columns] = source.packed
 
     def _numbers(self, field: str, count: int) -> Floats:
         """The first numbers of a field, as an array that shares its memory."""

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from logs.figures.movie_frames import RATE, Film
+from logs.figures.movie_frames import RATE, MovieFrames
 from logs.recording.reader import FlightLog
 from planfly.terminal.progress import progress
 from planfly.terminal.targets import refuse_existing, refuse_folder
@@ -48,7 +48,7 @@ def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: flo
         raise PlanflyError(
             f"{target}: --movie: an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
         )
-    film = Film(log.setup, log.track, start, end, args.speed or max(1.0, (end - start) / _LASTS))
+    film = MovieFrames(log.setup, log.track, start, end, args.speed or max(1.0, (end - start) / _LASTS))
     if len(film) > _MOST_FRAMES:
         raise PlanflyError(f"{target}: --movie: {len(film):,} frames: at most {_MOST_FRAMES:,}; raise --speed")
     if not kind:
@@ -57,14 +57,14 @@ def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: flo
     return [target]
 
 
-def _shown(film: Film) -> Iterator[Image.Image]:
+def _shown(film: MovieFrames) -> Iterator[Image.Image]:
     with progress("drawing") as advance:
         for number, frame in enumerate(film.frames(), 1):
             yield Image.fromarray(frame)
             advance(number, len(film), f"frame {number} of {len(film)}")
 
 
-def _write_folder(folder: Path, film: Film) -> list[Path]:
+def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
     """Write the frames, which are ours to replace, one file each."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
@@ -78,7 +78,7 @@ def _write_folder(folder: Path, film: Film) -> list[Path]:
     return files
 
 
-def _gif(film: Film) -> bytes:
+def _gif(film: MovieFrames) -> bytes:
     """All frames in the colours of the first, so that nothing flickers; a frame holds only what has changed."""
     images = _shown(film)
     # The aircraft's own colour is among them: the first frame shows it, too.
@@ -99,7 +99,7 @@ def _gif(film: Film) -> bytes:
     return data.getvalue()
 
 
-def _mp4(film: Film) -> bytes:
+def _mp4(film: MovieFrames) -> bytes:
     """Frames through ffmpeg, as raw pixels on its input.  Raises OSError with its last words if it fails."""
     frames = film.frames()
     first = next(frames)

@@ -111,7 +111,7 @@ def _csv(columns: Sequence[str], rows: Any) -> str:
 def write_figures(folder: Path, done: Sequence[PaperRun]) -> None:
     """Figures as the paper's 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
     from logs.figures.draw_all import write_png
-    from logs.figures.paper import Line, draw_convergence, draw_encodings, draw_paths
+    from logs.figures.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
     by_problem: dict[int, dict[str, list[PaperRun]]] = {}
     for item in done:
@@ -120,7 +120,7 @@ def write_figures(folder: Path, done: Sequence[PaperRun]) -> None:
         scenario = load_scenario(problem_name(threats))
         first = next(iter(groups))
         lines = {
-            name: [Line(run.waypoints, run.objectives[Objective.LENGTH_RATIO], run.safe) for run in group]
+            name: [PaperPath(run.waypoints, run.objectives[Objective.LENGTH_RATIO], run.safe) for run in group]
             for name, group in groups.items()
         }
         write_png(draw_paths(scenario, first, lines[first]), folder / f"paths-{threats:02d}.png")

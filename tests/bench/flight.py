@@ -22,7 +22,7 @@ from flight.simulation import simulate as simulation
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import FDM_HZ, Flight, SimulatedFlight, simulate
 from tests.bench.angles import angles
-from tests.flight.conftest import MakeSetup, setup_maker, standard
+from tests.setups import MakeSetup, setup_maker, standard
 
 Floats = NDArray[np.float64]
 
@@ -35,8 +35,8 @@ MISMATCHES = {
     "control power -25 %": Variation(control=0.75),
     "volts -8 %": Variation(volts=0.92),
 }
-# The reference laws at their best: what `python -m tests.bench.tune_reference_laws` found, in winds that are not reported on and on the
-# inner loops as they are; what swings in any of those winds is left out.
+# The reference laws at their best: what `python -m tests.bench.tune_reference_laws` found, in winds that are not
+# reported on and on the inner loops as they are; what swings in any of those winds is left out.
 BEST_L1 = {"l1_period": 5.0, "l1_damping": 1.2}
 BEST_FIELD = {"field_path": 0.1, "field_course": 11.0, "field_course_integral": 0.2}
 

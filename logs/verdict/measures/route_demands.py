@@ -14,11 +14,11 @@ from aircraft.path_limits import (
     downwind,
     fly_over_run,
     ground_speed_on,
-    reversal_room,
+    roll_reversal_length,
     turn_radius_between,
 )
 from flight.simulation.flight_setup import FlightSetup
-from world.geometry import arc_cut, arc_reach, leg_courses, leg_runs, leg_slopes, signed_turns
+from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
 
 Floats = NDArray[np.float64]
 
@@ -122,7 +122,7 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     blend, sag = _blends(setup, points, runs, turns, radius, after)
     cut = np.zeros(count)
     for i in np.flatnonzero(np.isfinite(radius) & ~route.fly_over).tolist():
-        cut[i] = min(arc_cut(abs(float(turns[i])), float(radius[i])), _LARGEST_CUT * float(radius[i]))
+        cut[i] = min(fly_by_offset(abs(float(turns[i])), float(radius[i])), _LARGEST_CUT * float(radius[i]))
     return RouteDemands(
         setup=setup,
         limits=limits,
@@ -178,7 +178,7 @@ def turn_room(turn: float, radius: float, fly_over: bool) -> tuple[float, float]
         return 0.0, radius * fly_over_run(turn)
     if turn > _U_TURN:
         return math.inf, math.inf
-    reach = arc_reach(turn, radius)
+    reach = tangent_length(turn, radius)
     return reach, reach
 
 
@@ -198,7 +198,7 @@ def _reversals(
             table = tables[float(setup.route.airspeed[leg])]
             ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
             lower = float(min(up[leg], up[leg + 1]))
-            out[leg] = reversal_room(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
+            out[leg] = roll_reversal_length(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
     return out
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from world.geometry import arc_reach
+from world.geometry import tangent_length
 
 Floats = NDArray[np.float64]
 
@@ -56,7 +56,7 @@ def _middle(shape: RouteDemands, i: int) -> Floats:
         return np.array(shape.points[i, :2])
     ux, uy = shape.leg_unit(i - 1)
     side = math.copysign(1.0, shape.turns[i])
-    reach = arc_reach(abs(float(shape.turns[i])), float(shape.radius[i]))
+    reach = tangent_length(abs(float(shape.turns[i])), float(shape.radius[i]))
     return np.array(shape.points[i, :2] - reach * np.array([ux, uy]) + side * shape.radius[i] * np.array([uy, -ux]))
 
 

@@ -8,7 +8,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_demands import ON_THE_SPOT, RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turn
-from world.geometry import arc_cut
+from world.geometry import fly_by_offset
 
 # A turn passes if the bank stays within the limit and this, the aircraft within this of its arc on the outside, and the
 # cross-track settles under this before the next turn; the design document's figures.
@@ -155,7 +155,7 @@ def _too_tight(shape: RouteDemands, i: int, measure: TurnMeasure) -> list[str]:
     bank that it does not have, or slowed down.
     """
     turn, setup = abs(float(shape.turns[i])), shape.setup
-    least = arc_cut(turn, float(shape.tightest[i])) if turn < SHARPEST else math.inf
+    least = fly_by_offset(turn, float(shape.tightest[i])) if turn < SHARPEST else math.inf
     if measure.passed is None or not math.isfinite(least) or setup.route.fly_over[i] or setup.guidance != "path":
         return []
     slack = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence] + _NAV_SIGMAS * ERRORS[setup.nav][0]

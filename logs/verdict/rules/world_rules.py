@@ -34,7 +34,7 @@ def clearance_findings(shape: RouteDemands, flown: AlignedTrack | None, *, geome
         reason = "no terrain was given, so heights above ground are not known"
         return [make_finding("clearance", "flight", ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
     points, legs, _ = planned_path(shape)
-    low, _ = path_clearance(ground.heights, ground.to_pixel.packed, points)
+    low, _ = path_clearance(ground.heights, ground.to_pixel.record, points)
     planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(shape.legs)]
     out = []
     for leg in range(shape.legs):

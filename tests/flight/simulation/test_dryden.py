@@ -13,7 +13,7 @@ from aircraft.catalog import Aircraft
 from flight.simulation.dryden import GUST_FILTERS, dryden_scales, start_gusts, step_gusts
 from flight.simulation.simulate import Flight
 from flight.simulation.track import as_track
-from tests.flight.conftest import MakeSetup
+from tests.setups import MakeSetup
 from world.kernels import Record
 
 Floats = NDArray[np.float64]

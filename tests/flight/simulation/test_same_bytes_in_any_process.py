@@ -13,7 +13,7 @@ from aircraft.catalog import load_aircraft
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import COLUMNS
-from tests.flight.conftest import MakeSetup, standard
+from tests.setups import MakeSetup, standard
 
 
 def fly(setup: FlightSetup) -> str:

@@ -20,7 +20,7 @@ from flight.dynamics.fdm import Variation
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import BANK_RESERVE, Flight, simulate
 from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_tracks
-from tests.flight.conftest import standard
+from tests.setups import standard
 from world.errors import FlightError
 
 Floats = NDArray[np.float64]

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from logs.figures.movie_frames import RATE, Film
+from logs.figures.movie_frames import RATE, MovieFrames
 from logs.recording.reader import FlightLog, read_log
 from planfly.cli import main
-from tests.logs.conftest import make_setup, make_track, record
+from tests.logs.made_flight import make_setup, make_track, record
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,7 @@ def log(log_path: Path) -> FlightLog:
 
 
 def test_the_aircraft_moves_over_a_map_that_stands_still(log: FlightLog) -> None:
-    film = Film(log.setup, log.track, 0.0, log.end_time, 24.0)
+    film = MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0)
     frames = list(film.frames())
     assert len(frames) == len(film) == 5
     np.testing.assert_allclose(film.times(), [0.0, 2.0, 4.0, 6.0, log.end_time])
@@ -53,7 +53,7 @@ def test_a_gif_holds_the_frames(
     command = ["replay", str(log_path), "--movie", str(target), "--speed", "24"]
     assert main(command) == 0
     assert f"movie     {target}" in capsys.readouterr().out
-    wanted = list(Film(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
+    wanted = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
     with Image.open(target) as film:
         assert film.n_frames == len(wanted)
         film.seek(len(wanted) - 1)
@@ -117,7 +117,7 @@ def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     target = tmp_path / "film.mp4"
     assert main(["replay", str(log_path), "--movie", str(target), "--speed", "24"]) == 0
-    frames = list(Film(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
+    frames = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
     assert target.read_bytes() == b"".join(frame.tobytes() for frame in frames)
     told = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
     assert f"{frames[0].shape[1]}x{frames[0].shape[0]}" in told

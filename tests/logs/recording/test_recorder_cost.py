@@ -1,4 +1,4 @@
-"""What a log costs: rows of the issue, held to their musts; `make bench` prints the figures."""
+"""Recording, checking and reporting stay within their bounds of time and bytes; `make bench` prints the figures."""
 
 import os
 from pathlib import Path

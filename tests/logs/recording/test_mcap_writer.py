@@ -1,4 +1,4 @@
-"""Readers that others wrote: they open our logs, find nothing amiss, and agree on counts and values."""
+"""Other projects' readers open the written files without complaint, and agree on counts and values."""
 
 import json
 import re
@@ -18,8 +18,8 @@ from tests.clients import NODE_MODULES, beside_python, need
 
 pytestmark = pytest.mark.client
 
-# What `pymcap-cli doctor` says of a clean log, all of them "info": our profile is our own, everything that is metadata
-# elsewhere is an attachment here, a chunk a second is small on purpose, and the made flight here is noise.
+# What `pymcap-cli doctor` reports of a clean log, all of them "info": our profile is our own, everything that is
+# metadata elsewhere is an attachment here, a chunk a second is small on purpose, and the made flight here is noise.
 KNOWN = {"UNKNOWN_PROFILE", "NO_METADATA", "SMALL_CHUNKS", "CHUNK_COMPRESSION_INEFFICIENT"}
 
 
@@ -47,32 +47,31 @@ def log(request: pytest.FixtureRequest, log_file: Path, tmp_path: Path) -> Path:
     return cut
 
 
-def test_mcap_core_on_node(log: Path, track: Track) -> None:
+def test_mcap_core_on_node_reads_every_row(log: Path, track: Track) -> None:
     node = need(shutil.which("node"), "node", "apt package nodejs")
     need(NODE_MODULES / "@mcap" / "core", "@mcap/core", "make clients")
-    said = json.loads(run(node, str(Path(__file__).with_name("read_mcap.cjs")), str(NODE_MODULES), str(log)))
-    assert said["counts"] == said["statistics"] == our_counts(log)
-    rows = said["counts"]["/state"]
-    assert [int(stamp) for stamp in said["stamps"]] == [EPOCH_NS + round(t * 1e9) for t in track.time[:rows]]
-    for name, _, field, column in FIELDS:
-        values = getattr(track, field)[:rows]
-        ours = values if values.ndim == 1 else values[:, column]
+    found = json.loads(run(node, str(Path(__file__).with_name("read_mcap.cjs")), str(NODE_MODULES), str(log)))
+    assert found["counts"] == found["statistics"] == our_counts(log)
+    rows = found["counts"]["/state"]
+    assert [int(stamp) for stamp in found["stamps"]] == [EPOCH_NS + round(t * 1e9) for t in track.time[:rows]]
+    for field in FIELDS:
+        ours = field.of(getattr(track, field.source)[:rows])
         # A float32 as JavaScript reads it is the same number.
-        np.testing.assert_array_equal(np.array(said["sums"][name]), ours.astype(np.float64), err_msg=name)
-    assert "setup.json" in said["attachments"]
+        np.testing.assert_array_equal(np.array(found["sums"][field.name]), ours.astype(np.float64), err_msg=field.name)
+    assert "setup.json" in found["attachments"]
 
 
-def test_rerun_mcap(log: Path) -> None:
+def test_rerun_finds_every_message(log: Path) -> None:
     rerun = need(beside_python("rerun"), "rerun", "pip package rerun-sdk")
     rows = re.findall(r"^(\w+) +\d+ +\d+ +(/\S+) +(.*)$", run(rerun, "mcap", "check", str(log)), re.MULTILINE)
     assert {topic for _, topic, _ in rows} == set(our_counts(log))
     assert {(state, issues.strip()) for state, _, issues in rows} == {("ok", "—")}
-    told = run(rerun, "mcap", "info", str(log))
-    found = re.findall(r"^ *\d+ +(/\S+) +(\d+) ", told, re.MULTILINE)
+    listing = run(rerun, "mcap", "info", str(log))
+    found = re.findall(r"^ *\d+ +(/\S+) +(\d+) ", listing, re.MULTILINE)
     assert {topic: int(count) for topic, count in found if int(count)} == our_counts(log)
 
 
-def test_pymcap_doctor(log: Path) -> None:
+def test_pymcap_doctor_finds_no_errors(log: Path) -> None:
     doctor = need(beside_python("pymcap-cli"), "pymcap-cli", "pip package pymcap-cli")
     lines = [json.loads(line) for line in run(doctor, "doctor", "--format", "jsonl", str(log)).splitlines()]
     findings = [line for line in lines if line["type"] == "finding"]
@@ -84,7 +83,7 @@ def test_pymcap_doctor(log: Path) -> None:
     assert summary["messages"] == sum(our_counts(log).values())
 
 
-def test_a_damaged_log_is_told_from_a_whole_one(log_file: Path, tmp_path: Path) -> None:
+def test_the_doctor_finds_a_damaged_log(log_file: Path, tmp_path: Path) -> None:
     # Otherwise the three above could agree on anything.
     doctor = need(beside_python("pymcap-cli"), "pymcap-cli", "pip package pymcap-cli")
     cut = tmp_path / "cut.mcap"
