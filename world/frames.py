@@ -259,24 +259,6 @@ def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:  
     return u, v
 
 
-@compiled_views
-def polymap_within(rows: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Both components of `PolyMap.rows` of this size at one point, in the first columns of a wider table."""
-    a = (x - rows[0, 0]) / rows[1, 0]
-    b = (y - rows[0, 1]) / rows[1, 1]
-    u = 0.0
-    v = 0.0
-    for i in range(size - 1, -1, -1):
-        row_u = 0.0
-        row_v = 0.0
-        for j in range(size - 1 - i, -1, -1):
-            row_u = row_u * b + rows[2 + i, j]
-            row_v = row_v * b + rows[2 + size + i, j]
-        u = u * a + row_u
-        v = v * a + row_v
-    return u, v
-
-
 @compiled
 def _polymap_many(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:  # pragma: no cover - compiled
     out = np.empty((2, x.size))

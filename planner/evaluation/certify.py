@@ -144,8 +144,8 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
 
 def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
     """Least distance of a waypoint to the edge of the map, the floor or the ceiling, m."""
-    low = np.array([data.bounds[0, 0], data.bounds[1, 0], data.floor])
-    high = np.array([data.bounds[0, 1], data.bounds[1, 1], data.ceiling])
+    low = np.array([data.west, data.south, data.floor])
+    high = np.array([data.east, data.north, data.ceiling])
     margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
     problems.extend(
         f"waypoint {i}: {-margins[i]:.1f} m outside the area, floor or ceiling"

@@ -193,7 +193,8 @@ def _measure_flown(
     R(1/cos(theta/2) - 1) and a chord's rise; and it does so within its extent: within the tangent and half the arc, or
     the blend of heights.
     """
-    slope_out = (path[1, 2] - path[0, 2]) / max(legs[0].run, 1e-6)
+    start, first = path[0], path[1]
+    slope_out = (first[2] - start[2]) / max(legs[0].run, 1e-6)
     for i in range(1, legs.shape[0]):
         radius = 0.0 if fly_over else _arc_radius(legs_hold_turns, legs, corners, i)
         tangent = corners[i].tangent if radius > 0.0 else 0.0

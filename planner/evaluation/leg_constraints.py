@@ -195,7 +195,7 @@ def _add_bounds(
     data: ProblemArrays, path: Floats, graded: bool, violations: Record
 ) -> None:  # pragma: no cover - compiled
     """Add the waypoints off the map, below the floor or above the ceiling (eq. 7)."""
-    west, east, south, north = data.bounds[0, 0], data.bounds[0, 1], data.bounds[1, 0], data.bounds[1, 1]
+    west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
     for i in range(path.shape[0]):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]

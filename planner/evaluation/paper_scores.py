@@ -275,7 +275,7 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
 @compiled_views
 def _add_outside(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:  # pragma: no cover - compiled
     """Add whether a waypoint is off the map, below the floor or above the ceiling (eq. 7)."""
-    west, east, south, north = data.bounds[0, 0], data.bounds[0, 1], data.bounds[1, 0], data.bounds[1, 1]
+    west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
     xs, ys, zs, outside = place.east, place.north, place.up, sums.outside
     for b in range(size):

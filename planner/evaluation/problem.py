@@ -89,7 +89,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         threats=units,
         spheres=sphere_records(units),
         aircraft=derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence]),
-        bounds=scenario.bounds,
+        **_edges(scenario.bounds),
         start=scenario.start,
         destination=scenario.destination,
         floor=float(scenario.floor),
@@ -112,6 +112,12 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
     )
+
+
+def _edges(bounds: Floats) -> dict[str, float]:
+    """The edges of a map with these bounds (2, 2) by name."""
+    (west, east), (south, north) = bounds.tolist()
+    return {"west": west, "east": east, "south": south, "north": north}
 
 
 def _or_nan(value: float | None) -> float:
@@ -140,12 +146,11 @@ def _inset(data: ProblemArrays) -> ProblemArrays:
     """Arrays with the map and the heights shrunk by the margins, or by what the ends leave of them."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
-    bounds = data.bounds.copy()
-    bounds[:, 0] = np.minimum(bounds[:, 0] + MAP_MARGIN, np.maximum(bounds[:, 0], low[:2]))
-    bounds[:, 1] = np.maximum(bounds[:, 1] - MAP_MARGIN, np.minimum(bounds[:, 1], high[:2]))
-    bounds.setflags(write=False)
     return data._replace(
-        bounds=bounds,
+        west=min(data.west + MAP_MARGIN, max(data.west, float(low[0]))),
+        south=min(data.south + MAP_MARGIN, max(data.south, float(low[1]))),
+        east=max(data.east - MAP_MARGIN, min(data.east, float(high[0]))),
+        north=max(data.north - MAP_MARGIN, min(data.north, float(high[1]))),
         floor=min(data.floor + HEIGHT_MARGIN, max(data.floor, float(low[2]))),
         ceiling=max(data.ceiling - HEIGHT_MARGIN, min(data.ceiling, float(high[2]))),
     )
@@ -157,4 +162,5 @@ def _space(scenario: Scenario, data: ProblemArrays) -> Space:
     low = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), ends)
     high = max(data.ceiling, low + 1.0)
     up = (float(low), float(high))
-    return Space(scenario.start, scenario.destination, data.bounds, up, scenario.planner.across_m)
+    bounds = np.array([[data.west, data.east], [data.south, data.north]])
+    return Space(scenario.start, scenario.destination, bounds, up, scenario.planner.across_m)

@@ -58,7 +58,7 @@ class ProblemArrays(NamedTuple):
     to_pixel: map from positions to its pixels.
     threats: `THREAT` records (m,), and spheres the same as `SPHERE` records.
     aircraft: what it can do, of which turbulence leaves a plan a share.
-    bounds: (2, 2) map; floor and ceiling: lowest and highest waypoint.
+    west, east, south, north: edges of the map; floor and ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.
     max_turn: largest course change.
     legs_hold_turns: whether a leg must be as long as its turns.
@@ -79,7 +79,10 @@ class ProblemArrays(NamedTuple):
     threats: Records
     spheres: Records
     aircraft: PerformanceTable
-    bounds: Floats
+    west: float
+    east: float
+    south: float
+    north: float
     start: Floats
     destination: Floats
     floor: float

@@ -92,7 +92,8 @@ def terrain_excess(
 
     ends: columns and rows of a and b.
     """
-    column, row, column_step, row_step = ends[0], ends[1], ends[2] - ends[0], ends[3] - ends[1]
+    column, row, last_column, last_row = ends
+    column_step, row_step = last_column - column, last_row - row
     rise = bz - az
     run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
     pitch = 1.0 / max(1.0, math.ceil(run / required.sample_pitch))
@@ -116,7 +117,8 @@ def _begin_legs(
     to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:  # pragma: no cover - compiled
     """Fill `TERRAIN_LEG` records (w - 1,) as they are before the first sample."""
-    column, row = polymap(to_pixel, path[0, 0], path[0, 1])
+    start = path[0]
+    column, row = polymap(to_pixel, start[0], start[1])
     for i in range(legs.shape[0]):
         after_column, after_row = polymap(to_pixel, path[i + 1, 0], path[i + 1, 1])
         run = legs[i].run

@@ -67,8 +67,7 @@ def _lowest_height(
     steps: 0 along for the middle sample alone.
     """
     east, north = position_of(frame, along, across)
-    west, south = data.bounds[0, 0], data.bounds[1, 0]
-    if not (west <= east <= data.bounds[0, 1] and south <= north <= data.bounds[1, 1]):
+    if not (data.west <= east <= data.east and data.south <= north <= data.north):
         return math.inf
     column, row = polymap(data.to_pixel, east, north)
     spread = 0 if steps.columns_along == 0.0 and steps.rows_along == 0.0 else 1

@@ -98,7 +98,7 @@ def plan(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
     space = ob.RealVectorStateSpace(3)
     box = ob.RealVectorBounds(3)
     data = task.problem.search
-    low, high = [*data.bounds[:, 0], data.floor], [*data.bounds[:, 1], data.ceiling]
+    low, high = [data.west, data.south, data.floor], [data.east, data.north, data.ceiling]
     for axis in range(3):
         box.setLow(axis, float(low[axis]))
         box.setHigh(axis, float(high[axis]))

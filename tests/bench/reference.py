@@ -61,8 +61,8 @@ def numpy_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
     run = np.hypot(legs[..., 0], legs[..., 1])
     climb, dive = math.tan(data.max_climb - data.angle_margin), math.tan(data.max_dive - data.angle_margin)
     counts[:, 1] = ((legs[..., 2] > climb * run) | (-legs[..., 2] > dive * run)).sum(axis=1)
-    low = np.array([data.bounds[0, 0], data.bounds[1, 0], data.floor])
-    high = np.array([data.bounds[0, 1], data.bounds[1, 1], data.ceiling])
+    low = np.array([data.west, data.south, data.floor])
+    high = np.array([data.east, data.north, data.ceiling])
     counts[:, 3] = ((paths < low) | (paths > high)).any(axis=2).sum(axis=1)
     share = np.arange(POINTS) / POINTS
     points = (paths[:, :-1, None, :] + share[:, None] * legs[:, :, None, :]).reshape(len(paths), -1, 3)
@@ -170,8 +170,8 @@ def _brute(
 def brute_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
     """Counts (n, 4) and objectives (n, 4) of paths (n, w, 3), compiled, without lists of near threats."""
     cols, rows = pixels_of(data.to_pixel, paths[..., 0], paths[..., 1])
-    low = np.array([data.bounds[0, 0], data.bounds[1, 0], data.floor])
-    high = np.array([data.bounds[0, 1], data.bounds[1, 1], data.ceiling])
+    low = np.array([data.west, data.south, data.floor])
+    high = np.array([data.east, data.north, data.ceiling])
     straight = float(np.linalg.norm(data.destination - data.start))
     slopes = math.tan(data.max_climb - data.angle_margin), math.tan(data.max_dive - data.angle_margin)
     limits = _Limits(data.max_turn, *slopes, data.clearance + data.buffer, straight)

@@ -20,7 +20,9 @@ def numbers(make_limits: Callable[[Scenario], Limits], small: Callable[..., Scen
     """The small scenario with numbers for all limits, and no reserve: its clearance is the ground."""
     flat = small(limits={"max_turn_deg": 45, "max_climb_deg": 20, "max_dive_deg": 25, "min_clearance_m": 0})
     problem = make_problem(flat, make_limits(flat))
-    data = problem.search._replace(buffer=0.0, bounds=flat.bounds, floor=flat.floor, ceiling=flat.ceiling)
+    (west, east), (south, north) = flat.bounds.tolist()
+    edges = {"west": west, "east": east, "south": south, "north": north}
+    data = problem.search._replace(buffer=0.0, floor=flat.floor, ceiling=flat.ceiling, **edges)
     return Problem(problem.scenario, problem.limits, data, data, problem.space)
 
 
