@@ -6,18 +6,15 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.path_limits import Limits, ground_speed_on
 from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import Trim, straight
-from flight.guidance.fly_by_path import FlyByPath, fly_by_path
+from flight.guidance.fly_by_path import FlyByPath, fly_by_path, waypoint_records
 from flight.guidance.gains import load_gains
 from flight.guidance.memory import CROSS_TRACK, L1, VECTOR_FIELD
 from flight.guidance.navigation_error import ERRORS, start_navigation
-from flight.guidance.reference_laws import WAYPOINT
-from flight.mission.route import Route
 from flight.simulation.dryden import start_gusts
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Ground, LocalMap
@@ -27,7 +24,7 @@ from flight.simulation.track import Rows, Track, as_track, join_rows, quantised
 from flight.simulation.workspace import BLOCK_TICKS, READ_FIELDS, Workspace
 from world.errors import FlightError
 from world.frames import to_geo
-from world.geometry import leg_courses, signed_turns
+from world.geometry import leg_courses
 from world.random_streams import NAVIGATION, TURBULENCE, stream
 from world.wind import W20
 
@@ -81,6 +78,7 @@ def simulate(
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission
+    >>> from flight.mission.route import Route
     >>> from flight.simulation.flight_setup import make_limits
     >>> from world.scenario import load_scenario
     >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
@@ -114,16 +112,6 @@ def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
     return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0
 
 
-def _waypoints(route: Route) -> NDArray[np.record]:
-    """(w,) of `flight.guidance.reference_laws.WAYPOINT`; the last one has its leg's airspeed before it."""
-    waypoints: NDArray[np.record] = np.zeros(len(route.waypoints), WAYPOINT)
-    waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
-    waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
-    waypoints["fly_over"], waypoints["acceptance"] = route.fly_over, route.acceptance
-    waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
-    return waypoints
-
-
 class Flight:
     """One flight in progress, advanced by `block`: `simulate` in one go, the live vehicle in step with a clock.
 
@@ -140,7 +128,7 @@ class Flight:
         self._map = LocalMap.around(setup)
         self._steps = round(FDM_HZ / setup.guidance_hz)
         self.dt = self._steps / FDM_HZ
-        self._workspace = Workspace(gains, self.path, _waypoints(setup.route))
+        self._workspace = Workspace(gains, self.path, waypoint_records(setup.route))
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self._map.position.record, self._map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record

@@ -156,9 +156,13 @@ def join_rows(parts: Sequence[Rows]) -> Rows:
     >>> rows["time"] = np.arange(6)
     >>> join_rows([rows[:2], rows[2::2]])["time"]
     array([0., 1., 2., 4.])
+    >>> join_rows([rows[4:5], rows[5:]])["time"]
+    array([4., 5.])
     """
     # As numbers: numpy copies a record field by field, which takes a hundred times as long.
-    return np.concatenate([_numbers(part) for part in (_NO_ROWS, *parts)]).view(TRACK_ROW)[:, 0]
+    numbers = np.concatenate([_numbers(part) for part in (_NO_ROWS, *parts)])
+    # Of parts of one row each numpy makes columns that follow each other.
+    return np.ascontiguousarray(numbers).view(TRACK_ROW)[:, 0]
 
 
 def as_track(rows: Rows) -> Track:

@@ -2,7 +2,6 @@
 
 import itertools
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,11 +13,11 @@ from numpy.typing import NDArray
 from flight.guidance.fly_by_path import FlyByPath, arc_point, fly_by_path, sample_path
 from flight.guidance.path_kernels import PIECE, profile
 from flight.simulation.flight_setup import FlightSetup
+from tests.setups import MakeSetup
 from world.geometry import leg_runs, turning_angles
 from world.kernels import Record, field_names
 
 Floats = NDArray[np.float64]
-MakeSetup = Callable[..., FlightSetup]
 # All fields of a piece but where its leg changes, which may be nowhere.
 FINITE = set(field_names(PIECE)) - {"leg_change"}
 RADIUS = 25.0**2 / (9.80665 * math.tan(math.radians(30.0)))

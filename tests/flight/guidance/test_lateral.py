@@ -1,7 +1,6 @@
 """The guidance core in one tick: signs of the commands, limits, and the end of the path."""
 
 import math
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,17 +9,14 @@ from hypothesis import strategies as st
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.state import COMMANDS, STATE
-from flight.guidance.fly_by_path import fly_by_path
+from flight.guidance.fly_by_path import fly_by_path, waypoint_records
 from flight.guidance.gains import Gains, load_gains
 from flight.guidance.lateral import guide
 from flight.guidance.memory import GUIDANCE_MEMORY
 from flight.guidance.navigation_error import MOTION
-from flight.guidance.reference_laws import WAYPOINT
 from flight.simulation.flight_setup import FlightSetup
-from world.geometry import signed_turns
+from tests.setups import MakeSetup
 from world.kernels import Record
-
-MakeSetup = Callable[..., FlightSetup]
 
 
 class Tick:
@@ -28,11 +24,7 @@ class Tick:
 
     def __init__(self, setup: FlightSetup, gains: Gains) -> None:
         self.path = fly_by_path(setup.route, setup.limits)
-        way = setup.route.waypoints
-        self.waypoints = np.zeros(len(way), WAYPOINT)
-        self.waypoints["east"], self.waypoints["north"] = way[:, 0], way[:, 1]
-        self.waypoints["turn"][1:-1] = np.abs(signed_turns(way))
-        self.waypoints["airspeed"][:-1] = setup.route.airspeed
+        self.waypoints = waypoint_records(setup.route)
         self.gains = gains.record()
         self.memory: Record = np.zeros(1, GUIDANCE_MEMORY)[0]
         self.memory.last_airspeed, self.memory.max_bank = -1.0, math.radians(33.0)

@@ -1,6 +1,5 @@
 """The size and rate of navigation's errors, and a flight that follows its estimated state."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -8,11 +7,9 @@ import pytest
 
 from aircraft.catalog import Aircraft
 from flight.guidance.navigation_error import ERRORS, MOTION, NAVIGATION_LAGS, navigate, start_navigation
-from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
+from tests.setups import MakeSetup
 from world.kernels import Record
-
-MakeSetup = Callable[..., FlightSetup]
 
 
 def test_navigation_errors_have_their_size_and_their_rate() -> None:

@@ -1,7 +1,6 @@
 """L1 and the vector field by their formulas and in flight."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +9,10 @@ import pytest
 from aircraft.catalog import Aircraft
 from flight.guidance.navigation_error import MOTION
 from flight.guidance.reference_laws import WAYPOINT, field_course, l1_acceleration, l1_angles, l1_length, l1_reached
-from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
+from tests.setups import MakeSetup
 from world.kernels import Record
 
-MakeSetup = Callable[..., FlightSetup]
 A, B = np.array([(0.0, 0.0, 0.0, False, 0.0, 25.0), (0.0, 1000.0, math.pi / 4, False, 0.0, 25.0)], WAYPOINT)
 
 

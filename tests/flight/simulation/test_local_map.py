@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.local_map import LocalMap
-from tests.flight.conftest import MakeSetup
+from tests.setups import MakeSetup
 from world.frames import GeoOrigin, to_map
 
 

@@ -6,7 +6,6 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,11 +19,10 @@ from flight.dynamics.fdm import Variation
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import BANK_RESERVE, Flight, simulate
 from flight.simulation.track import COLUMNS, Rows, Track, as_track, join_tracks
-from tests.setups import standard
+from tests.setups import MakeSetup, standard
 from world.errors import FlightError
 
 Floats = NDArray[np.float64]
-MakeSetup = Callable[..., FlightSetup]
 ROOT = Path(__file__).parents[3]
 TICK = 1 / 60
 
