@@ -19,7 +19,9 @@ from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.simulation.flight_setup import FlightSetup
-from planfly.pipeline import Vehicle, load_vehicle, make_setup
+from logs.verdict.places import Place
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import make_setup
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario, from_spec
 from world.wind import Wind
@@ -54,14 +56,14 @@ _AIRSPEEDS = (18.0, 31.0)  # that a scenario may ask an Aerosonde to fly
 class MadeMission:
     """A mission ready to be judged and flown.
 
-    kind: what it breaks, "" for nothing.  where: the legs or waypoints at which that is to be
-    found, as findings begin.
+    kind: what it breaks, "" for nothing.  places: the legs or waypoints, without their items, at which that is to be
+    found.
     """
 
     setup: FlightSetup
-    vehicle: Vehicle
+    airframe: Airframe
     kind: str
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
 
     @property
     def rule(self) -> str:
@@ -152,19 +154,19 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     steps = runs[:, None] * np.stack([np.sin(draft.courses), np.cos(draft.courses)], axis=1)
     points = np.column_stack([np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]), heights])
     scenario = _scenario(draft, points, numbers, f"{kind or 'feasible'} {number}")
-    vehicle = load_vehicle(scenario)
+    airframe = load_airframe(scenario)
     mission = _mission(points, draft.speeds, scenario.origin)
-    setup = make_setup(scenario, vehicle, mission, number)
-    return MadeMission(setup, vehicle, kind, _where(draft))
+    setup = make_setup(scenario, airframe, mission, number)
+    return MadeMission(setup, airframe, kind, _places(draft))
 
 
-def _where(draft: _Draft) -> tuple[str, ...]:
+def _places(draft: _Draft) -> tuple[Place, ...]:
     """Where a mission's fault is to be found: of a leg too short for its turns, at either of them."""
     if not draft.kind:
         return ()
     if draft.short >= 0:
-        return f"waypoint {draft.short}", f"waypoint {draft.short + 1}"
-    return (f"{'waypoint' if draft.kind == 'turn number' else 'leg'} {draft.bad}",)
+        return Place("waypoint", draft.short), Place("waypoint", draft.short + 1)
+    return (Place("waypoint" if draft.kind == "turn number" else "leg", draft.bad),)
 
 
 def _turbulence(rng: np.random.Generator) -> Any:

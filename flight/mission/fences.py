@@ -40,8 +40,10 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
     return shapes
 
 
-def fence_problem(fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float) -> str | None:
-    """Which fence a place (m) breaks, or None.
+def fence_problem(
+    fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
+) -> tuple[str, int] | None:
+    """Which fence a place (m) breaks, in words, and its first item's number; None for none.
 
     fences: items 5001..5004, a polygon's corners together.  Inclusions count together: a place must be in all of them.
     """
@@ -56,7 +58,7 @@ def fence_problem(fences: tuple[MissionItem, ...], origin: GeoOrigin, east: floa
             inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
             name = f"circle of {item.params[0]:.0f} m"
         if inside != (item.command in INCLUSIONS):
-            return f"{'outside an inclusion' if not inside else 'inside an exclusion'} {name} (fence item {item.seq})"
+            return f"{'outside an inclusion' if not inside else 'inside an exclusion'} {name}", item.seq
     return None
 
 

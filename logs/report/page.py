@@ -110,7 +110,7 @@ def _page(
     return environment.get_template("report.html").render(
         name=setup.scenario.name,
         badge=badge_of(verdict),
-        summary=verdict.summary.splitlines() or [""],
+        summary=verdict.lines or [""],
         flown=track is not None,
         failing=[row for row in rows if row.state == "fail"],
         counts=count_sentence(rows),

@@ -33,7 +33,7 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
     slopes: list[float] = []
     for number in numbers:
         made = feasible(number, margin)
-        flown = simulate(made.setup, made.vehicle.aircraft)
+        flown = simulate(made.setup, made.airframe.aircraft)
         if flown.ended != "completed":
             raise RuntimeError(f"mission {number} {flown.ended}")
         shape = route_demands(made.setup)

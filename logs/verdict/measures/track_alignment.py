@@ -13,32 +13,34 @@ from numpy.typing import NDArray
 from flight.simulation.track import Track
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.tolerances import ARRIVED, FARTHEST, FASTEST, REACH
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
-# A waypoint further than this from the track draws no row to itself, m.
-REACH = 500.0
 # Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
 _CELLS = 40_000_000
 # Rows are thinned to no less than this many seconds for the assignment.
 _CHORD = 0.25
-# No position or speed of ours is larger; what is, is garbage.
-_FARTHEST, _FASTEST = 1e7, 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class AlignedTrack:
-    """A track laid beside a route.
+    """A track laid beside a route of w waypoints; t usable rows.
 
-    track: its usable rows.  bad_rows: how many had no finite, plausible numbers or no later time than the row
-    before; first_bad: their first time, s (NaN where there is none).  rows: (w,) the row nearest to each waypoint's
-    apex, never decreasing; the last row for a waypoint that the flight did not get to.  distance: (w,) m from
-    there to the apex.  passed: (w,) bool, the flight went by.  course: (t,) rad over the ground, unwrapped.
-    distance_run: (t,) m along the ground track.  low, low_at: (t - 1,) least height above ground between a row and the
-    next, m, and the fraction of the way where it is; NaN off the known terrain, and without any.
+    track: the usable rows.
+    bad_rows: how many rows had no finite, plausible numbers or no later time than the row before.
+    first_bad: time of the first of them, s; NaN where there is none.
+    rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
+    did not get to.
+    distance: (w,) m from there to the apex.
+    passed: (w,) bool, the flight went by.
+    course: (t,) rad over the ground, unwrapped.
+    distance_run: (t,) m along the ground track.
+    low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the way where
+    it is; NaN off the known terrain, and without any.
     """
 
     track: Track
@@ -71,7 +73,7 @@ class AlignedTrack:
         return slice(start, int(np.searchsorted(time, time[last] + seconds, side="right")))
 
 
-def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
+def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     """Lay a track beside a route; None where it has fewer than two usable rows."""
     good = _usable(track)
     if int(good.sum()) < 2:
@@ -81,14 +83,14 @@ def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
     else:
         first_bad = float(track.time[int(np.argmin(good))])
         clean = Track(*(getattr(track, item.name)[good] for item in fields(track)))
-    apexes = shape.apexes()
+    apexes = demands.apexes()
     rows, distance = _assign(clean, apexes)
     last = len(clean) - 1
-    passed = (rows < last) | (distance <= shape.cut + 10.0)
+    passed = (rows < last) | (distance <= demands.fly_by_offset + ARRIVED)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
-    ground = shape.setup.scenario.terrain
+    ground = demands.setup.scenario.terrain
     low, low_at = np.full(last, math.nan), np.zeros(last)
     if ground is not None:
         low, low_at = path_clearance(ground.heights, ground.to_pixel.packed, clean.position)
@@ -106,10 +108,10 @@ def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
     )
 
 
-def along_across(shape: RouteDemands, leg: int, position: Floats) -> tuple[Floats, Floats]:
+def along_across(demands: RouteDemands, leg: int, position: Floats) -> tuple[Floats, Floats]:
     """Distance along a leg from its start and to the right of its line, m, of positions (n, 3)."""
-    east, north = position[:, 0] - shape.points[leg, 0], position[:, 1] - shape.points[leg, 1]
-    ux, uy = math.sin(shape.courses[leg]), math.cos(shape.courses[leg])
+    east, north = position[:, 0] - demands.points[leg, 0], position[:, 1] - demands.points[leg, 1]
+    ux, uy = math.sin(demands.courses[leg]), math.cos(demands.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
@@ -133,8 +135,8 @@ def _usable(track: Track) -> NDArray[np.bool_]:
     for name in ("airspeed", "current", "energy"):
         good &= np.isfinite(getattr(track, name))
     for name, largest in (
-        ("position", _FARTHEST),
-        ("velocity", _FASTEST),
+        ("position", FARTHEST),
+        ("velocity", FASTEST),
         ("attitude", 1e3),
         ("controls", 1e3),
         ("wind", 1e3),

@@ -18,6 +18,7 @@ from logs.figures.elements.failures import failures, paths_differ, route_distanc
 from logs.figures.elements.style import FAIL, FLOWN, nice_step, outline_rows, png_bytes
 from logs.figures.elements.threats import sphere_cuts
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import Place
 from world.scenario import Scenario, from_spec
 
 # A right angle and a climb, in round numbers: legs of 1,000, 800 and 600 m.
@@ -54,18 +55,18 @@ def make_track(route: np.ndarray = ROUTE, rate: float = 2.0) -> Track:
     return Track(**values)  # type: ignore[arg-type]  # the track gives each column its type
 
 
-def make_verdict(*bad: tuple[str, str]) -> Verdict:
-    findings = [Finding("slope", "leg 0", 2.0, 2.0, 8.0, "aircraft", 0.1, 6.0, "deg", "fit", True, "")]
+def make_verdict(*bad: tuple[str, Place]) -> Verdict:
+    findings = [Finding("slope", Place("leg", 0), 2.0, 2.0, 8.0, "aircraft", 0.1, 6.0, "deg", "fit", True, "")]
     findings += [
-        Finding(rule, where, 9.0, 9.0, 8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, "") for rule, where in bad
+        Finding(rule, place, 9.0, 9.0, 8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, "") for rule, place in bad
     ]
-    return Verdict(tuple(findings), not bad, True, "flyable" if not bad else "not flyable", "flown")
+    return Verdict(tuple(findings), not bad, True, ("flyable" if not bad else "not flyable",), "flown")
 
 
 DRAWERS = [draw_map, draw_profile]
 ALL = {"plan_waypoints": ROUTE, "route_waypoints": ROUTE}
 NONE_TERRAIN = {"terrain": {"kind": "none"}, "threats": []}
-FAILED = make_verdict(("slope", "leg 1"), ("turn", "waypoint 2 (item 3)"))
+FAILED = make_verdict(("slope", Place("leg", 1)), ("turn", Place("waypoint", 2, 3)))
 
 
 @pytest.mark.parametrize("draw", DRAWERS)
@@ -145,9 +146,9 @@ def test_failing_places_are_marked_and_only_those(draw: Any) -> None:
 
     assert marks(None) == 0
     assert marks(make_verdict()) == 0
-    assert marks(make_verdict(("slope", "leg 1"))) == 1
+    assert marks(make_verdict(("slope", Place("leg", 1)))) == 1
     assert marks(FAILED) == 2
-    assert marks(make_verdict(("turn", "waypoint 99"), ("energy", "flight"))) == 0
+    assert marks(make_verdict(("turn", Place("waypoint", 99)), ("energy", Place("flight")))) == 0
 
 
 def test_map_shows_the_track_where_it_was_flown() -> None:
@@ -280,8 +281,9 @@ def test_paths_that_lie_on_each_other_do_not_differ() -> None:
     assert paths_differ(ROUTE, ROUTE[:-1], 1.0)
 
 
-def test_places_are_read_from_findings() -> None:
-    found = failures(make_verdict(("slope", "leg 1"), ("clearance", "leg 1"), ("turn", "waypoint 3 (item 7)")), 4)
+def test_failures_lie_at_the_places_of_findings() -> None:
+    bad = ("slope", Place("leg", 1)), ("clearance", Place("leg", 1)), ("turn", Place("waypoint", 3, 7))
+    found = failures(make_verdict(*bad), 4)
     assert found.legs == {1: ("slope", "clearance")}
     assert found.waypoints == {3: ("turn",)}
-    assert not failures(make_verdict(("slope", "leg 3"), ("turn", "waypoint 4")), 4)
+    assert not failures(make_verdict(("slope", Place("leg", 3)), ("turn", Place("waypoint", 4))), 4)

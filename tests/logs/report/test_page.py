@@ -28,6 +28,8 @@ from logs.report.page import report_html, write_report
 from logs.report.tables import LEG_COLUMNS, PASSAGE_COLUMNS, leg_rows, passage_rows, saturation_rows
 from logs.report.text import badge_of, finding_rows, number, quantity, rule_rows
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.wording import place_text
 from world.scenario import from_spec
 
 ROUTE = np.array([[-900.0, -400.0, 300.0], [100.0, -400.0, 340.0], [100.0, 400.0, 380.0], [700.0, 400.0, 360.0]])
@@ -111,18 +113,19 @@ def make_track() -> Track:
     return Track(**values)  # type: ignore[arg-type]  # the track gives each column its type
 
 
-def finding(rule: str, where: str, ok: bool | None, margin: float | None, **changes: Any) -> Finding:
-    base = Finding(rule, where, 4.0, 4.25, 7.8, "aircraft", 0.1, margin, "deg", "least squares", ok, f"why {where}")
+def finding(rule: str, place: Place, ok: bool | None, margin: float | None, **changes: Any) -> Finding:
+    reason = f"why {place_text(place)}"
+    base = Finding(rule, place, 4.0, 4.25, 7.8, "aircraft", 0.1, margin, "deg", "least squares", ok, reason)
     return replace(base, **changes)
 
 
 FINDINGS = (
-    finding("turn", "waypoint 1 (item 2)", True, 12.3),
-    finding("slope", "leg 0", True, 3.5),
-    finding("slope", "leg 1", False, -3.45, flown=11.25),
-    finding("bounds", "flight", None, None, planned=None, flown=None, limit=None, reason="no scenario was given"),
+    finding("turn", Place("waypoint", 1, 2), True, 12.3),
+    finding("slope", Place("leg", 0), True, 3.5),
+    finding("slope", Place("leg", 1), False, -3.45, flown=11.25),
+    finding("bounds", FLIGHT, None, None, planned=None, flown=None, limit=None, reason="no scenario was given"),
 )
-VERDICT = Verdict(FINDINGS, False, True, "not flyable: slope on leg 1\nStart: in the air", "flown")
+VERDICT = Verdict(FINDINGS, False, True, ("not flyable: slope on leg 1", "Start: in the air"), "flown")
 ARGUMENTS: dict[str, Any] = {
     "ended": "completed",
     "versions": {"planfly": "0.1.0", "jsbsim": "1.3.3"},
@@ -228,9 +231,8 @@ def test_verdict_comes_first_then_what_fails() -> None:
 def test_hostile_words_stay_words() -> None:
     setup = make_setup(name=EVIL, description=EVIL)
     setup = replace(setup, mission=replace(setup.mission, source=EVIL, warnings=(EVIL,)), aircraft=EVIL)
-    verdict = Verdict(
-        (finding("slope", EVIL, False, -1.0, reason=EVIL, method=EVIL, unit=EVIL),), False, False, EVIL, EVIL
-    )
+    evil = finding("threat", Place("missile", 0, name=EVIL), False, -1.0, reason=EVIL, method=EVIL, unit=EVIL)
+    verdict = Verdict((evil,), False, False, (EVIL,), EVIL)
     html = report_html(setup, make_track(), verdict, ended=EVIL, versions={EVIL: EVIL}, command=EVIL)
     assert len(re.findall("<script", html)) == 2
     assert len(re.findall("</script", html)) == 2
@@ -243,7 +245,7 @@ def test_hostile_words_stay_words() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_a_plan_that_was_not_flown_has_a_report() -> None:
     setup = make_setup(terrain={"kind": "none"}, threats=[])
-    verdict = Verdict(FINDINGS, False, False, "no feasible plan: slope", "plan")
+    verdict = Verdict(FINDINGS, False, False, ("no feasible plan: slope",), "plan")
     for track in (None, make_track().rows(0, 0)):
         html = report_html(setup, track, verdict, ended=None, versions={}, command="planfly run small")
         text = Page(html).text()
@@ -308,12 +310,12 @@ def test_legs_add_up_to_the_flight() -> None:
         (True, True, "geometric", FINDINGS[:2], "Flyable on paper, not flown"),
         (False, True, "flown", FINDINGS, "Not flyable"),
         (False, False, "flown", FINDINGS, "Not flyable, and incomplete"),
-        (False, False, "flown", (finding("completion", "flight", False, None),), "Incomplete, so not flyable"),
+        (False, False, "flown", (finding("completion", FLIGHT, False, None),), "Incomplete, so not flyable"),
         (False, False, "plan", FINDINGS, "Not flyable: no feasible plan"),
     ],
 )
 def test_badge(flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], word: str) -> None:
-    badge = badge_of(Verdict(findings, flyable, complete, "", level))
+    badge = badge_of(Verdict(findings, flyable, complete, (), level))
     assert badge.word == word
     assert badge.state == ("pass" if flyable else "fail")
 
@@ -335,21 +337,21 @@ def test_numbers_with_units() -> None:
     assert number(-0.001, digits=1) == "0.0"
     assert quantity(math.pi / 6, "rad") == "30.0°"
     assert quantity(4.0, "m/s") == "4.00\u00a0m/s"
-    (row,) = finding_rows([finding("turn", "waypoint 1", True, 0.1, unit="rad", planned=0.5, tolerance=0.01)])
+    (row,) = finding_rows([finding("turn", Place("waypoint", 1), True, 0.1, unit="rad", planned=0.5, tolerance=0.01)])
     assert (row.planned, row.margin, row.unit) == ("28.6", "+5.73", "°")
     assert row.method == "least squares (±\u00a00.57°)"
 
 
 @given(st.lists(st.tuples(st.sampled_from([True, False, None]), st.floats(-10, 10)), min_size=1, max_size=12))
 def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) -> None:
-    findings = [finding("slope", f"leg {k}", ok, margin) for k, (ok, margin) in enumerate(kinds)]
+    findings = [finding("slope", Place("leg", k), ok, margin) for k, (ok, margin) in enumerate(kinds)]
     (row,) = rule_rows(findings)
     judged = [item for item in findings if item.ok is not None]
     failed = [item for item in judged if item.ok is False]
     assert row.state == ("fail" if failed else "pass" if judged else "unjudged")
     if judged:
         worst = min(item.margin or 0.0 for item in (failed or judged))
-        assert findings[int(row.where.removeprefix("leg "))].margin == worst
+        assert row.where in [place_text(item.place) for item in findings if item.margin == worst]
     states = [item.state for item in finding_rows(findings)]
     assert states == sorted(states, key=["fail", "pass", "unjudged"].index)
 
