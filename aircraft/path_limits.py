@@ -5,6 +5,7 @@ The compiled functions judge a planner's candidate, a certificate and a route wi
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,31 @@ Floats = NDArray[np.float64]
 ROLL_TIME = 0.8
 # Vertical acceleration where one slope blends into the next, m/s^2.
 BLEND_ACCELERATION = 1.0
+
+
+class PerformanceTable(NamedTuple):
+    """What an aircraft can do at one airspeed, bank limit and wind, in the form that compiled functions take.
+
+    airspeed: m/s.
+    tan_max_bank: tangent of the bank limit.
+    wind_speed: mean wind (m/s) at `wind_reference_amsl` (m).
+    wind_to: direction that the wind blows towards, rad clockwise from north.
+    wind_gradient: m/s more per metre of height, 1/s.
+    gust_sigma: standard deviation of the gusts, m/s.
+    amsl: (h,) m, increasing; the heights of the two tables.
+    climb, descent: (h,) rad, steepest angles to the air, positive in the direction of their name.
+    """
+
+    airspeed: float
+    tan_max_bank: float
+    wind_speed: float
+    wind_to: float
+    wind_gradient: float
+    wind_reference_amsl: float
+    gust_sigma: float
+    amsl: Floats
+    climb: Floats
+    descent: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,116 +71,127 @@ class Limits:
 
         Both are 0 where the wind leaves no way along the course.
         """
-        climb, dive = aircraft_slopes(self.packed(airspeed), course, amsl)
+        climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
 
     def turn_radius(self, course_in: float, course_out: float, amsl: float, airspeed: float | None = None) -> float:
         """Radius (m) of the arc at `max_bank` between two courses, for the highest ground speed on the way."""
-        return float(turn_radius_between(self.packed(airspeed), course_in, course_out, amsl))
+        return float(turn_radius_between(self.performance(airspeed), course_in, course_out, amsl))
 
-    def packed(self, airspeed: float | None = None) -> Floats:
-        """Pack the aircraft's side as one array, for the compiled functions.
+    def performance(self, airspeed: float | None = None) -> PerformanceTable:
+        """What the aircraft can do at an airspeed (m/s; the limits' own where none is given), for compiled functions.
 
-        (3, 8 + h): row 0 holds airspeed, tan(max_bank), wind speed, wind direction (towards, rad), gradient,
-        reference height, the number of table heights, the gusts' standard deviation; from column 8 on, rows 0..2 hold
-        the table's heights (m), climb and descent angles to the air (rad) at this airspeed.
+        Climb and descent are NaN where `Envelope.air_angles` knows none.
         """
-        speed = self.airspeed if airspeed is None else airspeed
-        heights = self.envelope.amsl
-        packed = np.zeros((3, 8 + heights.size))
-        wind = self.wind
-        packed[0, :8] = (
-            speed,
-            math.tan(self.max_bank),
-            wind.speed,
-            wind.from_course + math.pi,
-            wind.gradient,
-            wind.reference_amsl,
-            heights.size,
+        speed, heights, wind = self.airspeed if airspeed is None else airspeed, self.envelope.amsl, self.wind
+        angles = np.array([self.envelope.air_angles(speed, float(amsl)) for amsl in heights])
+        return PerformanceTable(
+            airspeed=float(speed),
+            tan_max_bank=math.tan(self.max_bank),
+            wind_speed=float(wind.speed),
+            wind_to=wind.from_course + math.pi,
+            wind_gradient=float(wind.gradient),
+            wind_reference_amsl=float(wind.reference_amsl),
             # sigma_w of MIL-F-8785C, which sigma_u meets at 300 m.
-            0.1 * W20[wind.turbulence],
+            gust_sigma=0.1 * W20[wind.turbulence],
+            amsl=heights,
+            climb=_locked(angles[:, 0]),
+            descent=_locked(angles[:, 1]),
         )
-        packed[0, 8:] = heights
-        for k, amsl in enumerate(heights):
-            packed[1:, 8 + k] = self.envelope.air_angles(speed, float(amsl))
-        return packed
+
+
+def derated(table: PerformanceTable, share: float) -> PerformanceTable:
+    """Give the same aircraft only this share of its climb and descent; an angle below 0, a loss of height, stays."""
+    climb, descent = (
+        _locked(np.where(angles > 0.0, share * angles, angles)) for angles in (table.climb, table.descent)
+    )
+    return table._replace(climb=climb, descent=descent)
+
+
+def _locked(values: Floats) -> Floats:
+    # Of one type for numba, whoever makes the table: contiguous and read-only.
+    out = np.array(values, dtype=np.float64)
+    out.setflags(write=False)
+    return out
 
 
 @inlined
-def wind_speed_at(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
+def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
     """Mean wind speed at a height, m/s."""
-    speed: float = max(0.0, packed[0, 2] + packed[0, 4] * (amsl - packed[0, 5]))
+    speed: float = max(0.0, table.wind_speed + table.wind_gradient * (amsl - table.wind_reference_amsl))
     return speed
 
 
 @inlined
-def ground_speed_on(packed: Floats, course: float, amsl: float) -> float:  # pragma: no cover - compiled
+def ground_speed_on(table: PerformanceTable, course: float, amsl: float) -> float:  # pragma: no cover - compiled
     """Ground speed on a course held against the mean wind, m/s; NaN where it cannot be held."""
-    wind = wind_speed_at(packed, amsl)
-    angle = packed[0, 3] - course
-    return ground_speed(packed[0, 0], wind * math.cos(angle), wind * math.sin(angle))
+    wind = wind_speed_at(table, amsl)
+    angle = table.wind_to - course
+    return ground_speed(table.airspeed, wind * math.cos(angle), wind * math.sin(angle))
 
 
 @inlined
-def downwind(packed: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cover - compiled
     """East and north of the unit vector that the wind blows towards."""
-    return math.sin(packed[0, 3]), math.cos(packed[0, 3])
+    return math.sin(table.wind_to), math.cos(table.wind_to)
 
 
 @compiled_views
 def slopes_along(
-    packed: Floats, tail_share: float, cross_share: float, amsl: float
+    table: PerformanceTable, tail_share: float, cross_share: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive over the ground, rad, with these shares of the wind along and across the course."""
-    count = int(packed[0, 6])
-    wind = wind_speed_at(packed, amsl)
+    count = table.amsl.size
+    wind = wind_speed_at(table, amsl)
     k = 0
-    while k + 2 < count and packed[0, 9 + k] <= amsl:
+    while k + 2 < count and table.amsl[k + 1] <= amsl:
         k += 1
     # By hand: numba's np.interp of one number costs a microsecond.
-    share = min(1.0, max(0.0, (amsl - packed[0, 8 + k]) / (packed[0, 9 + k] - packed[0, 8 + k])))
-    climb = packed[1, 8 + k] + share * (packed[1, 9 + k] - packed[1, 8 + k])
-    dive = packed[2, 8 + k] + share * (packed[2, 9 + k] - packed[2, 8 + k])
-    up = ground_slope(climb, packed[0, 0], wind * tail_share, wind * cross_share)
-    down = ground_slope(dive, packed[0, 0], wind * tail_share, wind * cross_share)
+    share = min(1.0, max(0.0, (amsl - table.amsl[k]) / (table.amsl[k + 1] - table.amsl[k])))
+    climb = table.climb[k] + share * (table.climb[k + 1] - table.climb[k])
+    dive = table.descent[k] + share * (table.descent[k + 1] - table.descent[k])
+    up = ground_slope(climb, table.airspeed, wind * tail_share, wind * cross_share)
+    down = ground_slope(dive, table.airspeed, wind * tail_share, wind * cross_share)
     if math.isnan(up) or math.isnan(down):
         return 0.0, 0.0
     return up, down
 
 
 @compiled_views
-def aircraft_slopes(packed: Floats, course: float, amsl: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def aircraft_slopes(
+    table: PerformanceTable, course: float, amsl: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive over the ground on this course, rad, both positive; (0, 0) where no way is made."""
-    angle = packed[0, 3] - course
-    return slopes_along(packed, math.cos(angle), math.sin(angle), amsl)
+    angle = table.wind_to - course
+    return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
 
 
 @compiled_views
 def _turn_radius(
-    packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
+    table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
     """Arc radius between the unit courses u and v; w: downwind; side: of the turn, 0 for one flown either way."""
-    wind = wind_speed_at(packed, amsl)
+    wind = wind_speed_at(table, amsl)
     if wind == 0.0:
         # No way to be blown: the same speed on every course.
-        fastest = packed[0, 0]
+        fastest = table.airspeed
     else:
-        before = ground_speed(packed[0, 0], wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
-        after = ground_speed(packed[0, 0], wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
+        before = ground_speed(table.airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx))
+        after = ground_speed(table.airspeed, wind * (vx * wx + vy * wy), wind * (vx * wy - vy * wx))
         if math.isnan(before) or math.isnan(after):
             return math.inf
         fastest = max(before, after)
         # The highest ground speed is downwind, if the turn passes through that course.
         if side == 0.0 or (side * (ux * wy - uy * wx) > 0.0 and side * (wx * vy - wy * vx) > 0.0):
-            fastest = max(fastest, packed[0, 0] + wind)
-    fastest += packed[0, 7]
-    radius: float = fastest * fastest / (GRAVITY * packed[0, 1])
+            fastest = max(fastest, table.airspeed + wind)
+    fastest += table.gust_sigma
+    radius: float = fastest * fastest / (GRAVITY * table.tan_max_bank)
     return radius
 
 
 @compiled_views
 def turn_radius_between(
-    packed: Floats, course_in: float, course_out: float, amsl: float
+    table: PerformanceTable, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
     """Arc radius at the bank limit for the highest ground speed between two courses; inf where one cannot be held.
 
@@ -163,15 +200,15 @@ def turn_radius_between(
     """
     turn = wrap(course_out - course_in)
     ux, uy, vx, vy = math.sin(course_in), math.cos(course_in), math.sin(course_out), math.cos(course_out)
-    wx, wy = downwind(packed)
+    wx, wy = downwind(table)
     # A U-turn may be flown either way.
     side = 0.0 if abs(turn) > math.pi - 1e-6 else (-1.0 if turn > 0.0 else 1.0)
-    return _turn_radius(packed, ux, uy, vx, vy, amsl, side, wx, wy)
+    return _turn_radius(table, ux, uy, vx, vy, amsl, side, wx, wy)
 
 
 @compiled_views
 def corner_tangent(
-    packed: Floats, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
+    table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Length of leg that the fly-by arc between the unit courses u and v takes on either side, and its radius, m.
 
@@ -182,7 +219,7 @@ def corner_tangent(
         return 0.0, 0.0
     if abs(cross) < 1e-6 and dot < 0.0:
         return math.inf, 0.0
-    radius = _turn_radius(packed, ux, uy, vx, vy, amsl, cross, wx, wy)
+    radius = _turn_radius(table, ux, uy, vx, vy, amsl, cross, wx, wy)
     return radius * abs(cross) / (1.0 + dot), radius
 
 
@@ -212,36 +249,43 @@ def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
 
 
 @compiled
-def turn_tangents(packed: Floats, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
+def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:  # pragma: no cover - compiled
     """Length of leg that the fly-by arc at each waypoint uses on either side, (w,) m; 0 at the ends.
 
     waypoints: (w, 3).  R tan(theta/2); a U-turn has no tangent point and gets inf.
     """
     count = waypoints.shape[0]
     out = np.zeros(count)
-    wx, wy = downwind(packed)
+    wx, wy = downwind(table)
     for i in range(1, count - 1):
         ux, uy = waypoints[i, 0] - waypoints[i - 1, 0], waypoints[i, 1] - waypoints[i - 1, 1]
         vx, vy = waypoints[i + 1, 0] - waypoints[i, 0], waypoints[i + 1, 1] - waypoints[i, 1]
         u, v = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
         if u > 1e-6 and v > 1e-6:
-            out[i], _ = corner_tangent(packed, ux / u, uy / u, vx / v, vy / v, waypoints[i, 2], wx, wy)
+            out[i], _ = corner_tangent(table, ux / u, uy / u, vx / v, vy / v, waypoints[i, 2], wx, wy)
     return out
 
 
 @compiled
 def reversal_room(
-    packed: Floats, ux: float, uy: float, amsl: float, radius_in: float, radius_out: float, wx: float, wy: float
+    table: PerformanceTable,
+    ux: float,
+    uy: float,
+    amsl: float,
+    radius_in: float,
+    radius_out: float,
+    wx: float,
+    wy: float,
 ) -> float:  # pragma: no cover - compiled
     """Length of leg (m) that rolling from a turn into one the other way round takes, between arcs of these radii (m).
 
     u: the leg's unit course.  w: `downwind`.  0 where the wind leaves no way along the leg.
     """
-    wind = wind_speed_at(packed, amsl)
-    speed = ground_speed(packed[0, 0], wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + packed[0, 7]
+    wind = wind_speed_at(table, amsl)
+    speed = ground_speed(table.airspeed, wind * (ux * wx + uy * wy), wind * (ux * wy - uy * wx)) + table.gust_sigma
     if math.isnan(speed):
         return 0.0
     pull = speed * speed / GRAVITY
-    roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(packed[0, 1])
+    roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(table.tan_max_bank)
     room: float = speed * ROLL_TIME * max(0.0, roll)
     return room

@@ -1,27 +1,38 @@
-"""The aircraft of a scenario and what it can do: what a plan needs of it, without flight and logs."""
+"""The aircraft of a scenario and the limits it flies within: what a plan needs of it, without simulation and logs."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
-from aircraft.envelope import Envelope
+from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
+from flight.simulation.flight_setup import make_limits
 from world.errors import ScenarioError
 from world.scenario import Scenario
 
 
 @dataclass(frozen=True, slots=True)
 class Airframe:
-    """The aircraft of a scenario and what it can do.
+    """The aircraft of a scenario, loaded once for all that plan, fly and judge.
 
-    airspeed: m/s.  max_bank: rad.  battery: Wh.
+    aircraft: its entry in the catalog.
+    limits: of scenario and aircraft together; they hold the envelope.
+    battery: energy carried, Wh.
     """
 
     aircraft: Aircraft
-    envelope: Envelope
-    airspeed: float
-    max_bank: float
+    limits: Limits
     battery: float
+
+    @property
+    def airspeed(self) -> float:
+        """Airspeed until a mission sets another, m/s."""
+        return self.limits.airspeed
+
+    @property
+    def max_bank(self) -> float:
+        """Steepest bank in turns, rad."""
+        return self.limits.max_bank
 
 
 def choose_seed(scenario: Scenario, seed: int | None) -> int:
@@ -32,7 +43,15 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 
 
 def load_airframe(scenario: Scenario) -> Airframe:
-    """The scenario's aircraft.  Raises ScenarioError for an unknown one or a speed it cannot fly."""
+    """The scenario's aircraft, its envelope, and the limits that both set.
+
+    Raises ScenarioError for an unknown aircraft, a speed that it cannot fly, or a wind that leaves it no way.
+
+    >>> from world.scenario import load_scenario
+    >>> airframe = load_airframe(load_scenario("tight"))
+    >>> airframe.aircraft.name, airframe.airspeed, airframe.limits.min_clearance
+    ('aerosonde', 25.0, 60.0)
+    """
     table = scenario.flight
     try:
         aircraft = find_aircraft(table.aircraft)
@@ -52,4 +71,11 @@ def load_airframe(scenario: Scenario) -> Airframe:
         )
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
-    return Airframe(aircraft, envelope, airspeed, min(math.radians(table.max_bank_deg), envelope.max_bank), battery)
+    return Airframe(aircraft, make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg)), battery)
+
+
+def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
+    """The same aircraft within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
+    old = airframe.limits
+    limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
+    return replace(airframe, limits=limits)

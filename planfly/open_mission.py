@@ -46,11 +46,11 @@ def open_mission(
     if scenario_name is not None:
         scenario = load_scenario(scenario_name, terrain)
     else:
-        scenario = implied_scenario(mission, terrain, on_the_spot=True)
+        scenario = implied_scenario(mission, terrain, vertical_legs=True)
     scenario = change(scenario)
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
-    return OpenedMission(make_setup(scenario, airframe, mission, number, on_the_spot=True), airframe, path.stem)
+    return OpenedMission(make_setup(scenario, airframe, mission, number, vertical_legs=True), airframe, path.stem)
 
 
 def _open_plan(

@@ -9,7 +9,7 @@ from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.mission.routing import make_route
 from flight.mission_files.formats import mission_text
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from logs.recording.reader import LogEvent
@@ -61,8 +61,7 @@ def make_plan(
     scenario: Scenario, airframe: Airframe, seed: int, algorithm: str | None = None, advance: Advance | None = None
 ) -> Plan:
     """Plan within the scenario's and the aircraft's limits."""
-    limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
-    return plan_path(scenario, limits, seed=seed, algorithm=algorithm, progress=advance)
+    return plan_path(scenario, airframe.limits, seed=seed, algorithm=algorithm, progress=advance)
 
 
 def make_setup(
@@ -72,16 +71,16 @@ def make_setup(
     seed: int,
     *,
     plan: Plan | None = None,
-    on_the_spot: bool = False,
+    vertical_legs: bool = False,
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario.
 
-    on_the_spot: of `flight.mission.routing.make_route`.
+    vertical_legs: as for `flight.mission.routing.make_route`.
     """
-    limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
+    limits = airframe.limits
     fly_over = scenario.flight.fly_over
     route = make_route(
-        mission, scenario.origin, scenario.terrain, airframe.airspeed, fly_over, limits, on_the_spot=on_the_spot
+        mission, scenario.origin, scenario.terrain, airframe.airspeed, fly_over, limits, vertical_legs=vertical_legs
     )
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
@@ -89,10 +88,8 @@ def make_setup(
         mission=mission,
         mission_text=mission_text(mission, "waypoints"),
         route=route,
-        envelope=airframe.envelope,
+        limits=limits,
         aircraft=airframe.aircraft.name,
-        airspeed=airframe.airspeed,
-        max_bank=airframe.max_bank,
         battery=airframe.battery,
         seed=seed,
         plan=plan,

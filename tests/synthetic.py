@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY, Envelope
 from flight.mission.items import Mission
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import Track
 from world.geometry import leg_courses, leg_runs, signed_turns
 from world.scenario import Scenario, from_spec
@@ -104,15 +104,14 @@ def make_setup(
         items=np.arange(len(points)),
         started="trimmed at the first waypoint, on course to the second",
     )
+    scenario = scenario or make_scenario(points, **world)
     return FlightSetup(
-        scenario=scenario or make_scenario(points, **world),
+        scenario=scenario,
         mission=Mission(None, ()),
         mission_text="",
         route=route,
-        envelope=table or envelope(),
+        limits=make_limits(scenario, table or envelope(), airspeed, math.radians(bank_deg)),
         aircraft="aerosonde",
-        airspeed=airspeed,
-        max_bank=math.radians(bank_deg),
         battery=100.0,
         seed=1,
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.flight_process import Ready
+from flight.live.flight_process import MissionJudged
 from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, LOITER, MANUAL, MODE_NAMES, NO_MISSION, NOT_STARTED
 
 # param2 of MAV_CMD_COMPONENT_ARM_DISARM that forces it: MAVLink's number, and the one that MAVProxy sends to arm.
@@ -14,28 +14,32 @@ IN_PROGRESS, UNSUPPORTED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_UN
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
-    """MAV_RESULT, and words for the stations ("" for none)."""
+class CommandResult:
+    """MAV_RESULT of a command, and a text for the stations ("" for none)."""
 
     result: int
     text: str = ""
 
 
 @dataclass(slots=True)
-class Pilot:
+class ArmingState:
     """The vehicle's state as its commands see it.
 
-    judging: a verdict on the mission is on its way.  ready: the last one; None without a mission.  force: PFLY_FORCE.
-    stop_asked: the flight is to be ended.
+    mode: ArduPlane's number.
+    judging: a verdict on the mission is on its way.
+    judged: the last verdict; None without a mission.
+    force: PFLY_FORCE.
+    end_requested: the flight is to be ended.
+    mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
     mode: int = MANUAL
     armed: bool = False
     flying: bool = False
     judging: bool = False
-    ready: Ready | None = None
+    judged: MissionJudged | None = None
     force: bool = False
-    stop_asked: bool = False
+    end_requested: bool = False
     mission_state: int = NO_MISSION
 
     @property
@@ -46,62 +50,64 @@ class Pilot:
     @property
     def starts(self) -> bool:
         """Whether the flight is to be started: armed, in AUTO, and judged."""
-        return self.armed and self.mode == AUTO and not self.flying and not self.judging and self.ready is not None
+        return self.armed and self.mode == AUTO and not self.flying and not self.judging and self.judged is not None
 
-    def arm(self, on: bool, param2: float) -> Answer:
+    def arm(self, on: bool, param2: float) -> CommandResult:
         """Arm or disarm (MAV_CMD_COMPONENT_ARM_DISARM).  IN_PROGRESS: ask again when the verdict is there."""
         forced = param2 in _FORCED
         if not on:
             if self.flying and not forced:
-                return Answer(
+                return CommandResult(
                     DENIED, "in flight: a forced disarm (param2 21196; MAVProxy: disarm force) ends the flight"
                 )
-            self.stop_asked = self.flying
+            self.end_requested = self.flying
             self.armed = False
-            return Answer(ACCEPTED)
+            return CommandResult(ACCEPTED)
         if self.armed:
-            return Answer(ACCEPTED)
+            return CommandResult(ACCEPTED)
         if self.judging:
-            return Answer(IN_PROGRESS)
+            return CommandResult(IN_PROGRESS)
         reason = self._why_not_armed(forced)
         if reason:
-            return Answer(DENIED, f"arming denied: {reason}")
+            return CommandResult(DENIED, f"arming denied: {reason}")
         self.armed = True
-        return Answer(ACCEPTED, "" if self.mode == AUTO else "armed: AUTO starts the mission")
+        return CommandResult(ACCEPTED, "" if self.mode == AUTO else "armed: AUTO starts the mission")
 
-    def set_mode(self, mode: int) -> Answer:
+    def set_mode(self, mode: int) -> CommandResult:
         """Change to one of ArduPlane's modes."""
         if mode not in MODE_NAMES:
             known = mavlink.enums["PLANE_MODE"].get(mode)
             name = known.name.removeprefix("PLANE_MODE_") if known else f"mode {mode}"
-            return Answer(DENIED, f"{name} denied: this vehicle has MANUAL, LOITER and AUTO")
+            return CommandResult(DENIED, f"{name} denied: this vehicle has MANUAL, LOITER and AUTO")
         if self.flying and mode != AUTO:
-            return Answer(DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; a forced disarm ends the flight")
-        if mode == AUTO and self.ready is None and not self.judging:
-            return Answer(DENIED, "AUTO denied: no mission")
+            return CommandResult(
+                DENIED, f"{MODE_NAMES[mode]} denied: in flight only AUTO; a forced disarm ends the flight"
+            )
+        if mode == AUTO and self.judged is None and not self.judging:
+            return CommandResult(DENIED, "AUTO denied: no mission")
         self.mode = mode
-        return Answer(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
+        return CommandResult(ACCEPTED, "AUTO: arming starts the mission" if mode == AUTO and not self.armed else "")
 
-    def start(self) -> Answer:
+    def start(self) -> CommandResult:
         """MAV_CMD_MISSION_START."""
         if not self.armed:
-            return Answer(DENIED, "start denied: not armed")
+            return CommandResult(DENIED, "start denied: not armed")
         return self.set_mode(AUTO)
 
-    def hold(self, on: bool) -> Answer:
+    def pause(self, goes_on: bool) -> CommandResult:
         """MAV_CMD_DO_PAUSE_CONTINUE: a flight cannot be paused."""
-        return (
-            Answer(ACCEPTED) if on else Answer(DENIED, "pause denied: a flight is evidence only if it is flown through")
-        )
+        if goes_on:
+            return CommandResult(ACCEPTED)
+        return CommandResult(DENIED, "pause denied: a flight is evidence only if it is flown through")
 
-    def uploaded(self) -> None:
+    def mission_uploaded(self) -> None:
         """A mission has come and is being judged."""
         self.judging, self.mission_state = True, NOT_STARTED
 
-    def judged(self, ready: Ready) -> str:
+    def mission_judged(self, judged: MissionJudged) -> str:
         """Take a verdict; why the vehicle was disarmed, "" if it was not."""
         self.judging = False
-        self.ready = ready
+        self.judged = judged
         self.mission_state = NOT_STARTED
         reason = self._why_not_armed(False)
         if self.armed and reason:
@@ -109,30 +115,30 @@ class Pilot:
             return f"disarmed: {reason}"
         return ""
 
-    def cleared(self) -> None:
+    def mission_cleared(self) -> None:
         """The mission is gone."""
-        self.judging, self.ready, self.mission_state = False, None, NO_MISSION
+        self.judging, self.judged, self.mission_state = False, None, NO_MISSION
         if self.mode == AUTO:
             self.mode = MANUAL
 
-    def took_off(self) -> None:
+    def flight_started(self) -> None:
         """The flight has started."""
         self.flying, self.mission_state = True, ACTIVE
 
-    def ended(self, completed: bool) -> None:
+    def flight_ended(self, completed: bool) -> None:
         """The flight is over: disarmed, ready to be flown again."""
-        self.flying = self.armed = self.stop_asked = False
+        self.flying = self.armed = self.end_requested = False
         self.mode = MANUAL
         self.mission_state = COMPLETE if completed else NOT_STARTED
 
     def _why_not_armed(self, forced: bool) -> str:
-        if self.ready is None:
+        if self.judged is None:
             return ""
-        if not self.ready.possible:
+        if not self.judged.possible:
             return "the mission cannot be flown"
-        if not (self.ready.flyable or self.force or forced):
+        if not (self.judged.flyable or self.force or forced):
             return "the mission is judged not flyable; set PFLY_FORCE 1 to fly it all the same"
         return ""
 
 
-__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "UNSUPPORTED", "Answer", "Pilot"]
+__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "UNSUPPORTED", "ArmingState", "CommandResult"]

@@ -6,61 +6,64 @@ from typing import Any
 
 from flight.live.link import Link, Peer
 from flight.live.parameters import RATE, Parameters
-from flight.live.telemetry import Status, heartbeat, status_texts, telemetry_message
+from flight.live.status_text import INFO, status_texts
+from flight.live.telemetry import Status, heartbeat, telemetry_message
 
-INFO, NOTICE, WARNING, CRITICAL = 6, 5, 4, 2
 # A message that is late by more than this (s) is not made up for.
 _LATE = 0.5
-# Between heartbeats, and between looks at a message that nobody wants, s.
+# Between heartbeats, and between checks of a message that a station has switched off, s.
 _SECOND = 1.0
 
-Tell = Callable[[str], None]
+# Shows a text to a person at the terminal.
+ShowText = Callable[[str], None]
 
 
 class Downlink:
-    """Sends to every station that has been heard.
+    """Sends to every station that has sent a heartbeat.
 
-    tell: is given each text too, for a person at the terminal.  pause: how long the caller sleeps at most, s.
+    show: gets each text too.  pause: how long the caller sleeps at most, s.
     """
 
-    def __init__(self, link: Link, status: Status, parameters: Parameters, tell: Tell, pause: float) -> None:
+    def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
         """Send the first heartbeat at once."""
         self._link = link
         self._status = status
         self._parameters = parameters
-        self._tell = tell
+        self._show = show
         self._pause = pause
         self._texts = 0
-        self._next_hello = time.monotonic()
+        self._next_heartbeat = time.monotonic()
 
-    def say(self, text: str, severity: int = INFO) -> None:
-        """Tell every station, and the terminal."""
-        self._tell(text)
+    def send_text(self, text: str, severity: int = INFO) -> None:
+        """Send a text to every station, and show it at the terminal."""
+        self._show(text)
         self._texts = self._texts % 65535 + 1
         for peer in self._link.peers.values():
             for piece in status_texts(text, severity, self._texts):
                 self._link.send(piece, peer)
 
-    def to_all(self, message: Any) -> None:
+    def send_to_all(self, message: Any) -> None:
         """Send one message to every station."""
         for peer in self._link.peers.values():
             self._link.send(message, peer)
 
-    def hello_now(self) -> None:
-        """Send the next heartbeat at once: what it says has changed."""
-        self._next_hello = time.monotonic()
+    def heartbeat_now(self) -> None:
+        """Send the next heartbeat at once: its contents have changed."""
+        self._next_heartbeat = time.monotonic()
 
     def wait(self, now: float, patience: float) -> float:
-        """Give the time until something is due, s, at most ``patience``."""
+        """Return the time until something is due, s, at most ``patience``."""
         due = min((at for peer in self._link.peers.values() for at in peer.due.values()), default=now + patience)
-        return max(0.0, min(patience, due - now, self._next_hello - now))
+        return max(0.0, min(patience, due - now, self._next_heartbeat - now))
 
     def tick(self, now: float) -> None:
         """Send what is due."""
-        if now >= self._next_hello:
-            self._next_hello = now + _SECOND if now - self._next_hello > _LATE else self._next_hello + _SECOND
+        if now >= self._next_heartbeat:
+            self._next_heartbeat = (
+                now + _SECOND if now - self._next_heartbeat > _LATE else self._next_heartbeat + _SECOND
+            )
             self._link.forget_silent()
-            self._link.hello(heartbeat(self._status))
+            self._link.send_heartbeat(heartbeat(self._status))
         for peer in self._link.peers.values():
             self._telemetry(peer, now)
             self._stream_parameters(peer)

@@ -1,7 +1,21 @@
 """The process that flies: JSBSim holds the interpreter's lock while it steps, so the link lives in another one.
 
-Orders come in over a pipe and answers go back: a moment of flight as packed bytes, everything else pickled.  Both ends
-are ours; nothing that a station sends is ever unpickled.
+Orders come in over a pipe and events go back: a state snapshot as packed bytes, everything else pickled.  Both ends are
+ours; nothing that a station sends is ever unpickled.
+
+| order | what it asks for |
+|---|---|
+| `JudgeMission` | a verdict on a mission, without a flight |
+| `StartFlight` | the flight of the mission that was judged last |
+| `EndFlight` | the end of the flight, or of the process |
+
+| event | when it is sent |
+|---|---|
+| `ProcessReady` | once, before the first order is read |
+| `MissionJudged` | for each `JudgeMission` |
+| `flight.live.snapshot.Snapshot` | in flight, `SNAPSHOT_RATE` times a second |
+| `FlightEnded` | when the aircraft stops |
+| `FlightJudged` | when its log is closed |
 """
 
 import pickle
@@ -14,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
-from flight.live.snapshot import Moment, Watcher
+from flight.live.snapshot import Snapshot, SnapshotMaker
+from flight.live.status_text import CRITICAL, StatusText
 from flight.mission.items import Home, Mission
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import TICK, Flight, as_track
@@ -23,73 +38,80 @@ from world.errors import PlanflyError
 
 Floats = NDArray[np.float64]
 
-# Moments a second that are told; the log is handed to the operating system this often, s.
-MOMENTS = 60.0
-FLUSH = 0.2
+# Snapshots a second that are sent; the log is handed to the operating system this often, s.
+SNAPSHOT_RATE = 60.0
+FLUSH_PERIOD = 0.2
 # A machine that falls this far behind the clock (s) lets the flight run late rather than in one leap.
 _BEHIND = 0.5
-_MOMENT, _ANSWER = b"M", b"A"
-STOPPED, SHUT = "stopped by the ground station", "stopped: the vehicle was shut down"
-
-# Words for the stations: MAV_SEVERITY and text.
-Words = tuple[int, str]
+# First byte of what is sent: what follows is packed, or pickled.
+_PACKED, _PICKLED = b"S", b"E"
+STOPPED, SHUT_DOWN = "stopped by the ground station", "stopped: the vehicle was shut down"
 
 
 @dataclass(frozen=True, slots=True)
-class Judge:
-    """Order: judge a mission in the vehicle's scenario.  number: comes back with the answer."""
+class JudgeMission:
+    """Order: judge a mission in the vehicle's scenario.  number: comes back with the event."""
 
     mission: Mission
     number: int
 
 
 @dataclass(frozen=True, slots=True)
-class Fly:
+class StartFlight:
     """Order: fly the mission that was judged last."""
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
+class EndFlight:
     """Order: end the flight; with ``quit`` the process too."""
 
     quit: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class Ready:
-    """Answer to `Judge`.
+class ProcessReady:
+    """Event: the process runs, and its compiled code is loaded."""
 
-    possible: it can be started at all.  flyable: the verdict on its geometry.  items: seq of the item at each
-    waypoint, -1 for none.  start: where it starts; None if it is not possible.
+
+@dataclass(frozen=True, slots=True)
+class MissionJudged:
+    """Event: a mission has been judged.
+
+    number: of the order.
+    possible: whether the mission can be started at all.
+    flyable: the verdict on its geometry.
+    texts: what stations are sent about it.
+    home: the mission's, or the ground at its start; None if it is not possible.
+    items: seq of the item at each waypoint, -1 for none.
+    start: the aircraft where the flight starts; None if it is not possible.
     """
 
     number: int
     possible: bool
     flyable: bool
-    words: tuple[Words, ...]
+    texts: tuple[StatusText, ...]
     home: Home | None = None
     items: tuple[int, ...] = ()
-    start: Moment | None = None
+    start: Snapshot | None = None
 
 
 @dataclass(frozen=True, slots=True)
-class Up:
-    """The process is there, and its compiled code loaded."""
-
-
-@dataclass(frozen=True, slots=True)
-class Ended:
-    """The flight is over: "completed" or why not."""
+class FlightEnded:
+    """Event: the flight is over.  ended: "completed" or why not."""
 
     ended: str
 
 
 @dataclass(frozen=True, slots=True)
-class Landed:
-    """The flight has been judged and its log closed."""
+class FlightJudged:
+    """Event: the flight has been judged and its log closed.  texts: what stations are sent about it."""
 
     flyable: bool
-    words: tuple[Words, ...]
+    texts: tuple[StatusText, ...]
+
+
+Order = JudgeMission | StartFlight | EndFlight
+Event = ProcessReady | MissionJudged | FlightEnded | FlightJudged
 
 
 class LogSink(Protocol):
@@ -98,86 +120,105 @@ class LogSink(Protocol):
     def write(self, block: Track) -> None:
         """Append rows and hand them to the operating system."""
 
-    def finish(self, ended: str) -> Landed:
+    def finish(self, ended: str) -> FlightJudged:
         """Judge the flight and close the log."""
 
     def abandon(self) -> None:
         """Close the log of a flight that could not go on."""
 
 
-class Hangar(Protocol):
-    """What the application gives the process that flies."""
+class FlightFactory(Protocol):
+    """What the application gives the process that flies.  speed: times real time."""
 
     aircraft: Aircraft
     speed: float
 
-    def prepare(self, order: Judge) -> tuple[FlightSetup | None, Ready]:
+    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
         """Judge a mission; the setup is None where it cannot be flown."""
 
     def open_log(self, setup: FlightSetup) -> LogSink:
         """Open the log of the next flight."""
 
 
-def serve_flights(connection: Connection, hangar: Hangar) -> None:
-    """Judge and fly as ordered, until the other end closes or says so."""
+def serve_flights(connection: Connection, factory: FlightFactory) -> None:
+    """Judge and fly as ordered, until the other end closes or orders the process to end.
+
+    connection: the flying end of a `multiprocessing.Pipe`; orders are pickled into the other end, and `read_event`
+    reads what comes out of it.
+
+    >>> from multiprocessing import Pipe
+    >>> link_end, flying_end = Pipe()
+    >>> link_end.send(EndFlight(quit=True))
+    >>> serve_flights(flying_end, factory=None)  # an order to quit asks nothing of the factory
+    """
     setup: FlightSetup | None = None
     try:
         while True:
             order = connection.recv()
-            if isinstance(order, Judge):
-                setup, ready = hangar.prepare(order)
-                answer(connection, ready)
-            elif isinstance(order, Fly) and setup is not None:
-                if not _fly(connection, setup, hangar):
+            if isinstance(order, JudgeMission):
+                setup, judged = factory.prepare(order)
+                send_event(connection, judged)
+            elif isinstance(order, StartFlight) and setup is not None:
+                if not _fly(connection, setup, factory):
                     return
-            elif isinstance(order, Stop) and order.quit:
+            elif isinstance(order, EndFlight) and order.quit:
                 return
     except (EOFError, BrokenPipeError, ConnectionResetError):
         # The link is gone, and with it all who watched; the log is closed on the way here.
         return
 
 
-def answer(connection: Connection, what: Up | Ready | Ended | Landed) -> None:
-    """Send an answer to the link."""
-    connection.send_bytes(_ANSWER + pickle.dumps(what))
+def send_event(connection: Connection, event: Event) -> None:
+    """Send an event to the link; `read_event` reads it there.
+
+    >>> from multiprocessing import Pipe
+    >>> link_end, flying_end = Pipe()
+    >>> send_event(flying_end, FlightEnded("completed"))
+    >>> read_event(link_end.recv_bytes())
+    FlightEnded(ended='completed')
+    """
+    connection.send_bytes(_PICKLED + pickle.dumps(event))
 
 
-def read_answer(data: bytes) -> Moment | Up | Ready | Ended | Landed:
+def read_event(data: bytes) -> Snapshot | Event:
     """Read what the flying process sent."""
-    if data[:1] == _MOMENT:
-        return Moment.unpack(data[1:])
-    found: Up | Ready | Ended | Landed = pickle.loads(data[1:])
+    if data[:1] == _PACKED:
+        return Snapshot.unpack(data[1:])
+    found: Event = pickle.loads(data[1:])
     return found
 
 
-def _fly(connection: Connection, setup: FlightSetup, hangar: Hangar) -> bool:
+def _fly(connection: Connection, setup: FlightSetup, factory: FlightFactory) -> bool:
     """Fly in step with the clock; False when the process is to end."""
     try:
-        flight = Flight(setup, hangar.aircraft)
-        log = hangar.open_log(setup)
+        flight = Flight(setup, factory.aircraft)
+        log = factory.open_log(setup)
     except (PlanflyError, OSError) as error:
-        answer(connection, Ended(f"not started: {error}"))
-        answer(connection, Landed(False, ((2, f"flight not started: {error}"),)))
+        send_event(connection, FlightEnded(f"not started: {error}"))
+        send_event(connection, FlightJudged(False, (StatusText(f"flight not started: {error}", CRITICAL),)))
         return True
-    watcher = Watcher(setup)
+    snapshots = SnapshotMaker(setup)
     try:
-        ended, go_on = _in_step(connection, flight, watcher, log, hangar.speed)
+        ended, go_on = _in_step(connection, flight, snapshots, log, factory.speed)
         if go_on:
-            answer(connection, Ended(ended))
-        landed = log.finish(ended)
+            send_event(connection, FlightEnded(ended))
+        judged = log.finish(ended)
     except OSError as error:
         log.abandon()
         # A pipe that broke ends the process; a full disk ends the flight.
         if isinstance(error, BrokenPipeError | ConnectionResetError):
             raise
-        answer(connection, Ended(f"log: {error.strerror}"))
-        landed = Landed(False, ((2, f"flight ended: its log cannot be written: {error.strerror}"),))
+        send_event(connection, FlightEnded(f"log: {error.strerror}"))
+        text = f"flight ended: its log cannot be written: {error.strerror}"
+        judged = FlightJudged(False, (StatusText(text, CRITICAL),))
         go_on = True
-    answer(connection, landed)
+    send_event(connection, judged)
     return go_on
 
 
-def _in_step(connection: Connection, flight: Flight, watcher: Watcher, log: LogSink, speed: float) -> tuple[str, bool]:
+def _in_step(
+    connection: Connection, flight: Flight, snapshots: SnapshotMaker, log: LogSink, speed: float
+) -> tuple[str, bool]:
     """Step the flight by the clock: how it ended, and whether the process goes on."""
     clock = time.monotonic
     started = begun = clock()
@@ -196,20 +237,20 @@ def _in_step(connection: Connection, flight: Flight, watcher: Watcher, log: LogS
             ticks += due
             if len(rows):
                 pending.append(rows)
-                connection.send_bytes(_MOMENT + watcher.moment(rows[-1]).pack())
+                connection.send_bytes(_PACKED + snapshots.snapshot(rows[-1]).pack())
         if connection.poll():
             order = _order(connection)
-            if isinstance(order, Stop):
-                ended = ended or (SHUT if order.quit else STOPPED)
+            if isinstance(order, EndFlight):
+                ended = ended or (SHUT_DOWN if order.quit else STOPPED)
                 go_on = not order.quit
-        if pending and (ended or now - flushed >= FLUSH):
+        if pending and (ended or now - flushed >= FLUSH_PERIOD):
             log.write(as_track(np.concatenate(pending)))
             pending.clear()
             flushed = now
         if not ended:
             beat += 1
-            time.sleep(max(0.0, begun + beat / MOMENTS - clock()))
-            beat = max(beat, int((clock() - begun) * MOMENTS))
+            time.sleep(max(0.0, begun + beat / SNAPSHOT_RATE - clock()))
+            beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
     return ended, go_on
 
 
@@ -217,4 +258,4 @@ def _order(connection: Connection) -> object:
     try:
         return connection.recv()
     except EOFError:
-        return Stop(quit=True)
+        return EndFlight(quit=True)

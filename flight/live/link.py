@@ -1,6 +1,6 @@
 """The vehicle's link: one UDP socket, and the stations that it talks to.
 
-A station is told more than heartbeats only after it has sent a sound HEARTBEAT, from an address that is allowed, and
+A station gets more than heartbeats only after it has sent a valid HEARTBEAT, from an address that is allowed, and
 signed where a key is set.  The table of stations is bounded; one that falls silent leaves it.
 """
 
@@ -63,7 +63,16 @@ class Access:
 
 
 def check_access(access: Access) -> None:
-    """Raise FlightError for a vehicle that could be reached, or would send, beyond loopback without protection."""
+    """Check that whoever can reach the vehicle from another machine is protected against.
+
+    Beyond loopback, an address to listen at needs a key or a list of allowed addresses, and one to send to needs a key
+    or must be on that list.  Raises FlightError, which names the option to give.
+
+    >>> check_access(Access(("127.0.0.1", 14551), (("127.0.0.1", 14550),)))
+    >>> check_access(Access(("0.0.0.0", 14551), ()))
+    Traceback (most recent call last):
+    world.errors.FlightError: --bind 0.0.0.0:14551: beyond this machine: give --sign-key FILE or --allow IP,IP, ...
+    """
     for name, (host, port) in (("--bind", access.bind), *(("--to", address) for address in access.to)):
         if is_loopback(host) or access.key is not None:
             continue
@@ -194,7 +203,7 @@ class Link:
         """Send a message to a peer.  What the network does not take is lost, as on any radio."""
         self._transmit(message.pack(peer.mav), peer.mav, peer.address)
 
-    def hello(self, message: Any) -> None:
+    def send_heartbeat(self, message: Any) -> None:
         """Send a HEARTBEAT to where stations are expected, and to every peer."""
         for address, mav in self._hello.items():
             if address not in self.peers:

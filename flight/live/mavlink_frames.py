@@ -17,7 +17,7 @@ MOST_FRAMES = 64
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class MavlinkFrame:
     """One frame with a good checksum.  raw: all of it.  signed: whether a signature is attached, good or not."""
 
     raw: bytes
@@ -28,12 +28,12 @@ class Frame:
 
 
 class Decoder:
-    """Decodes frames of the dialect.  Bytes that are no frame, or no sound one, give nothing."""
+    """Decodes frames of the dialect.  Bytes that are no frame, or a damaged one, give nothing."""
 
     def __init__(self) -> None:
         self._mav = mavlink.MAVLink(None)
 
-    def message(self, frame: Frame) -> Any | None:
+    def message(self, frame: MavlinkFrame) -> Any | None:
         """Message of a frame, None where it cannot be read."""
         try:
             return self._mav.decode(bytearray(frame.raw))
@@ -41,9 +41,9 @@ class Decoder:
             return None
 
 
-def split_frames(data: bytes) -> list[Frame]:
-    """Sound frames in a datagram, in order; a damaged one is skipped to the next that is whole."""
-    found: list[Frame] = []
+def split_frames(data: bytes) -> list[MavlinkFrame]:
+    """Whole frames in a datagram, in order; a damaged one is skipped to the next that is whole."""
+    found: list[MavlinkFrame] = []
     data = data[:LARGEST]
     at = 0
     while at < len(data) and len(found) < MOST_FRAMES:
@@ -56,7 +56,7 @@ def split_frames(data: bytes) -> list[Frame]:
     return found
 
 
-def _frame_at(data: bytes, at: int) -> Frame | None:
+def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
     """Frame that starts at an offset, None where none does."""
     modern = data[at] == MAGIC_V2
     head = 10 if modern else 6
@@ -82,4 +82,4 @@ def _frame_at(data: bytes, at: int) -> Frame | None:
     crc.accumulate(bytes([kind.crc_extra]))
     if crc.crc != _CRC.unpack_from(data, end - 2)[0]:
         return None
-    return Frame(data[at:size], number, system, component, bool(flags))
+    return MavlinkFrame(data[at:size], number, system, component, bool(flags))

@@ -1,7 +1,7 @@
 """The vehicle's side of the MAVLink mission protocol, as a state machine: no socket, no clock of its own.
 
 A mission, a fence and rally points are each taken whole or not at all: an upload is collected beside the list that is
-there and replaces it only when its last item is in and every item is sound.  One station uploads at a time; another is
+there and replaces it only when its last item is in and every item is valid.  One station uploads at a time; another is
 denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)
 """
 
@@ -47,8 +47,8 @@ class Station:
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
-    """A message for one station; or, with ``text``, words for all of them as well."""
+class MissionReply:
+    """A message of the mission protocol for one station; text: for all of them as well, "" for none."""
 
     station: Station
     message: Any
@@ -103,7 +103,7 @@ class MissionServer:
     # Who finished which list last: its final ACK is repeated if its last item comes again.
     _finished: dict[MissionType, _Finished] = field(default_factory=dict)
 
-    def handle(self, message: Any, station: Station, now: float) -> list[Reply]:
+    def handle(self, message: Any, station: Station, now: float) -> list[MissionReply]:
         """Answer a message of the protocol; any other gets nothing.  ``now``: s, any clock that never goes back."""
         if message.get_type() in _HANDLERS and message.get_type() != "MISSION_ITEM_INT":
             self._moved_on(station)
@@ -118,16 +118,16 @@ class MissionServer:
         handler = _HANDLERS.get(message.get_type())
         return handler(self, message, station, kind, now) if handler else []
 
-    def tick(self, now: float) -> list[Reply]:
+    def tick(self, now: float) -> list[MissionReply]:
         """Ask again for what did not come, or may not have arrived; give up uploads that have gone silent."""
         replies = []
         for kind, upload in list(self._uploads.items()):
             if now - upload.heard > PATIENCE:
                 del self._uploads[kind]
-                words = (
+                text = (
                     f"{_NAMES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
                 )
-                replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, words))
+                replies.append(self._ack(upload.station, mavlink.MAV_MISSION_OPERATION_CANCELLED, kind, text))
             elif now - upload.asked >= upload.wait:
                 upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
                 upload.repeated = True
@@ -144,15 +144,15 @@ class MissionServer:
         """Whether an upload is in progress."""
         return bool(self._uploads)
 
-    def _count(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+    def _count(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         count = int(message.count)
         refusal = self._refusal(station, kind, now)
         if refusal:
             return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
         if count > MOST_UPLOADED:
-            words = f"{count} items: at most {MOST_UPLOADED} are stored"
-            return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, words)]
-        self._drop_rivals(station)
+            text = f"{count} items: at most {MOST_UPLOADED} are stored"
+            return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, text)]
+        self._drop_other_uploads(station)
         if count == 0:
             return self._clear(station, (kind,), kind, now)
         # A count always starts anew: a station that starts over with as many items must not have them mixed.
@@ -160,7 +160,7 @@ class MissionServer:
         self._finished.pop(kind, None)
         return [self._request(upload, kind, now)]
 
-    def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+    def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
@@ -192,20 +192,22 @@ class MissionServer:
         self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
 
-    def _float_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+    def _float_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
         if upload is None or upload.station != station:
             return []
-        words = "MISSION_ITEM carries positions as floats, up to 0.3 m off: MISSION_ITEM_INT is expected"
-        return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, words)]
+        text = "MISSION_ITEM carries positions as floats, up to 0.3 m off: MISSION_ITEM_INT is expected"
+        return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, text)]
 
-    def _list(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[Reply]:
+    def _list(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         count = len(self.lists[kind])
         return [
-            Reply(station, mavlink.MAVLink_mission_count_message(station.system, station.component, count, int(kind)))
+            MissionReply(
+                station, mavlink.MAVLink_mission_count_message(station.system, station.component, count, int(kind))
+            )
         ]
 
-    def _wanted(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[Reply]:
+    def _wanted(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         items = self.lists[kind]
         if not message.seq < len(items):
             return [self._ack(station, mavlink.MAV_MISSION_INVALID_SEQUENCE, kind)]
@@ -216,12 +218,12 @@ class MissionServer:
             seq=message.seq,
             mission_type=kind,
         )
-        return [Reply(station, item)]
+        return [MissionReply(station, item)]
 
-    def _clear_one(self, message: Any, station: Station, kind: MissionType, now: float) -> list[Reply]:
+    def _clear_one(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         return self._clear(station, (kind,), kind, now)
 
-    def _clear(self, station: Station, kinds: tuple[MissionType, ...], named: int, now: float) -> list[Reply]:
+    def _clear(self, station: Station, kinds: tuple[MissionType, ...], named: int, now: float) -> list[MissionReply]:
         for kind in kinds:
             refusal = self._refusal(station, kind, now)
             if refusal:
@@ -234,7 +236,7 @@ class MissionServer:
                 self.changed.add(kind)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
 
-    def _stopped(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[Reply]:
+    def _stopped(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         """Let a station that gives up (MISSION_ACK with an error) free the lock."""
         upload = self._uploads.get(kind)
         if upload is not None and upload.station == station and message.type != mavlink.MAV_MISSION_ACCEPTED:
@@ -255,26 +257,26 @@ class MissionServer:
                 return f"another station (system {upload.station.system}) is uploading"
         return ""
 
-    def _drop_rivals(self, station: Station) -> None:
+    def _drop_other_uploads(self, station: Station) -> None:
         """Forget the uploads of other stations, which have gone silent, when one takes the lock."""
         self._uploads = {kind: upload for kind, upload in self._uploads.items() if upload.station == station}
 
-    def _request(self, upload: _Upload, kind: MissionType, now: float) -> Reply:
+    def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
         upload.asked = now
         return _request(upload.station, len(upload.items), kind)
 
-    def _fail(self, upload: _Upload, kind: MissionType, result: int, words: str) -> Reply:
+    def _fail(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
         del self._uploads[kind]
-        return self._ack(upload.station, result, kind, f"{words}; nothing changed")
+        return self._ack(upload.station, result, kind, f"{text}; nothing changed")
 
-    def _ack(self, station: Station, result: int, kind: int, words: str = "") -> Reply:
+    def _ack(self, station: Station, result: int, kind: int, text: str = "") -> MissionReply:
         message = mavlink.MAVLink_mission_ack_message(station.system, station.component, result, int(kind))
-        return Reply(station, message, words)
+        return MissionReply(station, message, text)
 
 
-def _request(station: Station, seq: int, kind: MissionType) -> Reply:
+def _request(station: Station, seq: int, kind: MissionType) -> MissionReply:
     message = mavlink.MAVLink_mission_request_int_message(station.system, station.component, seq, int(kind))
-    return Reply(station, message)
+    return MissionReply(station, message)
 
 
 def _misplaced(item: MissionItem, kind: MissionType) -> str:

@@ -72,7 +72,21 @@ class Parameters:
 def vehicle_parameters(
     *, airspeed: float, slowest: float, fastest: float, max_bank_deg: float, system: int, speed: float
 ) -> Parameters:
-    """Make the parameters of a vehicle; speeds in m/s, ``speed`` times real time."""
+    """Parameters of a vehicle: ArduPilot's names, in the order of the alphabet.
+
+    airspeed, slowest, fastest: m/s.
+    max_bank_deg: degrees.
+    system: the vehicle's MAVLink system id.
+    speed: times real time.
+
+    >>> parameters = vehicle_parameters(
+    ...     airspeed=25.0, slowest=18.0, fastest=31.0, max_bank_deg=30.0, system=1, speed=1.0
+    ... )
+    >>> parameters["AIRSPEED_CRUISE"]
+    25.0
+    >>> parameters.set(b"AIRSPEED_MAX", 99.0)
+    (1, 'AIRSPEED_MAX is fixed by the aircraft or the scenario: 31 kept')
+    """
     return Parameters(
         [
             Parameter("AIRSPEED_CRUISE", airspeed),

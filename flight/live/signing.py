@@ -16,7 +16,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.generator.mavcrc import x25crc
 
-from flight.live.mavlink_frames import SIGNATURE, SIGNED, Frame
+from flight.live.mavlink_frames import SIGNATURE, SIGNED, MavlinkFrame
 from world.errors import FlightError
 
 # Timestamps count 10 us from 2015-01-01; a stream that is new may lag by a minute.
@@ -31,7 +31,15 @@ def read_key(path: Path) -> bytes:
     """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
 
     The hash is what MAVProxy's "signing setup" and Mission Planner make of a passphrase.  Raises FlightError for a file
-    that another user could read, or that is empty.
+    that another user could read, that cannot be read, or that holds fewer than 8 or more than 1024 bytes.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile() as file:  # made for its owner alone
+    ...     _ = file.write(b"correct horse battery")
+    ...     file.flush()
+    ...     key = read_key(Path(file.name))
+    >>> key.hex()[:16], len(key)
+    ('9028ea0d15decaa3', 32)
     """
     try:
         with path.open("rb") as file:
@@ -63,7 +71,7 @@ class Signing:
     newest: int = 0
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
-    def accepts(self, frame: Frame, wall: float) -> bool:
+    def accepts(self, frame: MavlinkFrame, wall: float) -> bool:
         """Whether a frame is signed with our key and newer than all before it in its stream.
 
         wall: s since 1970.  A frame with a bad signature leaves no trace.
@@ -78,7 +86,7 @@ class Signing:
         stream = (frame.system, frame.component, link)
         last = self._streams.get(stream)
         if last is None:
-            # By our clock, not by what others said: a station whose clock runs ahead locks nobody out.
+            # By our clock, not by others' timestamps: a station whose clock runs ahead locks nobody out.
             if stamp + _MOST_LAG < _stamp(wall) or len(self._streams) >= _MOST_STREAMS:
                 return False
         elif stamp <= last:

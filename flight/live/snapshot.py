@@ -1,8 +1,9 @@
-"""One moment of a flight as a ground station sees it, packed to pass between processes."""
+"""State snapshot of a flight for ground stations, packed to pass between processes."""
 
 import math
 import struct
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, fields, replace
+from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +15,14 @@ from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 
-_FORM = struct.Struct("<21d")
-
 
 @dataclass(frozen=True, slots=True)
-class Moment:
-    """Where the aircraft is and what it does; SI and radians, north and east true, heights AMSL.
+class Snapshot:
+    """Where the aircraft is and what it does at one time; SI and radians, north and east true, heights AMSL.
 
-    height: above ground, NaN where unknown.  energy: Wh used.  leg: the active one, -1 before the start.
+    height: above ground, NaN where unknown.  v_north, v_east, v_down: over the ground.  p, q, r: body rates.
+    throttle: 0..1.  wind_north, wind_east: the way the air moves.  current: A.  energy: Wh used.  leg: the active one,
+    -1 before the start.
     """
 
     time: float
@@ -29,73 +30,97 @@ class Moment:
     lon_deg: float
     amsl: float
     height: float
-    v_north: float
-    v_east: float
-    v_down: float
-    roll: float
-    pitch: float
-    yaw: float
-    p: float
-    q: float
-    r: float
-    airspeed: float
-    throttle: float
-    wind_north: float
-    wind_east: float
-    current: float
-    energy: float
-    leg: float
+    v_north: float = 0.0
+    v_east: float = 0.0
+    v_down: float = 0.0
+    roll: float = 0.0
+    pitch: float = 0.0
+    yaw: float = 0.0
+    p: float = 0.0
+    q: float = 0.0
+    r: float = 0.0
+    airspeed: float = 0.0
+    throttle: float = 0.0
+    wind_north: float = 0.0
+    wind_east: float = 0.0
+    current: float = 0.0
+    energy: float = 0.0
+    leg: float = -1.0
 
     def pack(self) -> bytes:
-        """Give the moment as bytes of one size."""
+        """Bytes of the snapshot, always as many.
+
+        >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
+        >>> Snapshot.unpack(parked.pack()) == parked
+        True
+        """
         return _FORM.pack(*astuple(self))
 
     @staticmethod
-    def unpack(data: bytes) -> "Moment":
-        """Read what `pack` gave.  Raises struct.error for another size."""
-        return Moment(*_FORM.unpack(data))
+    def unpack(data: bytes) -> "Snapshot":
+        """Snapshot of the bytes that `pack` gave.  Raises struct.error for another number of bytes."""
+        return Snapshot(*_FORM.unpack(data))
 
     @property
     def finite(self) -> bool:
-        """Whether it can be told to a station: a flight may end in numbers that are none."""
+        """Whether it can be sent to a station: a flight may end in numbers that are none."""
         return all(math.isfinite(value) for value in astuple(replace(self, height=0.0)))
 
 
-def _columns() -> dict[str, int]:
-    found, at = {}, 0
+_FORM = struct.Struct(f"<{len(fields(Snapshot))}d")
+
+
+def _named(row: Floats) -> SimpleNamespace:
+    """Fields of a flown row by name, as `flight.simulation.track.Track` names them."""
+    found, at = SimpleNamespace(), 0
     for name, width in COLUMNS.items():
-        found[name] = at
+        setattr(found, name, row[at] if width == 1 else row[at : at + width])
         at += width
     return found
 
 
-_AT = _columns()
+class SnapshotMaker:
+    """Makes snapshots of the rows of one flight.
 
-
-class Watcher:
-    """Makes moments of the rows of one flight, in the order of `flight.simulation.track.COLUMNS`."""
+    Positions become latitude and longitude, and vectors and courses on the map become true ones.
+    """
 
     def __init__(self, setup: FlightSetup) -> None:
         self._origin: GeoOrigin = setup.scenario.origin
         self._chart = Chart.around(setup)
 
-    def moment(self, row: Floats) -> Moment:
-        """Moment of a row (35,)."""
-        at = _AT
-        east, north, amsl = (float(value) for value in row[at["position"] : at["position"] + 3])
+    def snapshot(self, row: Floats) -> Snapshot:
+        """Snapshot of a flown row."""
+        return self._of_fields(_named(row))
+
+    def before_start(self, setup: FlightSetup) -> Snapshot:
+        """Snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
+        points = setup.route.waypoints
+        step = points[1] - points[0]
+        terrain = setup.scenario.terrain
+        ground = math.nan if terrain is None else float(terrain.height(points[0, 0], points[0, 1]))
+        row = _named(np.zeros(sum(COLUMNS.values())))
+        row.position = points[0]
+        row.attitude[2] = math.atan2(step[0], step[1])
+        row.clearance = points[0, 2] - ground
+        row.leg = -1.0
+        return self._of_fields(row)
+
+    def _of_fields(self, row: SimpleNamespace) -> Snapshot:
+        east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course and this.
         turn = self._chart.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
-        v_east, v_north, v_up = _turned(row[at["velocity"] : at["velocity"] + 3], turn)
-        wind_east, wind_north, _ = _turned(row[at["wind"] : at["wind"] + 3], turn)
-        roll, pitch, yaw = (float(value) for value in row[at["attitude"] : at["attitude"] + 3])
-        p, q, r = (float(value) for value in row[at["rates"] : at["rates"] + 3])
-        return Moment(
-            time=float(row[at["time"]]),
+        v_east, v_north, v_up = _turned(row.velocity, turn)
+        wind_east, wind_north, _ = _turned(row.wind, turn)
+        roll, pitch, yaw = (float(value) for value in row.attitude)
+        p, q, r = (float(value) for value in row.rates)
+        return Snapshot(
+            time=float(row.time),
             lat_deg=lat,
             lon_deg=lon,
             amsl=amsl,
-            height=float(row[at["clearance"]]),
+            height=float(row.clearance),
             v_north=v_north,
             v_east=v_east,
             v_down=-v_up,
@@ -105,28 +130,14 @@ class Watcher:
             p=p,
             q=q,
             r=r,
-            airspeed=float(row[at["airspeed"]]),
-            throttle=float(row[at["controls"] + 3]),
+            airspeed=float(row.airspeed),
+            throttle=float(row.controls[3]),
             wind_north=wind_north,
             wind_east=wind_east,
-            current=float(row[at["current"]]),
-            energy=float(row[at["energy"]]),
-            leg=float(row[at["leg"]]),
+            current=float(row.current),
+            energy=float(row.energy),
+            leg=float(row.leg),
         )
-
-    def before_start(self, setup: FlightSetup) -> Moment:
-        """Moment of an aircraft that waits at the route's start."""
-        points = setup.route.waypoints
-        step = points[1] - points[0]
-        row = np.zeros(sum(COLUMNS.values()))
-        row[_AT["position"] : _AT["position"] + 3] = points[0]
-        row[_AT["attitude"] + 2] = math.atan2(step[0], step[1])
-        terrain = setup.scenario.terrain
-        row[_AT["clearance"]] = (
-            math.nan if terrain is None else points[0, 2] - float(terrain.height(points[0, 0], points[0, 1]))
-        )
-        row[_AT["leg"]] = -1.0
-        return self.moment(row)
 
 
 def _turned(vector: Floats, turn: float) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from flight.live.mavlink_items import MissionType
-from flight.mission.items import FENCES, Command, Home, Mission, MissionItem, is_located, renumbered
+from flight.mission.items import AMSL, FENCES, Command, Frame, Home, Mission, MissionItem, is_located, renumbered
 
 
 def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tuple[Mission, int]:
@@ -35,13 +35,13 @@ def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tu
 def _is_home(item: MissionItem) -> bool:
     if item.command != Command.NAV_WAYPOINT or not is_located(item.command, item.frame):
         return False
-    return item.frame in (0, 5) or not any(item.params)
+    return item.frame in AMSL or not any(item.params)
 
 
 def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
     """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets."""
     home = mission.home
-    first = MissionItem(0, int(Command.NAV_WAYPOINT), 0, (0.0,) * 4, 0.0, 0.0, 0.0)
+    first = MissionItem(0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, 0.0, 0.0, 0.0)
     if home is not None:
         first = replace(first, lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt=home.alt)
     numbers = {item.seq: k for k, item in enumerate(mission.items, 1)}

@@ -3,13 +3,14 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, UNSUPPORTED, Answer, Pilot
+from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, UNSUPPORTED, ArmingState, CommandResult
 from flight.live.link import Peer
 from flight.live.parameters import FORCE, Parameters
+from flight.live.status_text import INFO, WARNING, StatusText
 from flight.live.telemetry import PERIODS, STREAMS, Status, telemetry_message
 
 # No message is sent more often than this, s.
@@ -18,71 +19,81 @@ _LONGEST = 3600.0
 # Arm commands that wait for a verdict.
 _MOST_WAITING = 16
 
-Reply = tuple[Peer | None, Any]  # None: a text (severity, words) for all
+
+class PeerMessage(NamedTuple):
+    """A MAVLink message for one station."""
+
+    peer: Peer
+    message: Any
+
+
+# What a request brings about; a text is for all stations.
+Response = PeerMessage | StatusText
 
 
 @dataclass(frozen=True, slots=True)
 class _Waiting:
-    """An arm command that waits for the verdict."""
+    """An arm command that waits for the verdict; param1, param2: of MAV_CMD_COMPONENT_ARM_DISARM."""
 
     peer: Peer
     system: int
     component: int
-    values: tuple[float, float]
+    param1: float
+    param2: float
 
 
 @dataclass(slots=True)
 class Requests:
-    """Answers requests; gives (peer, message), or (None, (severity, words)) for all stations."""
+    """Answers requests with messages for the station, and texts for all of them."""
 
-    pilot: Pilot
+    arming: ArmingState
     parameters: Parameters
     status: Status
     _waiting: list[_Waiting] = field(default_factory=list)
 
-    def handle(self, message: Any, peer: Peer, now: float) -> list[Reply]:
+    def handle(self, message: Any, peer: Peer, now: float) -> list[Response]:
         """Answer a message; one that is no request of these gets nothing."""
         handler = _HANDLERS.get(message.get_type())
         return handler(self, message, peer, now) if handler else []
 
-    def verdict_came(self) -> list[Reply]:
+    def verdict_came(self) -> list[Response]:
         """Answer the arm commands that waited for it."""
         waiting, self._waiting = self._waiting, []
-        replies: list[Reply] = []
+        replies: list[Response] = []
         for item in waiting:
-            reply = self.pilot.arm(*_switch(item.values))
+            reply = self.arming.arm(item.param1 == 1.0, item.param2)
             replies += self._answered(item.peer, item.system, item.component, _ARM, reply)
         return replies
 
-    def _command(self, message: Any, peer: Peer, now: float) -> list[Reply]:
+    def _command(self, message: Any, peer: Peer, now: float) -> list[Response]:
         system, component = message.get_srcSystem(), message.get_srcComponent()
         number = int(message.command)
         if number == _ARM:
-            reply = self.pilot.arm(*_switch((message.param1, message.param2)))
+            reply = self.arming.arm(message.param1 == 1.0, message.param2)
             if reply.result == IN_PROGRESS:
                 if len(self._waiting) < _MOST_WAITING:
-                    self._waiting.append(_Waiting(peer, system, component, (message.param1, message.param2)))
+                    self._waiting.append(_Waiting(peer, system, component, message.param1, message.param2))
                 else:
-                    reply = Answer(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+                    reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
             return self._answered(peer, system, component, number, reply)
         if number in _MESSAGE_COMMANDS:
             reply, extra = self._message_command(number, message, peer, now)
         else:
             reply, extra = self._flight_command(number, message), []
-        return [*self._answered(peer, system, component, number, reply), *((peer, item) for item in extra)]
+        return [*self._answered(peer, system, component, number, reply), *(PeerMessage(peer, item) for item in extra)]
 
-    def _flight_command(self, number: int, message: Any) -> Answer:
+    def _flight_command(self, number: int, message: Any) -> CommandResult:
         if number == mavlink.MAV_CMD_DO_SET_MODE:
-            return self.pilot.set_mode(_whole(message.param2))
+            return self.arming.set_mode(_whole(message.param2))
         if number == mavlink.MAV_CMD_MISSION_START:
-            return self.pilot.start()
+            return self.arming.start()
         if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
-            return self.pilot.hold(message.param1 == 1)
+            return self.arming.pause(message.param1 == 1)
         if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
             return self._set_current(_whole(message.param1))
-        return Answer(UNSUPPORTED)
+        return CommandResult(UNSUPPORTED)
 
-    def _message_command(self, number: int, message: Any, peer: Peer, now: float) -> tuple[Answer, list[Any]]:
+    def _message_command(self, number: int, message: Any, peer: Peer, now: float) -> tuple[CommandResult, list[Any]]:
         named = _MESSAGE_COMMANDS[number]
         wanted = _whole(message.param1) if named is None else named
         kind = mavlink.mavlink_map.get(wanted)
@@ -95,23 +106,23 @@ class Requests:
             kind = mavlink.mavlink_map.get(wanted)
             period = peer.periods.get(kind.msgname) if kind is not None else None
             interval = -1 if period is None else round(period * 1e6)
-            return Answer(ACCEPTED), [mavlink.MAVLink_message_interval_message(wanted & 0xFFFF, interval)]
+            return CommandResult(ACCEPTED), [mavlink.MAVLink_message_interval_message(wanted & 0xFFFF, interval)]
         found = telemetry_message(name, self.status)
-        return (Answer(ACCEPTED), [found]) if found is not None else (Answer(UNSUPPORTED), [])
+        return (CommandResult(ACCEPTED), [found]) if found is not None else (CommandResult(UNSUPPORTED), [])
 
-    def _set_interval(self, name: str, interval: float, peer: Peer, now: float) -> Answer:
+    def _set_interval(self, name: str, interval: float, peer: Peer, now: float) -> CommandResult:
         if name not in PERIODS:
-            return Answer(ACCEPTED if name == "HEARTBEAT" and interval in (0.0, 1e6) else UNSUPPORTED)
+            return CommandResult(ACCEPTED if name == "HEARTBEAT" and interval in (0.0, 1e6) else UNSUPPORTED)
         if not math.isfinite(interval):
-            return Answer(DENIED)
+            return CommandResult(DENIED)
         if interval < 0:
             peer.periods[name] = None
         else:
             peer.periods[name] = min(_LONGEST, max(_SHORTEST, interval / 1e6)) if interval else PERIODS[name]
             peer.due[name] = now
-        return Answer(ACCEPTED)
+        return CommandResult(ACCEPTED)
 
-    def _streams(self, message: Any, peer: Peer, now: float) -> list[Reply]:
+    def _streams(self, message: Any, peer: Peer, now: float) -> list[Response]:
         for name in STREAMS.get(int(message.req_stream_id), ()):
             rate = int(message.req_message_rate)
             period = min(_LONGEST, max(_SHORTEST, 1.0 / rate)) if message.start_stop and rate else None
@@ -119,62 +130,59 @@ class Requests:
             peer.due[name] = now
         return []
 
-    def _set_mode(self, message: Any, peer: Peer, _now: float) -> list[Reply]:
-        reply = self.pilot.set_mode(int(message.custom_mode))
+    def _set_mode(self, message: Any, peer: Peer, _now: float) -> list[Response]:
+        reply = self.arming.set_mode(int(message.custom_mode))
         # SET_MODE is a message; ArduPilot acknowledges it as the command of its number.
-        return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), 11, reply)
+        number = mavlink.MAVLINK_MSG_ID_SET_MODE
+        return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
-    def _mission_set_current(self, message: Any, peer: Peer, _now: float) -> list[Reply]:
+    def _mission_set_current(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         reply = self._set_current(int(message.seq))
-        found: list[Reply] = [(None, (4, reply.text))] if reply.text else []
-        return [*found, (peer, telemetry_message("MISSION_CURRENT", self.status))]
+        found: list[Response] = [StatusText(reply.text, WARNING)] if reply.text else []
+        return [*found, PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
 
-    def _set_current(self, seq: int) -> Answer:
+    def _set_current(self, seq: int) -> CommandResult:
         """Accept the first item, which is where every flight starts."""
-        if self.pilot.ready is not None and not self.pilot.flying and seq in (0, 1):
-            return Answer(ACCEPTED)
-        return Answer(DENIED, f"item {seq}: a mission is flown from its first item to its last")
+        if self.arming.judged is not None and not self.arming.flying and seq in (0, 1):
+            return CommandResult(ACCEPTED)
+        return CommandResult(DENIED, f"item {seq}: a mission is flown from its first item to its last")
 
-    def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Reply]:
+    def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
         peer.parameter = 0.0
         return []
 
-    def _read_parameter(self, message: Any, peer: Peer, _now: float) -> list[Reply]:
+    def _read_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         number = self.parameters.find(message.param_id, int(message.param_index))
-        return [] if number is None else [(peer, self.parameters.message(number))]
+        return [] if number is None else [PeerMessage(peer, self.parameters.message(number))]
 
-    def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Reply]:
+    def _write_parameter(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         number, problem = self.parameters.set(message.param_id, float(message.param_value))
-        self.pilot.force = self.parameters[FORCE] != 0.0
-        replies: list[Reply] = [(None, (4, problem))] if problem else []
+        self.arming.force = self.parameters[FORCE] != 0.0
+        replies: list[Response] = [StatusText(problem, WARNING)] if problem else []
         if number is not None:
-            replies.append((peer, self.parameters.message(number)))
+            replies.append(PeerMessage(peer, self.parameters.message(number)))
         return replies
 
-    def _ping(self, message: Any, peer: Peer, _now: float) -> list[Reply]:
+    def _ping(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         if message.target_system or message.target_component:
             return []
         pong = mavlink.MAVLink_ping_message(
             message.time_usec, message.seq, message.get_srcSystem(), message.get_srcComponent()
         )
-        return [(peer, pong)]
+        return [PeerMessage(peer, pong)]
 
-    def _timesync(self, message: Any, peer: Peer, _now: float) -> list[Reply]:
+    def _timesync(self, message: Any, peer: Peer, _now: float) -> list[Response]:
         if message.tc1 != 0:
             return []
-        return [(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
+        return [PeerMessage(peer, mavlink.MAVLink_timesync_message(int(self.status.wall * 1e9), message.ts1))]
 
     @staticmethod
-    def _answered(peer: Peer, system: int, component: int, number: int, reply: Answer) -> list[Reply]:
+    def _answered(peer: Peer, system: int, component: int, number: int, reply: CommandResult) -> list[Response]:
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
-        replies: list[Reply] = [(peer, ack)]
+        replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:
-            replies.append((None, (4 if reply.result == DENIED else 6, reply.text)))
+            replies.append(StatusText(reply.text, WARNING if reply.result == DENIED else INFO))
         return replies
-
-
-def _switch(values: tuple[float, float]) -> tuple[bool, float]:
-    return values[0] == 1.0, values[1]
 
 
 def _whole(value: float) -> int:
@@ -191,7 +199,7 @@ _MESSAGE_COMMANDS: dict[int, int | None] = {
     mavlink.MAV_CMD_GET_HOME_POSITION: mavlink.MAVLINK_MSG_ID_HOME_POSITION,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
 }
-_HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Reply]]] = {
+_HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
     "COMMAND_LONG": Requests._command,
     "COMMAND_INT": Requests._command,
     "SET_MODE": Requests._set_mode,

@@ -1,4 +1,4 @@
-"""Telemetry: MAVLink messages of a moment of flight, and how often each is sent."""
+"""Telemetry: MAVLink messages of a state snapshot, and how often each is sent."""
 
 import math
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.snapshot import Moment
+from flight.live.snapshot import Snapshot
 from flight.mission.items import Home
 
 # ArduPlane's numbers for its modes (custom_mode of HEARTBEAT).
@@ -37,7 +37,7 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
-# Version told to ground stations: of ArduPlane, whose conventions (modes, home as item 0) the vehicle follows.
+# Version that ground stations get: of ArduPlane, whose conventions (modes, home as item 0) the vehicle follows.
 _VERSION = (4 << 24) | (5 << 16) | (0 << 8) | 255
 
 # Seconds between two messages of a kind, unless a station asks otherwise; HEARTBEAT is not theirs to change.
@@ -55,24 +55,32 @@ PERIODS: dict[str, float] = {
 }
 # Which of them each MAV_DATA_STREAM of REQUEST_DATA_STREAM means (as ArduPilot groups them).
 STREAMS: dict[int, tuple[str, ...]] = {
-    0: tuple(PERIODS),
-    2: ("SYS_STATUS", "MISSION_CURRENT", "GPS_RAW_INT"),
-    6: ("GLOBAL_POSITION_INT",),
-    10: ("ATTITUDE",),
-    11: ("VFR_HUD",),
-    12: ("WIND", "WIND_COV", "EXTENDED_SYS_STATE", "HOME_POSITION"),
+    mavlink.MAV_DATA_STREAM_ALL: tuple(PERIODS),
+    mavlink.MAV_DATA_STREAM_EXTENDED_STATUS: ("SYS_STATUS", "MISSION_CURRENT", "GPS_RAW_INT"),
+    mavlink.MAV_DATA_STREAM_POSITION: ("GLOBAL_POSITION_INT",),
+    mavlink.MAV_DATA_STREAM_EXTRA1: ("ATTITUDE",),
+    mavlink.MAV_DATA_STREAM_EXTRA2: ("VFR_HUD",),
+    mavlink.MAV_DATA_STREAM_EXTRA3: ("WIND", "WIND_COV", "EXTENDED_SYS_STATE", "HOME_POSITION"),
 }
 
 
 @dataclass(slots=True)
 class Status:
-    """What the vehicle is doing; `telemetry_messages` tells it.
+    """What the vehicle is doing, as `telemetry_message` sends it.
 
-    boot: s since the vehicle came up.  battery: Wh when full.  load: share of time that the event loop is busy.
-    current: the mission item that is flown to.  total: how many items a mission has beside home.
+    snapshot: the aircraft.
+    home: heights over home count from it.
+    boot, wall: s since the vehicle came up, and since 1970.
+    mode: ArduPlane's number.
+    ready: whether arming would be accepted, or has been.
+    battery: Wh when full.
+    load: share of time that the event loop is busy.
+    current: the mission item that is flown to.
+    total: how many items a mission has beside home.
+    mission_state: MISSION_STATE of MISSION_CURRENT.
     """
 
-    moment: Moment
+    snapshot: Snapshot
     home: Home
     boot: float = 0.0
     wall: float = 0.0
@@ -88,7 +96,13 @@ class Status:
 
 
 def heartbeat(status: Status) -> Any:
-    """HEARTBEAT of a fixed wing that follows ArduPilot's conventions."""
+    """HEARTBEAT of a fixed wing that follows ArduPilot's conventions.
+
+    >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
+    >>> message = heartbeat(Status(parked, Home(46.0, 8.0, 400.0), mode=AUTO, armed=True))
+    >>> message.custom_mode, message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    (10, 128)
+    """
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
     if status.mode == AUTO:
         base |= (
@@ -105,22 +119,17 @@ def heartbeat(status: Status) -> Any:
 
 
 def telemetry_message(name: str, status: Status) -> Any:
-    """Message of a kind, as the vehicle stands; None for a kind that it does not send.  ``name``: see `PERIODS`."""
+    """MAVLink message of this name about a status; None for one that the vehicle does not send.
+
+    name: one of `PERIODS`, HEARTBEAT, AUTOPILOT_VERSION or SYSTEM_TIME.
+
+    >>> parked = Snapshot(time=0.0, lat_deg=46.0, lon_deg=8.0, amsl=500.0, height=100.0)
+    >>> message = telemetry_message("GLOBAL_POSITION_INT", Status(parked, Home(46.0, 8.0, 400.0)))
+    >>> message.lat, message.alt, message.relative_alt
+    (460000000, 500000, 100000)
+    """
     maker = _MAKERS.get(name)
     return maker(status) if maker else None
-
-
-def status_texts(text: str, severity: int, number: int) -> list[Any]:
-    """STATUSTEXT of any text, in pieces of 50 bytes that stations join again.  number: 1..65535, new for each text."""
-    # Ground stations show ASCII.
-    data = text.replace("°", " deg").encode("ascii", "replace")[:400]
-    pieces = [data[at : at + 50] for at in range(0, len(data), 50)]
-    if len(pieces) <= 1:
-        return [mavlink.MAVLink_statustext_message(severity, data)]
-    # A text ends with the first piece that is not full.
-    if len(pieces[-1]) == 50:
-        pieces.append(b"")
-    return [mavlink.MAVLink_statustext_message(severity, piece, number, k) for k, piece in enumerate(pieces)]
 
 
 def _ms(status: Status) -> int:
@@ -128,12 +137,12 @@ def _ms(status: Status) -> int:
 
 
 def _attitude(status: Status) -> Any:
-    now = status.moment
+    now = status.snapshot
     return mavlink.MAVLink_attitude_message(_ms(status), now.roll, now.pitch, now.yaw, now.p, now.q, now.r)
 
 
 def _position(status: Status) -> Any:
-    now = status.moment
+    now = status.snapshot
     return mavlink.MAVLink_global_position_int_message(
         _ms(status),
         round(now.lat_deg * 1e7),
@@ -148,7 +157,7 @@ def _position(status: Status) -> Any:
 
 
 def _hud(status: Status) -> Any:
-    now = status.moment
+    now = status.snapshot
     return mavlink.MAVLink_vfr_hud_message(
         now.airspeed,
         math.hypot(now.v_north, now.v_east),
@@ -165,16 +174,16 @@ def _mission_current(status: Status) -> Any:
 
 def _sys_status(status: Status) -> Any:
     health = _SENSORS | (_PREARM if status.ready else 0)
-    share = max(0.0, 1.0 - status.moment.energy / status.battery)
+    share = max(0.0, 1.0 - status.snapshot.energy / status.battery)
     present = _SENSORS | _PREARM
     return mavlink.MAVLink_sys_status_message(
         present, present, health, min(1000, round(status.load * 1000)), 44_400,
-        _short(status.moment.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
+        _short(status.snapshot.current * 100), round(share * 100), 0, 0, 0, 0, 0, 0,
     )  # fmt: skip
 
 
 def _gps(status: Status) -> Any:
-    now = status.moment
+    now = status.snapshot
     return mavlink.MAVLink_gps_raw_int_message(
         int(status.boot * 1e6), mavlink.GPS_FIX_TYPE_RTK_FIXED,
         round(now.lat_deg * 1e7), round(now.lon_deg * 1e7), round(now.amsl * 1e3), 50, 80,
@@ -184,14 +193,14 @@ def _gps(status: Status) -> Any:
 
 
 def _wind(status: Status) -> Any:
-    now = status.moment
+    now = status.snapshot
     # The way it comes from.
     source = math.degrees(math.atan2(-now.wind_east, -now.wind_north))
     return mavlink.MAVLink_wind_message(source, math.hypot(now.wind_east, now.wind_north), 0.0)
 
 
 def _wind_cov(status: Status) -> Any:
-    now = status.moment
+    now = status.snapshot
     unknown = math.nan
     return mavlink.MAVLink_wind_cov_message(
         int(status.boot * 1e6), now.wind_north, now.wind_east, 0.0, unknown, unknown, now.amsl, unknown, unknown

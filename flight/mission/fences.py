@@ -1,4 +1,4 @@
-"""Geofences and rally points: made of a scenario, taken apart into shapes, and asked whether a place is allowed."""
+"""Geofences and rally points: made of a scenario, grouped into shapes, and asked whether a position is allowed."""
 
 import math
 from collections.abc import Sequence
@@ -14,8 +14,8 @@ from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
 
-POLYGONS = (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_POLYGON_EXCLUSION)
-INCLUSIONS = (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
+POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
+INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
@@ -43,9 +43,19 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
 def fence_problem(
     fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
 ) -> tuple[str, int] | None:
-    """Which fence a place (m) breaks, in words, and its first item's number; None for none.
+    """First fence that a position violates: how, as text for people, and its first item's number; None for none.
 
-    fences: items 5001..5004, a polygon's corners together.  Inclusions count together: a place must be in all of them.
+    fences: items 5001..5004, a polygon's corners together.  Inclusions count together: a position must be in all of
+    them.  east, north: m on the map about ``origin``.  Raises MissionError for a polygon of fewer corners than it
+    counts.
+
+    >>> radius = (500.0, 0.0, 0.0, 0.0)
+    >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
+    >>> origin = GeoOrigin(36.5, -84.2)
+    >>> fence_problem((circle,), origin, east=0.0, north=600.0)
+    ('outside an inclusion circle of 500 m', 0)
+    >>> fence_problem((circle,), origin, east=0.0, north=400.0) is None
+    True
     """
     for shape in fence_shapes(fences):
         item = shape[0]
@@ -63,20 +73,28 @@ def fence_problem(
 
 
 def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[str, ...]]:
-    """Mission with a scenario's area and threats as its fence and the route's ends as rally points, and what is lost.
+    """Mission with a scenario's area and threats as its fence and the route's ends as rally points, and notes.
 
-    The area becomes an inclusion polygon, its four corners; each missile's reach an exclusion circle, which has no
-    height: a plan that passes above or below the sphere passes through the cylinder.  Radars are no fence: being seen
-    is not forbidden.  Rally points are the first and last position of the mission, at the mission's height over home.
+    The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
+    no height: a plan that passes above or below the sphere passes through the cylinder.  Radars are no fence: being
+    detected is not forbidden.  Rally points are the first and last position of the mission, at the mission's height
+    over home.  The notes say, for people, what a fence cannot hold, and what of it the mission itself violates.
+
+    >>> from world.scenario import load_scenario
+    >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"))
+    >>> [len(shape) for shape in fence_shapes(fenced.fences)][:4]  # the area's corners, then a circle a missile
+    [4, 1, 1, 1]
+    >>> notes
+    ('28 missile spheres became exclusion circles: a fence has no height, so that each is a cylinder',)
     """
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
-    fences = [_fence(scenario.origin, Command.NAV_FENCE_POLYGON_INCLUSION, 4.0, point) for point in corners]
+    fences = [_fence(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
     threats = scenario.threats
     lost = []
-    for name, place, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True):
+    for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True):
         if radius > 0.0:
-            fences.append(_fence(scenario.origin, Command.NAV_FENCE_CIRCLE_EXCLUSION, float(radius), place[:2]))
+            fences.append(_fence(scenario.origin, Command.NAV_FENCE_CIRCLE_EXCLUSION, float(radius), position[:2]))
             lost.append(str(name))
     notes = []
     if lost:
@@ -89,10 +107,10 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
 
 def _crossings(mission: Mission, fences: list[MissionItem], origin: GeoOrigin) -> list[str]:
     """A note if the mission's own legs pass through a circle of its fence."""
-    places = [item for item in mission.items if item.has_position]
-    if len(places) < 2:
+    positions = [item for item in mission.items if item.has_position]
+    if len(positions) < 2:
         return []
-    east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
+    east, north = to_map(origin, [item.lat_deg for item in positions], [item.lon_deg for item in positions])
     start = np.stack([east[:-1], north[:-1]], axis=1)
     step = np.stack([np.diff(east), np.diff(north)], axis=1)
     length2 = np.maximum((step**2).sum(axis=1), 1e-9)
@@ -109,18 +127,18 @@ def _crossings(mission: Mission, fences: list[MissionItem], origin: GeoOrigin) -
     return [f"{over}: an autopilot with this fence refuses it or breaks off"]
 
 
-def _fence(origin: GeoOrigin, command: Command, p1: float, place: Floats) -> MissionItem:
-    lat, lon = to_geo(origin, float(place[0]), float(place[1]))
+def _fence(origin: GeoOrigin, command: Command, p1: float, position: Floats) -> MissionItem:
+    lat, lon = to_geo(origin, float(position[0]), float(position[1]))
     params = (round(p1, 3), 0.0, 0.0, 0.0)
     return MissionItem(0, int(command), int(Frame.GLOBAL), params, on_grid(float(lat)), on_grid(float(lon)), 0.0)
 
 
 def _rally(mission: Mission) -> list[MissionItem]:
-    places = [item for item in mission.items if item.has_position]
+    positions = [item for item in mission.items if item.has_position]
     home = mission.home
-    if home is None or not places or math.isnan(home.alt):
+    if home is None or not positions or math.isnan(home.alt):
         return []
-    ends = [places[0], places[-1]] if len(places) > 1 else places
+    ends = [positions[0], positions[-1]] if len(positions) > 1 else positions
     return [
         MissionItem(
             0, int(Command.NAV_RALLY_POINT), int(Frame.GLOBAL_RELATIVE_ALT), (0.0,) * 4, end.lat_deg, end.lon_deg,
@@ -140,7 +158,7 @@ def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
 
 
 def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north: float) -> bool:
-    """Whether a place lies in a polygon, by the crossings of a ray to the east."""
+    """Whether a position lies in a polygon, by the crossings of a ray to the east."""
     e0, n0 = corners_east, corners_north
     e1, n1 = np.roll(e0, -1), np.roll(n0, -1)
     spans = (n0 > north) != (n1 > north)

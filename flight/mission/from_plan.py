@@ -13,8 +13,8 @@ from world.geometry import turning_angles
 
 Floats = NDArray[np.float64]
 
-# Added to how far a fly-by turn passes from its waypoint, m: the tolerance of the verdict's waypoint rule.
-REACH = 10.0
+# Added to the fly-by offset of a waypoint, m: the tolerance of the verdict's waypoint rule.
+ACCEPTANCE_TOLERANCE = 10.0
 
 
 def plan_mission(plan: Plan, airspeed: float, max_bank: float, source: str = "plan") -> Mission:
@@ -24,9 +24,20 @@ def plan_mission(plan: Plan, airspeed: float, max_bank: float, source: str = "pl
     MISSION_ITEM_INT and heights on whole millimetres, so every form of the mission carries the same numbers; that moves
     a waypoint by less than 8 mm on the map.
 
-    The acceptance radius is how far a fly-by turn at this speed and bank, in the scenario's wind from behind, passes
-    from its waypoint, R(1/cos(theta/2) - 1), and `REACH` more, up to a whole metre.  It is advisory: PX4 has its own on
-    fixed wings.
+    The acceptance radius is the fly-by offset, how far a turn at this speed and bank, in the scenario's wind from
+    behind, passes from its waypoint, R(1/cos(theta/2) - 1), and `ACCEPTANCE_TOLERANCE` more, up to a whole metre.  It
+    is advisory: PX4 has its own on fixed wings.
+
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> points = np.array([[0.0, 0.0, 75.0], [1000.0, 0.0, 75.0], [2000.0, 1000.0, 75.0]])
+    >>> plan = Plan(
+    ...     scenario, points, np.zeros(4, dtype=int), np.zeros(4), certificate=None, seed=1, algorithm="umda",
+    ...     evaluations=0, history=np.zeros((1, 3)),
+    ... )
+    >>> mission = plan_mission(plan, airspeed=25.0, max_bank=math.radians(30.0))
+    >>> [(item.command, item.params[1]) for item in mission.items]  # speed, then acceptance radii
+    [(178, 25.0), (16, 10.0), (16, 20.0), (16, 10.0)]
     """
     points = plan.waypoints
     lat, lon = to_geo(plan.scenario.origin, points[:, 0], points[:, 1])
@@ -62,7 +73,7 @@ def _acceptance(plan: Plan, airspeed: float, max_bank: float) -> Floats:
     radius = (airspeed + wind) ** 2 / (GRAVITY * math.tan(max_bank))
     # A U-turn's fly-by arc would pass at infinity.
     half = np.minimum(turning_angles(plan.waypoints), math.radians(150.0)) / 2.0
-    radii = np.full(len(plan.waypoints), REACH)
+    radii = np.full(len(plan.waypoints), ACCEPTANCE_TOLERANCE)
     radii[1:-1] += radius * (1.0 / np.cos(half) - 1.0)
     return np.ceil(radii - 1e-6)
 

@@ -1,4 +1,4 @@
-"""A scenario made around a mission file that came without one."""
+"""A scenario made around an external mission: a file that came without one."""
 
 import math
 import re
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Mission
-from flight.mission.itinerary import plan_stops
+from flight.mission.itinerary import ItineraryStop, make_itinerary
 from flight.mission.routing import HIGHEST, make_route
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_map
@@ -19,32 +19,44 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# The area reaches this far (m) beyond the mission's places, and the ceiling above its highest.
-AROUND = 2000.0
+# The area extends this far (m) beyond the mission's positions, and the ceiling above its highest.
+BUFFER = 2000.0
 # A home further than this (m) from the first position is not where the mission is flown: ground stations write a
-# default place of their own where none was set.
-_HOME_REACH = 100_000.0
+# default position of their own where none was set.
+_HOME_DISTANCE = 100_000.0
 
 
 def implied_scenario(
-    mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, on_the_spot: bool = False
+    mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, vertical_legs: bool = False
 ) -> Scenario:
     """Scenario for a mission that has none: its surroundings, no threats, default limits, ``external`` set.
 
-    terrain_path: an elevation file or embedded name, None for no terrain at all.  flight: the aircraft and how it
-    flies, the defaults if None.  The area is the box of the places flown to, their circles and 2 km around, cut at the
-    edge of the tile.  Start and destination are the route's ends; where those are not above ground they are lifted to
-    1 m, because a scenario's ends must be, while the route (and its verdict) keeps what the mission says.
+    terrain_path: an elevation file or embedded name, None for no terrain at all.
+    flight: the aircraft and how it flies, the defaults if None.
+    vertical_legs: as for `flight.mission.routing.make_route`.
 
-    on_the_spot: of `flight.mission.routing.make_route`.  Raises MissionError, and TerrainError where the mission leaves
-    the tile.
+    The area is the box of the positions flown to, their circles and 2 km around, cut at the edge of the tile.  Start
+    and destination are the route's ends; where those are not above ground they are lifted to 1 m, because a scenario's
+    ends must be, while the route (and its verdict) keeps the mission's heights.  Raises MissionError, and TerrainError
+    where the mission leaves the tile.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> items = [
+    ...     MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, lat, -84.2, 700.0)
+    ...     for k, lat in enumerate((36.50, 36.51), 1)
+    ... ]
+    >>> scenario = implied_scenario(Mission(None, tuple(items)), terrain_path=None)
+    >>> scenario.external, scenario.bounds.round().tolist()
+    (True, [[-2000.0, 2000.0], [-2000.0, 3110.0]])
     """
     flight = flight or FlightTable()
-    origin = mission_origin(mission)
-    box, flown = _boxes(mission, origin)
+    stops = make_itinerary(mission, 0.0).stops
+    origin = mission_origin(mission, stops)
+    box, flown = _boxes(mission, stops, origin)
     terrain, table, box = _ground(terrain_path, origin, box, flown)
     # The speed of a route does not matter for its ends.
-    route = make_route(mission, origin, terrain, flight.airspeed_mps or 25.0, flight.fly_over, on_the_spot=on_the_spot)
+    speed = flight.airspeed_mps or 25.0
+    route = make_route(mission, origin, terrain, speed, flight.fly_over, vertical_legs=vertical_legs)
     top = float(route.waypoints[:, 2].max())
     if terrain is not None:
         top = max(top, float(np.nanmax(terrain.heights)))
@@ -53,7 +65,7 @@ def implied_scenario(
         description="Made around a mission that came without a scenario",
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
-        area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + AROUND, HIGHEST)),
+        area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + BUFFER, HIGHEST)),
         start=_end(route.waypoints[0], terrain),
         destination=_end(route.waypoints[-1], terrain),
         flight=flight,
@@ -61,34 +73,34 @@ def implied_scenario(
     return from_spec(spec, mission.source, ground=terrain, external=True)
 
 
-def mission_origin(mission: Mission) -> GeoOrigin:
-    """Where the map of a mission without a scenario has its middle: home, or the first place flown to.
+def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
+    """Where the map of a mission without a scenario has its origin: home, or the first position flown to.
 
-    Home counts if it is within 100 km of that place.  Raises MissionError beyond 89 degrees of latitude.
+    stops: of the mission's itinerary.  Home counts if it is within 100 km of that position.  Raises MissionError beyond
+    89 degrees of latitude.
     """
-    first = plan_stops(mission, 0.0).stops[0]
-    places = [item for item in mission.items if item.has_position and item.seq >= first.item]
-    lat, lon = (places[0].lat_deg, places[0].lon_deg) if places else (first.lat_deg, first.lon_deg)
+    first = stops[0]
+    positions = [item for item in mission.items if item.has_position and item.seq >= first.item]
+    lat, lon = (positions[0].lat_deg, positions[0].lon_deg) if positions else (first.lat_deg, first.lon_deg)
     if abs(lat) > 89.0:
         raise MissionError(f"{mission.source}: latitude {lat:.7f}: a mission is flown within -89..89 degrees")
     origin = GeoOrigin(lat, lon)
     home = mission.home
     if home is not None and abs(home.lat_deg) <= 89.0:
         east, north = to_map(origin, home.lat_deg, home.lon_deg)
-        if math.hypot(float(east), float(north)) <= _HOME_REACH:
+        if math.hypot(float(east), float(north)) <= _HOME_DISTANCE:
             origin = GeoOrigin(home.lat_deg, home.lon_deg)
     return origin
 
 
-def _boxes(mission: Mission, origin: GeoOrigin) -> tuple[Floats, Floats]:
-    """Area, and smallest box of the places flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
-    stops = plan_stops(mission, 0.0).stops
+def _boxes(mission: Mission, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> tuple[Floats, Floats]:
+    """Area, and smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
     points = np.stack(to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops]))
     if not (np.abs(points) <= MAP_REACH).all():
         # The error that names the item.
         make_route(mission, origin, None, 1.0, False)
     flown = np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
-    around = AROUND + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
+    around = BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     return np.clip(flown + np.array([-around, around]), -MAP_REACH, MAP_REACH), flown
 
 
@@ -110,8 +122,8 @@ def _ground(
             f" east {te0:.0f}..{te1:.0f} m, north {tn0:.0f}..{tn1:.0f} m"
         )
     file = Path(path)
-    place = str(file.resolve()) if file.is_file() else path
-    table = TerrainTable(kind="dem", path=place, sha256=raster.sha256)
+    found = str(file.resolve()) if file.is_file() else path
+    table = TerrainTable(kind="dem", path=found, sha256=raster.sha256)
     return read_terrain(raster, origin, cut, MARGIN), table, cut
 
 

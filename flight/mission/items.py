@@ -61,15 +61,15 @@ class Command(IntEnum):
     VIDEO_STOP_CAPTURE = 2501
     DO_VTOL_TRANSITION = 3000
     CONDITION_GATE = 4501
-    NAV_FENCE_POLYGON_INCLUSION = 5001
-    NAV_FENCE_POLYGON_EXCLUSION = 5002
+    NAV_FENCE_POLYGON_VERTEX_INCLUSION = 5001
+    NAV_FENCE_POLYGON_VERTEX_EXCLUSION = 5002
     NAV_FENCE_CIRCLE_INCLUSION = 5003
     NAV_FENCE_CIRCLE_EXCLUSION = 5004
     NAV_RALLY_POINT = 5100
 
 
 C = Command
-# Commands that send the aircraft to a place.
+# Commands that send the aircraft to a position.
 PLACES = frozenset(
     {C.NAV_WAYPOINT, C.NAV_LOITER_UNLIM, C.NAV_LOITER_TURNS, C.NAV_LOITER_TIME, C.NAV_LOITER_TO_ALT}
     | {C.NAV_SPLINE_WAYPOINT, C.NAV_PAYLOAD_PLACE}
@@ -108,7 +108,11 @@ def is_located(command: int, frame: int) -> bool:
 
 
 def command_name(command: int) -> str:
-    """MAVLink name of a command without "MAV_CMD_", or its number where planfly does not know it."""
+    """MAVLink name of a command without "MAV_CMD_", or its number where planfly does not know it.
+
+    >>> command_name(16), command_name(50_000)
+    ('NAV_WAYPOINT', 'command 50000')
+    """
     try:
         return Command(command).name
     except ValueError:
@@ -116,7 +120,11 @@ def command_name(command: int) -> str:
 
 
 def on_grid(degrees: float) -> float:
-    """Double nearest to whole 1e-7 degrees, rounded, never truncated; NaN stays NaN."""
+    """Double nearest to whole 1e-7 degrees, rounded, never truncated; NaN stays NaN.
+
+    >>> on_grid(36.50000006), on_grid(-84.19999994)
+    (36.5000001, -84.1999999)
+    """
     return round(degrees * 1e7) / 1e7 if math.isfinite(degrees) else degrees
 
 
@@ -124,9 +132,14 @@ def on_grid(degrees: float) -> float:
 class MissionItem:
     """One mission item.
 
-    seq: its number in the file it came from (home is not an item).  params: p1..p4, NaN where unset.
-    lat_deg, lon_deg: degrees on the 1e-7 grid of MISSION_ITEM_INT, NaN where unset; for a command without a place, its
-    fifth and sixth parameters as written.  alt: m in the item's frame, NaN where unset.
+    seq: its number in the file it came from (home is not an item).
+    command: MAV_CMD.
+    frame: MAV_FRAME.
+    params: p1..p4, NaN where unset.
+    lat_deg, lon_deg: degrees on the 1e-7 grid of MISSION_ITEM_INT, NaN where unset; for a command without a position,
+        its fifth and sixth parameters as written.
+    alt: m in the item's frame, NaN where unset.
+    autocontinue: whether the mission goes on by itself after the item.
     """
 
     seq: int
@@ -142,7 +155,7 @@ class MissionItem:
     def x(self) -> int:
         """Latitude as MISSION_ITEM_INT carries it: 1e-7 degrees, rounded; INT32_MAX where unset (MAVLink).
 
-        A command without a place has its fifth parameter there, unscaled.
+        A command without a position has its fifth parameter there, unscaled.
         """
         return self._scaled(self.lat_deg)
 
@@ -158,7 +171,7 @@ class MissionItem:
 
     @property
     def has_position(self) -> bool:
-        """Whether its latitude and longitude name a place (0, 0 and NaN mean that they do not)."""
+        """Whether its latitude and longitude are a position (0, 0 and NaN mean that they do not)."""
         if not (math.isfinite(self.lat_deg) and math.isfinite(self.lon_deg)):
             return False
         return is_located(self.command, self.frame) and (self.x, self.y) != (0, 0)
@@ -177,11 +190,13 @@ class Home:
 class Mission:
     """A mission: what a .waypoints file, a .plan file or an upload holds.
 
-    home: None where the file has none, or 0,0.  items: seq strictly increasing.  fences: items 5001..5004, one per
-    vertex or circle.  rally: items 5100.  Those four decide whether two missions are equal.
-
+    home: None where the file has none, or 0,0.
+    items: seq strictly increasing.
+    fences: items 5001..5004, one per vertex or circle.
+    rally: items 5100.  Those four decide whether two missions are equal.
     cruise_speed: m/s, what a .plan file's author had the ground station assume; it is never sent to an aircraft.
-    warnings: what was odd about the file but could be read.  source: names it in messages.
+    warnings: what was odd about the file but could be read.
+    source: names it in messages.
     """
 
     home: Home | None
@@ -252,7 +267,7 @@ def _count_problem(item: MissionItem) -> str | None:
             return f"p2 {p2:g}: a jump's count is a whole number, or -1 for without end"
     if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:
         return f"p1 {p1:g}: turns and seconds to loiter cannot be negative"
-    if item.command in (Command.NAV_FENCE_POLYGON_INCLUSION, Command.NAV_FENCE_POLYGON_EXCLUSION):
+    if item.command in (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION):
         if not (p1 >= 3 and p1 == int(p1)):
             return f"p1 {p1:g}: a fence polygon has a whole number of corners, at least 3"
     elif item.command in FENCES and not p1 > 0:

@@ -28,10 +28,12 @@ UNLIMITED = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Loiter:
-    """A circle to fly: radius in m, positive to the right, 0 for the aircraft's own.
+    """A circle to fly.
 
+    radius: m, positive to the right, 0 for the aircraft's own.
     turns, seconds: how long, 0 for what does not count; neither is shortened, and the circle is left on the first
-    tangent to the next place after them.  to_height: until the item's height is reached.
+        tangent to the next position after them.
+    to_height: until the item's height is reached.
     """
 
     radius: float
@@ -60,10 +62,17 @@ def loiter_of(item: MissionItem) -> Loiter | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Stop:
-    """A place to fly to: the item's seq (-1: none), degrees, height in the item's frame, NaN to keep the last height.
+class ItineraryStop:
+    """A position to fly to.
 
-    airspeed: m/s on the leg that ends here.  acceptance: m, 0 where none is stated.  loiter: the circle flown about it.
+    item: the mission item's seq, -1 where no item asks for it.
+    command: the item's MAV_CMD.
+    lat_deg, lon_deg: degrees.
+    alt: m in the item's frame, NaN to keep the last height.
+    frame: the item's MAV_FRAME.
+    airspeed: m/s on the leg that ends here.
+    acceptance: radius, m, 0 where none is stated.
+    loiter: the circle flown about it, None for none.
     """
 
     item: int
@@ -81,10 +90,13 @@ class Stop:
 class Itinerary:
     """Where a mission goes: at least one stop.
 
-    home: the mission's, or the first position item with height NaN.  takeoff: the item that the flight starts with.
+    home: the mission's, or the first position item with height NaN.
+    has_home: whether it is the mission's.
+    takeoff: the item that the flight starts with, None for none.
+    notes: what is not flown as written, with item numbers.
     """
 
-    stops: tuple[Stop, ...]
+    stops: tuple[ItineraryStop, ...]
     home: Home
     has_home: bool
     takeoff: MissionItem | None
@@ -124,7 +136,7 @@ def _ranges(numbers: list[int]) -> str:
     return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
 
 
-def plan_stops(mission: Mission, default_airspeed: float) -> Itinerary:
+def make_itinerary(mission: Mission, default_airspeed: float) -> Itinerary:
     """Walk through the mission as an autopilot would.
 
     default_airspeed: m/s until the mission's first DO_CHANGE_SPEED.  Raises MissionError for a mission without a
@@ -177,13 +189,13 @@ def _in_flying_order(mission: Mission, notes: Notes) -> Iterator[MissionItem]:
 
 
 class _Walk:
-    """What is known after the items so far."""
+    """Stops, speed and notes after the items so far."""
 
     def __init__(self, mission: Mission, airspeed: float) -> None:
         self.source = mission.source
         self.default = self.airspeed = airspeed
         self.notes = Notes()
-        self.stops: list[Stop] = []
+        self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
         self.ended = False
         self.has_home = mission.home is not None
@@ -208,9 +220,9 @@ class _Walk:
         elif item.command != Command.DO_JUMP:
             self.notes.add(f"{command_name(item.command)}: not flown", item.seq)
 
-    def _stop(self, item: MissionItem, acceptance: float = 0.0) -> Stop:
-        lat, lon = item.lat_deg, item.lon_deg
-        return Stop(item.seq, item.command, lat, lon, item.alt, item.frame, self.airspeed, acceptance, loiter_of(item))
+    def _stop(self, item: MissionItem, acceptance: float = 0.0) -> ItineraryStop:
+        lat, lon, loiter = item.lat_deg, item.lon_deg, loiter_of(item)
+        return ItineraryStop(item.seq, item.command, lat, lon, item.alt, item.frame, self.airspeed, acceptance, loiter)
 
     def _take_off(self, item: MissionItem) -> None:
         name = command_name(item.command)

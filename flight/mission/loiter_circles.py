@@ -9,11 +9,12 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.itinerary import MOST_STOPS, Loiter, Notes, Stop
+from flight.mission.itinerary import MOST_STOPS, ItineraryStop, Loiter, Notes
 from world.errors import MissionError
 
 Floats = NDArray[np.float64]
@@ -22,7 +23,7 @@ Floats = NDArray[np.float64]
 CORNER = math.pi / 4.0
 # Radii (m) that are flown.  Below the smallest a corner's legs would be no legs; no aircraft of ours turns as tightly.
 TIGHTEST, WIDEST = 10.0, 20_000.0
-# A place must be this far (m) outside a circle to have a tangent to it.
+# A stop must be this far (m) outside a circle to have a tangent to it.
 _CLEAR = 2.0
 # Slope (tangent) of a spiral where no aircraft is known.
 PLAIN_SLOPE = 0.05
@@ -33,20 +34,35 @@ SpiralSlopes = Callable[[float, float], tuple[float, float]]
 OwnRadius = Callable[[float, float], float]
 
 
-@dataclass(frozen=True, slots=True)
-class Point:
-    """One waypoint of a route: whose it is, where (east, north, up m), and the radius of its arc (0: bank limit)."""
+class PlacedStop(NamedTuple):
+    """A stop of the itinerary on the map; position: (3,) east, north, up, m."""
 
-    stop: Stop
-    place: tuple[float, float, float]
+    stop: ItineraryStop
+    position: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class RoutePoint:
+    """One waypoint of a route.
+
+    stop: the stop that it belongs to.
+    position: east, north, up, m.
+    arc: radius that the path turns with there, m, 0 for the bank limit's.
+    """
+
+    stop: ItineraryStop
+    position: tuple[float, float, float]
     arc: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
 class _Node:
-    """A place, or a circle about it: turn is its radius, positive to the right, 0 for a place."""
+    """A stop as a point, or as a circle about it.
 
-    stop: Stop
+    turn: the circle's radius, m, positive to the right, 0 for a point.
+    """
+
+    stop: ItineraryStop
     east: float
     north: float
     up: float
@@ -57,37 +73,38 @@ class _Node:
 
 
 def lay_circles(
-    source: str, stops: list[tuple[Stop, Floats]], notes: Notes, own_radius: OwnRadius, slopes: SpiralSlopes
-) -> list[Point]:
-    """Waypoints of a route through places and around circles.
+    source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius, slopes: SpiralSlopes
+) -> list[RoutePoint]:
+    """Waypoints of a route through points and around circles.
 
-    stops: each with its east, north and up.  Places inside a circle before or after them are left out, with a note: no
-    straight leg joins them.  Raises MissionError for a loiter too wide or too long to lay out.
+    source: names the mission in errors.  own_radius, slopes: of the aircraft.  Stops inside a circle before or after
+    them are left out, with a note: no straight leg joins them.  Raises MissionError for a loiter too wide or too long
+    to lay out.
     """
     nodes = _nodes(source, stops, notes, own_radius)
     courses = [_course(a, b) for a, b in pairwise(nodes)]
-    points: list[Point] = []
-    up = float(stops[0][1][2])
+    points: list[RoutePoint] = []
+    up = float(stops[0].position[2])
     for k, node in enumerate(nodes):
         if node.turn == 0.0:
             up = node.up
-            points.append(Point(node.stop, (node.east, node.north, up)))
+            points.append(RoutePoint(node.stop, (node.east, node.north, up)))
             continue
         into = courses[k - 1] if k else (courses[k] if k < len(courses) else 0.0)
         onward = courses[k] if k < len(courses) else None
-        run = math.hypot(node.east - points[-1].place[0], node.north - points[-1].place[1]) if points else 0.0
+        run = math.hypot(node.east - points[-1].position[0], node.north - points[-1].position[1]) if points else 0.0
         laid = _around(source, node, into, onward, up, run, slopes)
         if not k:
-            laid.insert(0, Point(node.stop, (*_rim(node, into), laid[0].place[2])))
-        up = laid[-1].place[2]
+            laid.insert(0, RoutePoint(node.stop, (*_rim(node, into), laid[0].position[2])))
+        up = laid[-1].position[2]
         points += laid
         if len(points) > MOST_STOPS:
             raise MissionError(f"{source}: item {node.stop.item}: more than {MOST_STOPS:,} places, circles laid out")
     return points
 
 
-def _nodes(source: str, stops: list[tuple[Stop, Floats]], notes: Notes, own_radius: OwnRadius) -> list[_Node]:
-    """Places and circles in flying order, each with a tangent to the next."""
+def _nodes(source: str, stops: list[PlacedStop], notes: Notes, own_radius: OwnRadius) -> list[_Node]:
+    """Points and circles in flying order, each with a tangent to the next."""
     nodes: list[_Node] = []
     for stop, (east, north, up) in stops:
         node = _Node(stop, float(east), float(north), float(up))
@@ -108,12 +125,12 @@ def _nodes(source: str, stops: list[tuple[Stop, Floats]], notes: Notes, own_radi
     return nodes
 
 
-def _left_out(stop: Stop, circle: Stop, notes: Notes) -> None:
+def _left_out(stop: ItineraryStop, circle: ItineraryStop, notes: Notes) -> None:
     name = f"lies inside the circle of item {circle.item}, which is joined on a tangent: not flown to"
     notes.add(name if stop.item >= 0 else f"home {name}", stop.item if stop.item >= 0 else None)
 
 
-def _turn(source: str, stop: Stop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius) -> float:
+def _turn(source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: Notes, own_radius: OwnRadius) -> float:
     """Signed radius of a loiter, m."""
     radius = abs(loiter.radius)
     if radius > WIDEST:
@@ -128,13 +145,13 @@ def _turn(source: str, stop: Stop, loiter: Loiter, up: float, notes: Notes, own_
 
 
 def _joined(a: _Node, b: _Node) -> bool:
-    """Whether a tangent leads from one circle to another circle or place, or both are one circle."""
+    """Whether a tangent leads from one circle to another circle or point, or both are one circle."""
     apart = a.away(b)
     return apart > abs(b.turn - a.turn) + _CLEAR or (apart < 1.0 and abs(a.turn - b.turn) < 1.0)
 
 
 def _course(a: _Node, b: _Node) -> float:
-    """Course of the tangent from one circle (or place) to the next, rad; of one circle to itself, north."""
+    """Course of the tangent from one circle (or point) to the next, rad; of one circle to itself, north."""
     apart = a.away(b)
     if apart < 1.0:
         return 0.0
@@ -153,7 +170,7 @@ def _rim(node: _Node, course: float, out: float = 1.0) -> tuple[float, float]:
 
 def _around(
     source: str, node: _Node, into: float, onward: float | None, up: float, run: float, slopes: SpiralSlopes
-) -> list[Point]:
+) -> list[RoutePoint]:
     """Corners around a circle, joined on one course and left on another (None: the mission ends there).
 
     up: height where the leg before started, m.  run: its length, m.
@@ -185,7 +202,7 @@ def _around(
     for k in range(count):
         share = 1.0 if count == 1 else k / (count - 1)
         east, north = _rim(node, into + side * (k + 0.5) * step, 1.0 / math.cos(0.5 * step))
-        points.append(Point(node.stop, (east, north, first + share * (node.up - first)), radius))
+        points.append(RoutePoint(node.stop, (east, north, first + share * (node.up - first)), radius))
     if onward is None and sweep > 0.0:
-        points.append(Point(node.stop, (*_rim(node, into + side * sweep), node.up)))
+        points.append(RoutePoint(node.stop, (*_rim(node, into + side * sweep), node.up)))
     return points

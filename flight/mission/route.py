@@ -12,11 +12,15 @@ Floats = NDArray[np.float64]
 class Route:
     """Waypoints in flying order; leg i goes from waypoint i to i + 1.
 
-    waypoints: (w, 3) world m.  airspeed: (w - 1,) m/s on each leg.  acceptance: (w,) m, 0 where the mission states
-    none (advisory: the verdict has its own rule).  fly_over: (w,) bool.  items: (w,) the mission item's seq, -1 for a
-    point that is no item.  arcs: (w,) m, the radius that the path turns with there, 0 for the bank limit's; a loiter is
-    the corners of a polygon around its circle, all of one item, each with the circle's radius.  started: a sentence:
-    where and how the flight starts.  notes: what cannot be flown as written, with item numbers.
+    waypoints: (w, 3) east, north, up, m.
+    airspeed: (w - 1,) m/s on each leg.
+    acceptance: (w,) m, 0 where the mission states none (advisory: the verdict has its own rule).
+    fly_over: (w,) bool, whether the waypoint is flown through instead of by.
+    items: (w,) the mission item's seq, -1 for a point that is no item.
+    started: a sentence for people: where and how the flight starts.
+    notes: what cannot be flown as written, with item numbers.
+    arcs: (w,) m, the radius that the path turns with there, 0 for the bank limit's; a loiter is the corners of a
+        polygon around its circle, all of one item, each with the circle's radius.
     """
 
     waypoints: Floats

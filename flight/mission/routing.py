@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission, command_name
-from flight.mission.itinerary import Itinerary, Notes, Stop, plan_stops
-from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, SpiralSlopes, lay_circles
+from flight.mission.itinerary import Itinerary, ItineraryStop, Notes, make_itinerary
+from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, SpiralSlopes, lay_circles
 from flight.mission.route import Route
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
@@ -18,16 +18,16 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-# Places nearer to each other than this (m) are one place.
+# Positions nearer to each other than this (m) are one.
 SAME_PLACE = 1.0
-# Leg that stands for a climb on the spot, m: a metre of height on it is 89.4 degrees.
-STEP = 0.01
+# Horizontal length of a vertical leg, m: a metre of height on it is 89.4 degrees.
+VERTICAL_STEP = 0.01
 # Heights (m AMSL) that a flight may be asked to keep.
 LOWEST, HIGHEST = -500.0, 9000.0
 # Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.
 DEFAULT_RADIUS = 80.0
 OVER_TIGHTEST = 1.1
-# A spiral climbs and sinks with this share of what the aircraft can in straight flight.
+# A spiral climbs and sinks with this share of the aircraft's limits in straight flight.
 SPIRAL_SHARE = 0.6
 # A home that is further than this (m) from the ground at its place is worth a note.
 _HOME_ERROR = 30.0
@@ -41,41 +41,42 @@ def make_route(
     fly_over: bool,
     limits: Limits | None = None,
     *,
-    on_the_spot: bool = False,
+    vertical_legs: bool = False,
 ) -> Route:
-    """Route of a mission in the map about ``origin``.
+    """Route of a mission on the map about ``origin``.
 
-    terrain: None where none is known; heights above terrain are then an error.  default_airspeed: m/s until the
-    mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and sets none).  fly_over: whether
-    waypoints are flown through instead of by.  limits: the aircraft's, for the radius of a loiter that states none and
-    the slope of a spiral; None takes 80 m and 5 %.  on_the_spot: whether a place straight above or below the one before
-    it becomes a leg of `STEP` m, for a judge to call it what it is; otherwise it is an error.
+    terrain: None where none is known; heights above terrain are then an error.
+    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and
+        sets none).
+    fly_over: whether waypoints are flown through instead of by.
+    limits: the aircraft's, for the radius of a loiter that states none and the slope of a spiral; None takes 80 m and
+        5 %.
+    vertical_legs: whether a position straight above or below the one before it becomes a leg of `VERTICAL_STEP` m,
+        which the verdict's slope rule then refuses; otherwise it is an error.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
-    has a horizontal length of at least `SAME_PLACE`, or `STEP` on the spot.  Raises MissionError, naming the item, for
-    what cannot be placed, and for a mission of fewer than two places.
+    has a horizontal length of at least `SAME_PLACE`, or `VERTICAL_STEP` if vertical.  Raises MissionError, naming the
+    item, for what cannot be placed, and for a mission of fewer than two positions.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> items = [
+    ...     MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, lat, -84.2, 700.0)
+    ...     for k, lat in enumerate((36.50, 36.51, 36.52), 1)
+    ... ]
+    >>> route = make_route(Mission(None, tuple(items)), GeoOrigin(36.5, -84.2), None, 25.0, fly_over=False)
+    >>> route.waypoints.round().tolist()
+    [[0.0, 0.0, 700.0], [0.0, 1110.0, 700.0], [0.0, 2219.0, 700.0]]
+    >>> route.started
+    'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
     """
-    itinerary = plan_stops(mission, default_airspeed)
+    itinerary = make_itinerary(mission, default_airspeed)
     notes = Notes()
-    heights = _Heights(mission.source, itinerary, origin, terrain, notes)
-    flat = _on_map(mission.source, itinerary.stops, origin)
-    kept: list[tuple[Stop, Floats]] = []
-    for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
-        last = float(kept[-1][1][2]) if kept else math.nan
-        point = np.array([east, north, heights.amsl(stop, float(east), float(north), last)])
-        circles = stop.loiter is not None or bool(kept and kept[-1][0].loiter is not None)
-        if kept and not circles and math.dist(kept[-1][1][:2], point[:2]) < SAME_PLACE:
-            if on_the_spot and _straight_up(kept[-1], (stop, point)):
-                kept.append((stop, _step_aside(kept, point)))
-                continue
-            kept[-1] = (_merge(mission.source, kept[-1], (stop, point), notes), kept[-1][1])
-        else:
-            kept.append((stop, point))
+    kept = _placed_stops(mission.source, itinerary, origin, terrain, notes, vertical_legs)
     points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
     if len(points) < 2:
         raise MissionError(f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected")
     stops = [point.stop for point in points]
-    waypoints = np.array([point.place for point in points])
+    waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
     if mission.cruise_speed not in (None, default_airspeed) and stops[1].airspeed == default_airspeed:
         notes.add(
@@ -94,6 +95,27 @@ def make_route(
     )
 
 
+def _placed_stops(
+    source: str, itinerary: Itinerary, origin: GeoOrigin, terrain: Terrain | None, notes: Notes, vertical_legs: bool
+) -> list[PlacedStop]:
+    """Stops on the map, without those at the position of the one before."""
+    heights = _Heights(source, itinerary, origin, terrain, notes)
+    flat = _on_map(source, itinerary.stops, origin)
+    kept: list[PlacedStop] = []
+    for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
+        last = float(kept[-1].position[2]) if kept else math.nan
+        new = PlacedStop(stop, np.array([east, north, heights.amsl(stop, float(east), float(north), last)]))
+        circles = stop.loiter is not None or bool(kept and kept[-1].stop.loiter is not None)
+        if kept and not circles and math.dist(kept[-1].position[:2], new.position[:2]) < SAME_PLACE:
+            if vertical_legs and _is_vertical(kept[-1], new):
+                kept.append(PlacedStop(stop, _step_aside(kept, new.position)))
+                continue
+            kept[-1] = PlacedStop(_merge(source, kept[-1], new, notes), kept[-1].position)
+        else:
+            kept.append(new)
+    return kept
+
+
 def _own_radius(limits: Limits | None) -> OwnRadius:
     """Radius of a loiter that states none: a tenth over the bank limit's in this wind, in whole tens of metres."""
 
@@ -109,15 +131,15 @@ def _own_radius(limits: Limits | None) -> OwnRadius:
 
 
 def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
-    """Slopes of a spiral: a share of what the aircraft can on the worst course around it."""
+    """Slopes of a spiral: a share of the aircraft's limits on the worst course around it."""
 
     def slopes(airspeed: float, up: float) -> tuple[float, float]:
         if limits is None:
             return PLAIN_SLOPE, PLAIN_SLOPE
         found = []
         for k, most in enumerate((limits.max_climb, limits.max_dive)):
-            can = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
-            least = min(can, math.inf if most is None else most)
+            limit = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
+            least = min(limit, math.inf if most is None else most)
             # An aircraft that cannot climb at all gets a plain spiral, and the slope rule says so.
             found.append(SPIRAL_SHARE * math.tan(least) if 0.0 < least < 1.5 else PLAIN_SLOPE)
         return found[0], found[1]
@@ -125,11 +147,11 @@ def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
     return slopes
 
 
-def _name(stop: Stop) -> str:
+def _name(stop: ItineraryStop) -> str:
     return f"item {stop.item}" if stop.item >= 0 else "home"
 
 
-def _on_map(source: str, stops: tuple[Stop, ...], origin: GeoOrigin) -> Floats:
+def _on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> Floats:
     """East and north of each stop, (n, 2) m."""
     east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
     points = np.stack([east, north], axis=1)
@@ -157,7 +179,7 @@ class _Heights:
         self.home = itinerary.home
         self._home_amsl: float | None = None
 
-    def amsl(self, stop: Stop, east: float, north: float, last: float) -> float:
+    def amsl(self, stop: ItineraryStop, east: float, north: float, last: float) -> float:
         """Height of a stop; ``last``: the one before, NaN at the first."""
         if math.isnan(stop.alt):
             if math.isnan(last):
@@ -175,7 +197,7 @@ class _Heights:
             )
         return height
 
-    def _ground(self, stop: Stop, east: float, north: float) -> float:
+    def _ground(self, stop: ItineraryStop, east: float, north: float) -> float:
         asked = f"{self.source}: {_name(stop)}: height above terrain (frame {stop.frame})"
         if self.terrain is None:
             raise MissionError(f"{asked}: no terrain is given to count from")
@@ -184,12 +206,12 @@ class _Heights:
             raise MissionError(f"{asked}: {self.terrain.source} has no data there")
         return under
 
-    def _over_home(self, stop: Stop) -> float:
+    def _over_home(self, stop: ItineraryStop) -> float:
         if self._home_amsl is None:
             self._home_amsl = self._find_home(stop, self.home)
         return self._home_amsl
 
-    def _find_home(self, stop: Stop, home: Home) -> float:
+    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
         under = math.nan
         if self.terrain is not None:
             east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
@@ -211,24 +233,24 @@ class _Heights:
         return under
 
 
-def _straight_up(kept: tuple[Stop, Floats], new: tuple[Stop, Floats]) -> bool:
-    """Whether a place is straight above or below the one before, and no take-off's."""
-    return abs(float(new[1][2] - kept[1][2])) >= SAME_PLACE and new[0].command not in TAKEOFFS
+def _is_vertical(kept: PlacedStop, new: PlacedStop) -> bool:
+    """Whether a stop is straight above or below the one before, and no take-off's."""
+    return abs(float(new.position[2] - kept.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
 
 
-def _step_aside(kept: list[tuple[Stop, Floats]], point: Floats) -> Floats:
-    """The place `STEP` m further on the course that leads to the last one; east of it where there is none."""
+def _step_aside(kept: list[PlacedStop], point: Floats) -> Floats:
+    """Position `VERTICAL_STEP` m further on the course to the last one, or east of it, at the height of a point."""
     course = math.pi / 2.0
     if len(kept) > 1:
-        course = float(leg_courses(np.array([kept[-2][1], kept[-1][1]]))[0])
-    east, north, _ = kept[-1][1]
-    return np.array([east + STEP * math.sin(course), north + STEP * math.cos(course), point[2]])
+        course = float(leg_courses(np.array([kept[-2].position, kept[-1].position]))[0])
+    east, north, _ = kept[-1].position
+    return np.array([east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), point[2]])
 
 
-def _merge(source: str, kept: tuple[Stop, Floats], new: tuple[Stop, Floats], notes: Notes) -> Stop:
+def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
     """Leave out a stop at the place of the one before it; returns the one before, under its number."""
-    before, after = kept[0], new[0]
-    climb = float(new[1][2] - kept[1][2])
+    before, after = kept.stop, new.stop
+    climb = float(new.position[2] - kept.position[2])
     if abs(climb) >= SAME_PLACE:
         side = "above" if climb > 0.0 else "below"
         if after.command not in TAKEOFFS:
@@ -242,7 +264,7 @@ def _merge(source: str, kept: tuple[Stop, Floats], new: tuple[Stop, Floats], not
     return before if before.item >= 0 else after
 
 
-def _started(itinerary: Itinerary, first: Stop, origin: GeoOrigin, waypoints: Floats) -> str:
+def _started(itinerary: Itinerary, first: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
     course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
     lat, lon = first.lat_deg, first.lon_deg
     if first.loiter is not None:

@@ -29,7 +29,11 @@ _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 def mission_kind(path: Path) -> Kind:
-    """Form that a file's suffix names.  Raises MissionError for any other suffix."""
+    """Form that a file's suffix names.  Raises MissionError for any other suffix.
+
+    >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
+    ('plan', 'waypoints')
+    """
     try:
         return KINDS[path.suffix.lower()]
     except KeyError:
@@ -37,10 +41,21 @@ def mission_kind(path: Path) -> Kind:
 
 
 def read_mission(path: Path) -> Mission:
-    """Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
+    r"""Read a mission file: WPL 110 text (.waypoints, .txt, .fence, .rally) or a `.plan`.
 
     The suffix must be known; where text and suffix disagree, the text decides.  Raises MissionError with one line:
     file, line or field, value, what is allowed.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "short.waypoints"
+    ...     home, first = "0 1 0 16 0 0 0 0 36.5 -84.2 300 1", "1 0 3 16 0 0 0 0 36.51 -84.2 100 1"
+    ...     _ = path.write_text(f"QGC WPL 110\n{home}\n{first}\n", encoding="ascii")
+    ...     mission = read_mission(path)
+    >>> mission.home
+    Home(lat_deg=36.5, lon_deg=-84.2, alt=300.0)
+    >>> [(item.seq, item.lat_deg, item.alt) for item in mission.items]
+    [(1, 36.51, 100.0)]
     """
     mission_kind(path)
     return parse_mission(_read_text(path), str(path))
@@ -56,7 +71,14 @@ def parse_mission(text: str, source: str) -> Mission:
 
 
 def mission_text(mission: Mission, kind: Kind) -> str:
-    """Mission as the text of a file; the same mission always gives the same bytes."""
+    r"""Mission as the text of a file; the same mission always gives the same bytes.
+
+    kind: "waypoints" (QGC WPL 110), "plan" (QGroundControl's JSON), or its "fence" or "rally" points alone, as WPL.
+
+    >>> mission = parse_mission("QGC WPL 110\n1 0 3 16 0 0 0 0 36.51 -84.2 100 1\n", "short.waypoints")
+    >>> mission_text(mission, "waypoints").splitlines()[2].split()
+    ['1', '0', '3', '16', '0', '0', '0', '0', '36.51000000', '-84.20000000', '100.000', '1']
+    """
     return _WRITERS[kind](mission)
 
 

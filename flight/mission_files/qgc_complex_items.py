@@ -25,28 +25,28 @@ def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any
         if kind == "SimpleItem":
             out.append(item)
             continue
-        place = f"{source}: mission.items.{k}"
+        where = f"{source}: mission.items.{k}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECTS:
-            made = _transects(item, place, name)
+            made = _transects(item, where, name)
         elif name == _LANDING:
-            made = _landing(item, place, _last_number(out) + 1)
+            made = _landing(item, where, _last_number(out) + 1)
         else:
             raise MissionError(
-                f"{place}.type: {json.dumps(kind)[:40]} {name!r}: only SimpleItem, {', '.join(_TRANSECTS)} and"
+                f"{where}.type: {json.dumps(kind)[:40]} {name!r}: only SimpleItem, {', '.join(_TRANSECTS)} and"
                 f" {_LANDING} are read; have the ground station turn it into items first"
             )
-        warnings.append(f"{place}: {name} taken as the {len(made)} simple items that it stands for")
+        warnings.append(f"{where}: {name} taken as the {len(made)} simple items that it stands for")
         out += made
     return out
 
 
-def _transects(item: dict[str, Any], place: str, name: str) -> list[Any]:
+def _transects(item: dict[str, Any], where: str, name: str) -> list[Any]:
     held = item.get("TransectStyleComplexItem")
     items = held.get("Items") if isinstance(held, dict) else None
     if not isinstance(items, list) or not items:
         raise MissionError(
-            f"{place}.TransectStyleComplexItem.Items: {name!r} without its items: a list is expected;"
+            f"{where}.TransectStyleComplexItem.Items: {name!r} without its items: a list is expected;"
             " have the ground station save the plan anew"
         )
     return items
@@ -58,18 +58,18 @@ def _last_number(items: list[Any]) -> int:
     return number if isinstance(number, int) else len(items)
 
 
-def _landing(item: dict[str, Any], place: str, number: int) -> list[Any]:
+def _landing(item: dict[str, Any], where: str, number: int) -> list[Any]:
     """DO_LAND_START, the way in (a spiral down, or a waypoint), and LAND, as QGC sends them."""
-    approach = _coordinate(item, "landingApproachCoordinate", place) or _coordinate(item, "loiterCoordinate", place)
-    land = _coordinate(item, "landCoordinate", place)
+    approach = _coordinate(item, "landingApproachCoordinate", where) or _coordinate(item, "loiterCoordinate", where)
+    land = _coordinate(item, "landCoordinate", where)
     if approach is None or land is None:
         key = "landCoordinate" if land is None else "landingApproachCoordinate"
-        raise MissionError(f"{place}.{key}: missing: latitude, longitude and altitude are expected")
+        raise MissionError(f"{where}.{key}: missing: latitude, longitude and altitude are expected")
     relative = item.get("altitudesAreRelative", True)
     frame = Frame.GLOBAL_RELATIVE_ALT if relative else Frame.GLOBAL
     radius = item.get("loiterRadius", 0.0)
     if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0.0 <= radius <= 1e5:
-        raise MissionError(f"{place}.loiterRadius: {json.dumps(radius)[:40]}: 0..100000 m is expected")
+        raise MissionError(f"{where}.loiterRadius: {json.dumps(radius)[:40]}: 0..100000 m is expected")
     turn = float(radius) if item.get("loiterClockwise", True) else -float(radius)
     spiral = item.get("useLoiterToAlt", True)
     into = (
@@ -86,17 +86,17 @@ def _landing(item: dict[str, Any], place: str, number: int) -> list[Any]:
             "autoContinue": True,
             "command": int(command),
             "doJumpId": number + k,
-            "frame": int(where),
+            "frame": int(item_frame),
             "params": params,
         }
-        for k, (command, where, params) in enumerate(made)
+        for k, (command, item_frame, params) in enumerate(made)
     ]
 
 
-def _coordinate(item: dict[str, Any], key: str, place: str) -> list[Any] | None:
+def _coordinate(item: dict[str, Any], key: str, where: str) -> list[Any] | None:
     value = item.get(key)
     if value is None:
         return None
     if not isinstance(value, list) or len(value) != 3:
-        raise MissionError(f"{place}.{key}: {json.dumps(value)[:40]}: latitude, longitude and altitude are expected")
+        raise MissionError(f"{where}.{key}: {json.dumps(value)[:40]}: latitude, longitude and altitude are expected")
     return value

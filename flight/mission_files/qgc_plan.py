@@ -69,19 +69,19 @@ class _Disc(_Table):
     radius: Annotated[float, Field(gt=0.0, le=1e7)]
 
 
-class _Circle(_Table):
+class _FenceCircle(_Table):
     circle: _Disc
     inclusion: bool
 
 
-class _Polygon(_Table):
+class _FencePolygon(_Table):
     polygon: Annotated[list[_Pair], Field(min_length=3, max_length=1000)]
     inclusion: bool
 
 
-class _Fence(_Table):
-    circles: Annotated[list[_Circle], Field(max_length=1000)] = []
-    polygons: Annotated[list[_Polygon], Field(max_length=1000)] = []
+class _GeoFence(_Table):
+    circles: Annotated[list[_FenceCircle], Field(max_length=1000)] = []
+    polygons: Annotated[list[_FencePolygon], Field(max_length=1000)] = []
 
 
 class _Rally(_Table):
@@ -92,14 +92,14 @@ class _File(_Table):
     fileType: Literal["Plan"]
     version: Annotated[int, Field(ge=1, le=1)]
     mission: _Mission
-    geoFence: _Fence = _Fence()
+    geoFence: _GeoFence = _GeoFence()
     rallyPoints: _Rally = _Rally()
 
 
 def parse_plan_file(text: str, source: str) -> Mission:
     """Read the text of a `.plan` file; ``source`` names it in messages.
 
-    An item's number is its doJumpId, or its place in the list where it has none.  null is NaN.  Raises MissionError
+    An item's number is its doJumpId, or its index in the list where it has none.  null is NaN.  Raises MissionError
     with file, field, value and what is allowed.
     """
     try:
@@ -168,27 +168,31 @@ def _read_home(values: list[float | None] | None, source: str) -> Home | None:
     if values is None or values[0] is None or values[1] is None:
         return None
     lat, lon, alt = values[0], values[1], values[2] or 0.0
-    place = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
-    problem = item_problem(place)
+    read = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
+    problem = item_problem(read)
     if problem is not None:
         raise MissionError(f"{source}: mission.plannedHomePosition: {problem}")
-    return Home(on_grid(lat), on_grid(lon), alt + 0.0) if place.has_position else None
+    return Home(on_grid(lat), on_grid(lon), alt + 0.0) if read.has_position else None
 
 
-def _read_fences(fence: _Fence, source: str) -> tuple[MissionItem, ...]:
+def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
     found: list[MissionItem] = []
 
-    def add(command: Command, p1: float, point: list[float], place: str) -> None:
+    def add(command: Command, p1: float, point: list[float], where: str) -> None:
         item = MissionItem(
             len(found), int(command), Frame.GLOBAL, (p1, 0.0, 0.0, 0.0), on_grid(point[0]), on_grid(point[1]), 0.0
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(f"{source}: geoFence.{place}: {problem}")
+            raise MissionError(f"{source}: geoFence.{where}: {problem}")
         found.append(item)
 
     for k, shape in enumerate(fence.polygons):
-        command = Command.NAV_FENCE_POLYGON_INCLUSION if shape.inclusion else Command.NAV_FENCE_POLYGON_EXCLUSION
+        command = (
+            Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION
+            if shape.inclusion
+            else Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+        )
         for point in shape.polygon:
             add(command, float(len(shape.polygon)), point, f"polygons.{k}")
     for k, ring in enumerate(fence.circles):
@@ -268,7 +272,7 @@ def _item_json(item: MissionItem) -> dict[str, Any]:
         "type": "SimpleItem",
     }
     if is_located(item.command, item.frame):
-        # QGC leaves these out for commands without a place.
+        # QGC leaves these out for commands without a position.
         data |= {"AMSLAltAboveTerrain": None, "Altitude": numbers[6], "AltitudeMode": _altitude_mode(item.frame)}
     return data
 

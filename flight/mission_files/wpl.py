@@ -57,7 +57,7 @@ _ALLOWED = {"seq": (0, 65535), "current": (0, 1), "frame": (0, 255), "command": 
 class _Row:
     """One line of the file, as numbers."""
 
-    place: str
+    where: str
     current: bool
     item: MissionItem
 
@@ -91,7 +91,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
         raise MissionError(f"{source}: no items after the header")
     for before, after in pairwise(rows):
         if after.item.seq <= before.item.seq:
-            raise MissionError(f"{after.place}: seq {after.item.seq}: must be above the one before, {before.item.seq}")
+            raise MissionError(f"{after.where}: seq {after.item.seq}: must be above the one before, {before.item.seq}")
     home, body = _split_home(rows)
     fences = numbered([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
@@ -105,13 +105,13 @@ def parse_waypoints(text: str, source: str) -> Mission:
     )
 
 
-def _row(place: str, line: str) -> _Row:
+def _row(where: str, line: str) -> _Row:
     fields = line.split()
     if len(fields) != len(_COLUMNS):
-        raise MissionError(f"{place}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})")
+        raise MissionError(f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})")
     values = dict(zip(_COLUMNS, fields, strict=True))
-    whole = {name: _whole(place, name, values[name]) for name in _ALLOWED}
-    p1, p2, p3, p4, lat, lon, alt = (_number(place, name, values[name]) for name in _COLUMNS[4:11])
+    whole = {name: _whole(where, name, values[name]) for name in _ALLOWED}
+    p1, p2, p3, p4, lat, lon, alt = (_number(where, name, values[name]) for name in _COLUMNS[4:11])
     # A home line of Mission Planner may carry command 0.
     command = whole["command"] or (Command.NAV_WAYPOINT if whole["seq"] == 0 else 0)
     if is_located(command, whole["frame"]) and position_problem(lat, lon) is None:
@@ -121,21 +121,21 @@ def _row(place: str, line: str) -> _Row:
     )
     problem = item_problem(item)
     if problem is not None:
-        raise MissionError(f"{place}: {problem}")
-    return _Row(place, bool(whole["current"]), item)
+        raise MissionError(f"{where}: {problem}")
+    return _Row(where, bool(whole["current"]), item)
 
 
-def _whole(place: str, name: str, text: str) -> int:
+def _whole(where: str, name: str, text: str) -> int:
     low, high = _ALLOWED[name]
     if not _WHOLE.fullmatch(text) or not low <= int(text) <= high:
-        raise MissionError(f"{place}: {name} {_shown(text)}: a whole number {low}..{high} is expected")
+        raise MissionError(f"{where}: {name} {_shown(text)}: a whole number {low}..{high} is expected")
     return int(text)
 
 
-def _number(place: str, name: str, text: str) -> float:
+def _number(where: str, name: str, text: str) -> float:
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
-        raise MissionError(f"{place}: {name} {_shown(text)}: a finite number is expected{hint}")
+        raise MissionError(f"{where}: {name} {_shown(text)}: a finite number is expected{hint}")
     # 0.0 for -0.0, which no other form of a mission keeps.
     return float(text) + 0.0
 
@@ -158,20 +158,20 @@ def _warnings(rows: list[_Row], body: list[_Row]) -> list[str]:
     if not any(row.current for row in rows):
         found.append("no current item: flown from the first")
     if len(body) == len(rows):
-        found.append(f"{rows[0].place}: not a home line (seq 0, command 16): the mission has no home")
+        found.append(f"{rows[0].where}: not a home line (seq 0, command 16): the mission has no home")
     elif rows[0].item.has_position and rows[0].item.frame not in (Frame.GLOBAL, Frame.GLOBAL_INT):
         found.append(
-            f"{rows[0].place}: home in frame {rows[0].item.frame}: its height is taken as above mean sea level"
+            f"{rows[0].where}: home in frame {rows[0].item.frame}: its height is taken as above mean sea level"
         )
     gaps = [after for before, after in pairwise(rows) if after.item.seq != before.item.seq + 1]
     if gaps:
         found.append(
-            f"{gaps[0].place}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): numbers kept as written"
+            f"{gaps[0].where}: a gap in seq before {gaps[0].item.seq} ({len(gaps)} in all): numbers kept as written"
         )
     lost = [row for row in body if row.item.command in PLACES | LANDINGS and not row.item.has_position]
     if lost:
         name = command_name(lost[0].item.command)
-        found.append(f"{lost[0].place}: {name} at 0, 0, which is no position ({len(lost)} such items in all)")
+        found.append(f"{lost[0].where}: {name} at 0, 0, which is no position ({len(lost)} such items in all)")
     return found
 
 
@@ -189,7 +189,7 @@ def fence_text(mission: Mission) -> str:
 
 
 def rally_text(mission: Mission) -> str:
-    """Rally points of a mission as a WPL file of their own, as `fence_text`."""
+    """Rally points of a mission as a WPL file of their own: numbered from 0, and no home line."""
     return _lines(mission.rally)
 
 
@@ -206,9 +206,9 @@ def _text(home: Home | None, items: tuple[MissionItem, ...]) -> str:
 
 def _line(item: MissionItem, *, current: bool) -> str:
     numbers = [_decimal(value, 0) for value in item.params]
-    place = [_decimal(item.lat_deg, 8), _decimal(item.lon_deg, 8), _decimal(item.alt, 3)]
+    position = [_decimal(item.lat_deg, 8), _decimal(item.lon_deg, 8), _decimal(item.alt, 3)]
     whole = [str(int(value)) for value in (item.seq, current, item.frame, item.command)]
-    return "\t".join([*whole, *numbers, *place, str(int(item.autocontinue))])
+    return "\t".join([*whole, *numbers, *position, str(int(item.autocontinue))])
 
 
 def _decimal(value: float, places: int) -> str:

@@ -17,21 +17,26 @@ from world.scenario_file import Guidance, Navigation
 class FlightSetup:
     """What is flown, by what, in which world; the log carries all of it.
 
-    airspeed: m/s.  max_bank: rad.  battery: Wh.  mission_text: the mission as a .waypoints file, as flown.
-    plan: None for a mission that a person brought.  seed: of the run; the turbulence's stream comes from it
-    unless the scenario's wind has its own.  guidance: the law that steers.  nav: how well it knows where it is, a key
-    of `flight.guidance.navigation_error.ERRORS`.  guidance_hz: how often it steers, and how many rows the track has a
-    second.
+    scenario: the world, and what it asks of the flight.
+    mission: its items, as read or exported.
+    mission_text: the same as a .waypoints file, as flown.
+    route: the waypoints that the mission comes to.
+    limits: of scenario and aircraft together; made once, with the setup.
+    aircraft: its name in the catalog, or its folder.
+    battery: energy carried, Wh.
+    seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
+    plan: None for a mission that a person brought.
+    guidance: the law that steers.
+    nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
+    guidance_hz: how often it steers, and how many rows the track has a second.
     """
 
     scenario: Scenario
     mission: Mission
     mission_text: str
     route: Route
-    envelope: Envelope
+    limits: Limits
     aircraft: str
-    airspeed: float
-    max_bank: float
     battery: float
     seed: int
     plan: Plan | None = None
@@ -39,14 +44,34 @@ class FlightSetup:
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
 
+    @property
+    def envelope(self) -> Envelope:
+        """Table of the aircraft's climbs, descents, speeds and powers."""
+        return self.limits.envelope
 
-def limits_of(setup: FlightSetup) -> Limits:
-    """Make the limits that this flight is judged against."""
-    return make_limits(setup.scenario, setup.envelope, setup.airspeed, setup.max_bank)
+    @property
+    def airspeed(self) -> float:
+        """Airspeed until the mission sets another, m/s."""
+        return self.limits.airspeed
+
+    @property
+    def max_bank(self) -> float:
+        """Steepest bank in turns, rad."""
+        return self.limits.max_bank
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
-    """Make a scenario's limits, with the aircraft's where the scenario leaves them to it."""
+    """Limits of a path: the scenario's, with the aircraft's where the scenario leaves them to it.
+
+    airspeed: m/s.  max_bank: rad; the envelope's is used where it is less.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from world.scenario import load_scenario
+    >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
+    >>> limits.min_clearance, limits.max_bank, limits.max_turn is None
+    (60.0, 0.5, False)
+    """
 
     def number(value: float | str) -> float | None:
         return None if isinstance(value, str) else math.radians(value)

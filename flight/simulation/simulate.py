@@ -20,7 +20,7 @@ from flight.guidance.gains import load_gains
 from flight.guidance.navigation_error import ERRORS, NAV_STATES, start_navigation
 from flight.guidance.rows import Lateral, M
 from flight.simulation.dryden import GUST_STATES, start_gusts
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Chart, Ground
 from flight.simulation.tick import ENDS, linked_tick, tick
 from flight.simulation.track import COLUMNS, Track, quantised
@@ -91,7 +91,7 @@ def _slowest_leg(setup: FlightSetup, limits: Limits) -> float:
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
     speeds = []
     for leg, airspeed in enumerate(setup.route.airspeed):
-        table = limits.packed(float(airspeed))
+        table = limits.performance(float(airspeed))
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
     return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0
 
@@ -100,7 +100,7 @@ class Flight:
     """One flight in progress, advanced by `block`: `simulate` in one go, the live vehicle in step with a clock."""
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> None:
-        scenario, limits = setup.scenario, limits_of(setup)
+        scenario, limits = setup.scenario, setup.limits
         self.path = fly_by_path(setup.route, limits)
         self.speeds = setup.route.airspeed
         gains = load_gains(aircraft)

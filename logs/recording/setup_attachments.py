@@ -15,7 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from logs.recording.setup_schema import (
     EnvelopeFile,
     Finite,
@@ -151,15 +151,14 @@ def unpack_setup(pieces: dict[str, bytes], source: str) -> StoredSetup:
     listed = {name: pieces[name] for name in file.sha256}
     terrain = unpack_terrain(listed, source) if TERRAIN in listed else None
     scenario = _scenario(listed, source, terrain, file.foreign)
+    envelope = read_envelope(file.envelope, f"{source}: {SETUP}")
     setup = FlightSetup(
         scenario=scenario,
         mission=read_mission(file.mission),
         mission_text=_text(listed, MISSION, source),
         route=read_route(file.route, f"{source}: {SETUP}"),
-        envelope=read_envelope(file.envelope, f"{source}: {SETUP}"),
+        limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),
         aircraft=file.aircraft,
-        airspeed=file.airspeed_mps,
-        max_bank=file.max_bank_rad,
         battery=file.battery_wh,
         seed=file.seed,
         plan=_plan(listed, source, terrain) if PLAN in listed else None,

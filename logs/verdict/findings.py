@@ -11,7 +11,7 @@ from logs.verdict.wording import disagreement_text, place_text, suggestions_text
 
 SCHEMA = "planfly.verdict/2"
 
-# Each rule and its title, in the order in which a verdict is told.
+# Each rule and its title, in the order in which a verdict lists them.
 RULES = {
     "mission": "mission",
     "turn": "turns",

@@ -12,7 +12,7 @@ from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.tighter_limits import slope_limit, steep_arc, tighter_turn, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.turn_demands import available_lengths, packed_limits, turn_demands, turn_lengths
+from logs.verdict.measures.turn_demands import available_lengths, performance_tables, turn_demands, turn_lengths
 from logs.verdict.places import FLIGHT, Change, Place, Quantity, Suggestion
 from logs.verdict.tolerances import (
     ABOVE_SLOWEST,
@@ -69,7 +69,7 @@ def slope_suggestions(demands: RouteDemands, leg: int, item: Finding) -> tuple[S
     rise = abs(float(demands.points[leg + 1, 2] - demands.points[leg, 2]))
     run = float(demands.runs[leg])
     if planned <= limit and item.flown is not None:
-        # The geometry passes and the flight did not: what it managed is what it can.
+        # The geometry passes and the flight did not: what it managed is its limit.
         limit = min(limit, abs(math.radians(item.flown)))
     allowed = limit - BUFFER_ANGLE
     if allowed <= 0.0 or planned <= allowed:
@@ -153,7 +153,7 @@ def _gentler_turn(demands: RouteDemands, i: int, allowed: float) -> float:
         airspeed=route.airspeed[first : last - 1],
         **{name: getattr(route, name)[first:last] for name in ("acceptance", "fly_over", "items", "arcs")},
     )
-    tables, at = packed_limits(near, demands.limits), i - first
+    tables, at = performance_tables(near, demands.limits), i - first
     for _ in range(TRIES):
         degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
         if degrees <= 0.0:
@@ -185,7 +185,7 @@ def _slope_speed(demands: RouteDemands, leg: int, slope: float) -> float | None:
     course, side = float(demands.courses[leg]), 0 if demands.slopes[leg] >= 0.0 else 1
     heights = (float(demands.points[leg, 2]), float(demands.points[leg + 1, 2]))
     for speed in _speeds(demands, max(heights), float(demands.setup.route.airspeed[leg])):
-        table = demands.limits.packed(speed)
+        table = demands.limits.performance(speed)
         if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
             return speed
     return None
@@ -196,7 +196,7 @@ def _turn_speed(demands: RouteDemands, i: int) -> float | None:
     now = float(max(demands.setup.route.airspeed[i - 1 : i + 1]))
     available = min(available_lengths(demands.runs, demands.before, demands.after, demands.reversal, i))
     for speed in sorted((v for v in _speeds(demands, float(demands.points[i, 2]), now) if v < now), reverse=True):
-        table = demands.limits.packed(speed)
+        table = demands.limits.performance(speed)
         radius = turn_radius_between(table, demands.courses[i - 1], demands.courses[i], float(demands.points[i, 2]))
         used = turn_lengths(abs(float(demands.turns[i])), radius, bool(demands.setup.route.fly_over[i]))
         if max(used) + BUFFER_LENGTH <= available:
@@ -213,9 +213,9 @@ def _further(demands: RouteDemands, aligned: AlignedTrack | None, place: Place, 
     threats = demands.setup.scenario.threats
     one = slice(m, m + 1)
     spheres = (threats.position[one], threats.kill_radius[one], threats.kill_scale[one])
-    nearest = path_spheres(demands.path.points, demands.path.times, *spheres)[0, 2]
+    nearest = path_spheres(demands.path.points, demands.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
-        nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres)[0, 2])
+        nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
     away = _whole(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
     return ((Change("distance", place, None, away, "m"),),)
 

@@ -56,7 +56,7 @@ OFF_SPEED = 1.0
 # Share of the wind at 6 m.  Standard deviation of the gust along the track: MIL-F-8785C has 0.1 high up to 0.2 at the
 # ground.
 GUST_SHARE = 0.15
-# rad.  What an aircraft showed that it can may fall short of what a leg asks by this and `SURE` standard errors.
+# rad.  The ability that an aircraft showed may fall short of what a leg asks by this and `SURE` standard errors.
 SHOWN_TOLERANCE = math.radians(0.1)
 # Standard errors.  How far a measured ability may be out.
 SURE = 3.0
@@ -72,7 +72,7 @@ SPEED_MEMORY = 12.0
 THROUGHOUT = 0.8
 # Throttle 0..1, and battery current in A, that count as at a limit.
 FULL, IDLE, NO_CURRENT = 0.99, 0.01, 0.02
-# Throttle 0..1.  What an aircraft can is seen at its whole throttle alone: 1 % of the Aerosonde's is 0.6 degrees of
+# Throttle 0..1.  An aircraft's ability is seen at its whole throttle alone: 1 % of the Aerosonde's is 0.6 degrees of
 # climb.
 WHOLE_THROTTLE = 0.999
 # s.  Least time over which an ability is measured; how long after the throttle came to its limit; after how long
@@ -130,7 +130,7 @@ RESERVE = 0.2
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.
-REACH = 500.0
+CAPTURE_RADIUS = 500.0
 # m.  A waypoint that the track ends at is passed within this of its apex, beside the fly-by's own distance.
 ARRIVED = 10.0
 # m, m/s.  No position or speed of ours is larger; what is, is garbage.
@@ -148,7 +148,7 @@ PX4_LANDING_ANGLE = math.radians(5.0 + 0.1)
 PX4_FIRST_WAYPOINT = 10_000.0
 # m.  MIS_DIST_WPS of the releases that had it.
 PX4_BETWEEN_WAYPOINTS = 900.0
-# m.  A condition gate nearer than this to a waypoint is at its place.
+# m.  A condition gate nearer than this to a waypoint is at the same position.
 PX4_GATE_APART = 0.05
 # Highest actuator number and value of DO_SET_SERVO.
 PX4_MOST_SERVO, PX4_MOST_PWM = 5, 2000.0

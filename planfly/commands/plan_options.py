@@ -10,7 +10,6 @@ from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
 
-from flight.simulation.flight_setup import make_limits
 from planfly.airframe import Airframe
 from planner.plan import Objective, Plan, read_plan
 from planner.search.explain_failure import what_blocks
@@ -80,7 +79,7 @@ def make_plan(
     args: argparse.Namespace, scenario: Scenario, old: Plan | None, airframe: Airframe, seed: int, advance: "Advance"
 ) -> Plan:
     """Plan as the command line asks."""
-    limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
+    limits = airframe.limits
     with best_so_far(args.budget[1] if args.budget else None) as stop:
         if old is None:
             return plan_path(scenario, limits, seed=seed, algorithm=args.algorithm, progress=advance, stop=stop)

@@ -5,10 +5,10 @@ import time
 
 import numpy as np
 
-from flight.live.downlink import INFO
 from flight.live.link import Link
-from flight.live.snapshot import Watcher
-from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, status_texts, telemetry_message
+from flight.live.snapshot import SnapshotMaker
+from flight.live.status_text import INFO, status_texts
+from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, telemetry_message
 from flight.mission.items import Home
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
@@ -22,10 +22,10 @@ _PATIENCE = 10.0
 def play(log: FlightLog, args: argparse.Namespace) -> None:
     """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
     link, wait = Link(link_access(args)), _PATIENCE if args.wait is None else args.wait
-    watcher = Watcher(log.setup)
+    snapshots = SnapshotMaker(log.setup)
     track = log.track
     rows = track_rows(track)
-    start = watcher.before_start(log.setup)
+    start = snapshots.before_start(log.setup)
     home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
     status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
     items = log.setup.route.items
@@ -43,10 +43,10 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
                     len(rows) - 1,
                     int(np.searchsorted(track.time, (time.monotonic() - begun) * (args.speed or 1.0), side="right")),
                 )
-                moment = watcher.moment(rows[k])
-                if moment.finite:
-                    status.moment = moment
-                    status.current = max(0, int(items[min(int(moment.leg) + 1, len(items) - 1)]))
+                snapshot = snapshots.snapshot(rows[k])
+                if snapshot.finite:
+                    status.snapshot = snapshot
+                    status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
                 player.step(0.01)
             if log.ended == "completed" and k == len(rows) - 1:
                 status.mission_state = COMPLETE
@@ -67,7 +67,7 @@ class _Player:
         self._texts = 0
 
     def say(self, text: str) -> None:
-        """Tell the stations and the terminal."""
+        """Send a text to the stations, and print it."""
         print(text, flush=True)
         self._texts += 1
         for peer in self._link.peers.values():
@@ -81,7 +81,7 @@ class _Player:
             self.step(0.05)
 
     def rest(self, seconds: float, stopped: Stopped) -> None:
-        """Go on telling the last moment."""
+        """Go on sending the last snapshot."""
         end = time.monotonic() + seconds
         while time.monotonic() < end and not stopped():
             self.step(0.02)
@@ -93,7 +93,7 @@ class _Player:
         self._link.receive()
         if now >= self._hello:
             self._hello = now + 1.0
-            self._link.hello(heartbeat(self._status))
+            self._link.send_heartbeat(heartbeat(self._status))
         for peer in self._link.peers.values():
             for name, due in peer.due.items():
                 if now >= due:

@@ -8,13 +8,13 @@ from typing import Any
 from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_plan_only
-from planfly.airframe import choose_seed, load_airframe
+from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.pipeline import flight_events, fly, make_plan, make_setup
 from planfly.refine import refine
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, write_missions, write_pictures, write_verdict
 from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, refuse_folder
-from planner.plan import plan_json
+from planner.plan import Plan, plan_json
 from world.atomic_files import write_whole
 from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_flight
@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> Verdict:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
     scenario = with_flight(load_scenario(args.scenario), guidance=args.guidance, nav=args.nav)
     seed = choose_seed(scenario, args.seed)
-    load_airframe(scenario)
+    airframe = load_airframe(scenario)
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
     if args.out:
         refuse_folder(folder, args.overwrite)
@@ -37,13 +37,13 @@ def run(args: argparse.Namespace) -> Verdict:
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
         nonlocal cleared
-        plan_airframe = load_airframe(planned_in)
+        planned_with = airframe if planned_in is scenario else tightened_airframe(airframe, planned_in)
         with progress(f"planning {scenario.name}") as advance:
-            plan = make_plan(planned_in, plan_airframe, seed, advance=advance)
+            plan = make_plan(planned_in, planned_with, seed, advance=advance)
         if not cleared:
             prepare_folder(folder)
             cleared = True
-        return _fly_round(folder, scenario, plan, seed, command)
+        return _fly_round(folder, scenario, airframe, plan, seed, command)
 
     verdict, rounds = refine(scenario, args.refine, one_round, lambda number: _keep(folder, number))
     if args.refine:
@@ -52,8 +52,9 @@ def run(args: argparse.Namespace) -> Verdict:
     return verdict
 
 
-def _fly_round(folder: Path, scenario: Scenario, plan: Any, seed: int, command: str) -> tuple[Verdict, bool]:
-    airframe = load_airframe(scenario)
+def _fly_round(
+    folder: Path, scenario: Scenario, airframe: Airframe, plan: Plan, seed: int, command: str
+) -> tuple[Verdict, bool]:
     write_whole(folder / "plan.json", plan_json(plan))
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints")
     write_missions(mission, [folder / "mission.waypoints", folder / "mission.plan"])

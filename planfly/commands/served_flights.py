@@ -1,4 +1,4 @@
-"""The process that flies, as ``planfly serve`` sets it up: scenario, verdicts in words, and logs."""
+"""The process that flies, as ``planfly serve`` sets it up: scenario, verdicts as texts, and logs."""
 
 import contextlib
 import math
@@ -9,9 +9,16 @@ from pathlib import Path
 
 import numpy as np
 
-from flight.live.downlink import CRITICAL, INFO, NOTICE, WARNING
-from flight.live.flight_process import Judge, Landed, Ready, Up, Words, answer, serve_flights
-from flight.live.snapshot import Watcher
+from flight.live.flight_process import (
+    FlightJudged,
+    JudgeMission,
+    MissionJudged,
+    ProcessReady,
+    send_event,
+    serve_flights,
+)
+from flight.live.snapshot import SnapshotMaker
+from flight.live.status_text import CRITICAL, INFO, NOTICE, WARNING, StatusText
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import Flight, as_track
@@ -28,15 +35,18 @@ from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
 
 DEFAULT_SCENARIO = "jacksboro"
-# Most words about one verdict; the log has the rest.
-_MOST_WORDS = 4
+# Most texts about one verdict; the log has the rest.
+_MOST_TEXTS = 4
 
 
 @dataclass(frozen=True, slots=True)
-class Served:
-    """What is served, in words that both processes understand.
+class ServeOptions:
+    """What the command line asks to serve; both processes load it for themselves.
 
-    mission: "" for none.  scenario, terrain: None where not named.  logs: the folder of the flight logs.
+    mission: a file's path, "" for none.
+    scenario, terrain: None where not named.
+    speed: times real time.
+    logs: the folder of the flight logs.
     """
 
     mission: str
@@ -47,7 +57,7 @@ class Served:
 
 
 @dataclass(frozen=True, slots=True)
-class World:
+class ServedScenario:
     """The scenario, the aircraft in it, the seed, and the mission to begin with."""
 
     scenario: Scenario
@@ -56,38 +66,38 @@ class World:
     mission: Mission | None
 
 
-def open_world(served: Served) -> World:
+def open_served(options: ServeOptions) -> ServedScenario:
     """Load what is served.  Raises PlanflyError."""
-    if served.mission:
-        opened = open_mission(Path(served.mission), served.scenario, served.terrain)
-        return World(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
-    scenario = load_scenario(served.scenario or DEFAULT_SCENARIO, served.terrain)
-    return World(scenario, load_airframe(scenario), scenario.planner.seed or 1, None)
+    if options.mission:
+        opened = open_mission(Path(options.mission), options.scenario, options.terrain)
+        return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
+    scenario = load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain)
+    return ServedScenario(scenario, load_airframe(scenario), scenario.planner.seed or 1, None)
 
 
-def fly_process(connection: Connection, served: Served) -> None:
+def fly_process(connection: Connection, options: ServeOptions) -> None:
     """Run the process that flies."""
-    # Ctrl-C reaches the whole group; the link tells this process when to end.
+    # Ctrl-C reaches the whole group; the link orders this process to end.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    hangar = ServedHangar(served)
-    hangar.warm()
-    answer(connection, Up())
-    serve_flights(connection, hangar)
+    factory = ServedFlights(options)
+    factory.warm()
+    send_event(connection, ProcessReady())
+    serve_flights(connection, factory)
 
 
-class ServedHangar:
+class ServedFlights:
     """Judges missions in the served scenario, and logs flights into the served folder."""
 
-    def __init__(self, served: Served) -> None:
-        self._world = open_world(served)
-        self._logs = served.logs
-        self.aircraft = self._world.airframe.aircraft
-        self.speed = served.speed
+    def __init__(self, options: ServeOptions) -> None:
+        self._served = open_served(options)
+        self._logs = options.logs
+        self.aircraft = self._served.airframe.aircraft
+        self.speed = options.speed
 
     def warm(self) -> None:
         """Fly half a second and judge it, so that no station waits for compilers later."""
-        scenario = self._world.scenario
+        scenario = self._served.scenario
         points = np.linspace(scenario.start, scenario.destination, 3)
         lats, lons = to_geo(scenario.origin, points[:, 0], points[:, 1])
         none, amsl = (0.0, 0.0, 0.0, 0.0), float(points[0, 2])
@@ -96,29 +106,30 @@ class ServedHangar:
             for k, (lat, lon) in enumerate(zip(lats.tolist(), lons.tolist(), strict=True), 1)
         )
         with contextlib.suppress(PlanflyError):
-            setup = make_setup(scenario, self._world.airframe, Mission(None, items), self._world.seed)
+            setup = make_setup(scenario, self._served.airframe, Mission(None, items), self._served.seed)
             judge_geometry(setup)
             rows, _ = Flight(setup, self.aircraft).block(30)
             judge_flight(setup, as_track(rows), "warm")
 
-    def prepare(self, order: Judge) -> tuple[FlightSetup | None, Ready]:
+    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
         """Judge a mission on its geometry, and see that it can be started."""
-        world = self._world
+        served = self._served
         try:
-            setup = make_setup(world.scenario, world.airframe, order.mission, world.seed)
+            setup = make_setup(served.scenario, served.airframe, order.mission, served.seed)
             # Its first tick says whether it can start, and has the loop compiled.
             Flight(setup, self.aircraft).block(1)
-            watcher = Watcher(setup)
+            snapshots = SnapshotMaker(setup)
         except PlanflyError as error:
-            return None, Ready(order.number, False, False, ((CRITICAL, f"mission cannot be flown: {error}"),))
+            text = StatusText(f"mission cannot be flown: {error}", CRITICAL)
+            return None, MissionJudged(order.number, False, False, (text,))
         verdict = judge_geometry(setup)
         home = order.mission.home
-        start = watcher.before_start(setup)
+        start = snapshots.before_start(setup)
         if home is None:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
-        words = mission_words(setup, verdict)
-        return setup, Ready(order.number, True, verdict.flyable, words, home, items, start)
+        texts = mission_texts(setup, verdict)
+        return setup, MissionJudged(order.number, True, verdict.flyable, texts, home, items, start)
 
     def open_log(self, setup: FlightSetup) -> "ServedLog":
         """Open the next free ``flight-NNN.mcap``."""
@@ -148,38 +159,38 @@ class ServedLog:
         self._recorder.write(block)
         self._recorder.flush()
 
-    def finish(self, ended: str) -> Landed:
+    def finish(self, ended: str) -> FlightJudged:
         """Judge the flight and close the log."""
         track = join_tracks(self._blocks)
         verdict = judge_flight(self._setup, track, ended)
         end = float(track.time[-1]) if len(track) else 0.0
         self._recorder.event(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
         self._recorder.finish(ended, verdict)
-        return Landed(verdict.flyable, (*verdict_words("flown", verdict), (INFO, f"log {self._path}")))
+        return FlightJudged(verdict.flyable, (*verdict_texts("flown", verdict), StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:
         """Close the log as it is."""
         self._recorder.__exit__(OSError, None, None)
 
 
-def mission_words(setup: FlightSetup, verdict: Verdict) -> tuple[Words, ...]:
-    """What stations are told of a mission: verdict, size, and what is not flown as written."""
+def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:
+    """Texts about a mission for stations: verdict, size, and what is not flown as written."""
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
-    size = (INFO, f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}")
-    notes = tuple((NOTICE, f"note: {note}") for note in route.notes[:_MOST_WORDS])
-    return (size, *verdict_words("geometry", verdict), *notes)
+    size = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
+    notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MOST_TEXTS])
+    return (size, *verdict_texts("geometry", verdict), *notes)
 
 
-def verdict_words(level: str, verdict: Verdict) -> tuple[Words, ...]:
+def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     """A verdict in a few lines, the worst first."""
     failed = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
-        return ((INFO, f"verdict ({level}): FLYABLE"),)
-    lines = [(WARNING, f"{_heading(item)}: {item.reason}") for item in failed[:_MOST_WORDS]]
-    if len(failed) > _MOST_WORDS:
-        lines.append((WARNING, f"and {len(failed) - _MOST_WORDS} more findings"))
-    return ((WARNING, f"verdict ({level}): NOT FLYABLE"), *lines)
+        return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
+    lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MOST_TEXTS]]
+    if len(failed) > _MOST_TEXTS:
+        lines.append(StatusText(f"and {len(failed) - _MOST_TEXTS} more findings", WARNING))
+    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *lines)
 
 
 def _heading(item: Finding) -> str:

@@ -13,20 +13,20 @@ from logs.verdict.findings import RULES, Finding, Verdict, verdict_json
 from logs.verdict.wording import place_text, suggestions_text
 from world.atomic_files import write_whole
 
-# Failed findings that are told one by one.
-_TOLD = 12
+# Failed findings that are listed one by one.
+_LISTED = 12
 
 
 def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
     """The verdict on the terminal: the summary first, then what fails, then the tightest finding of each rule."""
     print(verdict.summary)
     failed = [finding for finding in verdict.findings if finding.ok is False]
-    for finding in failed[:_TOLD]:
+    for finding in failed[:_LISTED]:
         print(f"  failed  {finding.rule} at {place_text(finding.place)}: {finding.reason}")
         if finding.suggestions:
             print(f"          would pass: {suggestions_text(finding.suggestions)}")
-    if len(failed) > _TOLD:
-        print(f"  failed  and {len(failed) - _TOLD} more")
+    if len(failed) > _LISTED:
+        print(f"  failed  and {len(failed) - _LISTED} more")
     for rule, title in RULES.items():
         mine = [finding for finding in verdict.findings if finding.rule == rule]
         if mine:

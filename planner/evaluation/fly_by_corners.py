@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import BLEND_ACCELERATION, turn_tangents, wind_speed_at
+from aircraft.path_limits import BLEND_ACCELERATION, PerformanceTable, turn_tangents, wind_speed_at
 from planner.evaluation.problem_arrays import Rules
 from world.geometry import turning_angle
 from world.kernels import compiled, inlined
@@ -17,9 +17,9 @@ ARC_STEP = math.radians(15.0)
 
 
 @inlined
-def blend_reach(packed: Floats, amsl: float) -> float:  # pragma: no cover - compiled
+def blend_reach(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
     """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
-    speed = packed[0, 0] + wind_speed_at(packed, amsl)
+    speed = table.airspeed + wind_speed_at(table, amsl)
     reach: float = speed * speed / (2.0 * BLEND_ACCELERATION)
     return reach
 
@@ -31,7 +31,9 @@ def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: floa
 
 
 @compiled
-def corner_past(packed: Floats, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:  # pragma: no cover
+def corner_past(
+    table: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
+) -> Floats:  # pragma: no cover
     """Vertices (k, 3) of the way that a flight takes past a waypoint, at least as low as the flight.
 
     They are: a point on the leg where the blend of heights begins, the fly-by arc of this radius from tangent point to
@@ -57,7 +59,7 @@ def corner_past(packed: Floats, before: Floats, at: Floats, after: Floats, radiu
     room_in, room_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
     beside = 0.5 * arc if chords > 0 else min(room_in, room_out)
     room_in, room_out = min(room_in, beside), min(room_out, beside)
-    reach = blend_reach(packed, at[2])
+    reach = blend_reach(table, at[2])
     half_in = min(abs(slope_in - slope) * reach, room_in)
     half_out = min(abs(slope - slope_out) * reach, room_out) if chords > 0 else half_in
     cut_in = 0.25 * max(0.0, slope_in - slope) * half_in

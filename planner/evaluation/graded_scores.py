@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.path_limits import PerformanceTable
 from planner.evaluation.fly_by_corners import ARC_STEP, blend_reach, corner_past
 from planner.evaluation.leg_constraints import Gauge, constraints, make_gauge, measure_corners, measure_legs
 from planner.evaluation.missile_index import Missiles, kill_density
@@ -63,14 +64,14 @@ def score_path(
     """Judge path n of (n, w, 3): rows n of missed (n, 4), which must be 0, and of objectives."""
     # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
     heights, to_pixel, missiles = rules.heights, rules.to_pixel, rules.missiles
-    steep, packed, clear, margin = rules.steep, rules.aircraft, gauge.clear, rules.kill_margin
+    steep, table, clear, margin = rules.steep, rules.aircraft, gauge.clear, rules.kill_margin
     legs, corners, bends, lines, gaps = bench.legs, bench.corners, bench.bends, bench.lines, bench.gaps
     asked = bench.asked
     count = paths.shape[1]
     measure_legs(paths, n, legs)
     measure_corners(rules, gauge, paths, n, legs, corners)
     constraints(rules, gauge, paths, n, legs, corners, True, missed)
-    _measure_bends(packed, rules.room, rules.fly_over, paths, n, legs, corners, bends)
+    _measure_bends(table, rules.room, rules.fly_over, paths, n, legs, corners, bends)
     sound(heights, steep, to_pixel, clear, paths, n, legs, bends[:, REACH], lines, asked)
     length, kill = 0.0, 0.0
     for i in range(count - 1):
@@ -89,7 +90,7 @@ def score_path(
         close = drop + aside > CORNER_SLACK or min(gaps[i - 1, 1], gaps[i, 0]) < drop + aside
         if drop + aside < 0.01 or not (low or close):
             continue
-        arc = corner_past(packed, paths[n, i - 1], paths[n, i], paths[n, i + 1], bends[i, RADIUS])
+        arc = corner_past(table, paths[n, i - 1], paths[n, i], paths[n, i + 1], bends[i, RADIUS])
         if low:
             missed[n, 2] += _corner_depth(heights, steep, to_pixel, clear, arc)
         if close:
@@ -136,7 +137,14 @@ def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # 
 
 @compiled_views
 def _measure_bends(
-    packed: Floats, room: bool, fly_over: bool, paths: Floats, n: int, legs: Floats, corners: Floats, out: Floats
+    table: PerformanceTable,
+    room: bool,
+    fly_over: bool,
+    paths: Floats,
+    n: int,
+    legs: Floats,
+    corners: Floats,
+    out: Floats,
 ) -> None:  # pragma: no cover - compiled
     """Fill out (w, 5): radius of the flown arc at each waypoint, and how far the flown corner departs from the legs, m.
 
@@ -151,7 +159,7 @@ def _measure_bends(
         slope_in = slope_out
         slope_out = (paths[n, i + 1, 2] - paths[n, i, 2]) / max(legs[i, 2], 1e-6)
         crest = max(0.0, slope_in - slope_out)
-        reach = blend_reach(packed, paths[n, i, 2])
+        reach = blend_reach(table, paths[n, i, 2])
         aside = math.sqrt(radius * radius + tangent * tangent) - radius
         aside += min(aside, radius * CHORD_RISE)
         out[i, RADIUS] = radius

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import (
+    PerformanceTable,
     arc_slope,
     corner_tangent,
     downwind,
@@ -55,9 +56,9 @@ def make_gauge(rules: Rules) -> Gauge:  # pragma: no cover - compiled
     climb, dive = rules.climb, rules.dive
     by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
-        climb = _least_slope(rules, 1)
+        climb = _least_slope(rules, rules.aircraft.climb)
     if math.isnan(dive):
-        dive = _least_slope(rules, 2)
+        dive = _least_slope(rules, rules.aircraft.descent)
     return Gauge(
         # A turn cannot exceed half a circle, whatever rounding says.
         math.cos(rules.max_turn) if rules.max_turn < math.pi else -2.0,
@@ -72,19 +73,19 @@ def make_gauge(rules: Rules) -> Gauge:  # pragma: no cover - compiled
 
 
 @compiled_views
-def _least_slope(rules: Rules, row: int) -> float:  # pragma: no cover - compiled
+def _least_slope(rules: Rules, angles: Floats) -> float:  # pragma: no cover - compiled
     """Slope (rad) that the aircraft can do on any course between floor and ceiling; -1 for none.
 
-    row: of the packed aircraft, 1 to climb and 2 to sink.  Least with the strongest wind behind.
+    angles: of the aircraft's table, to climb or to sink.  Least with the strongest wind behind.
     """
-    packed = rules.aircraft
-    wind = max(wind_speed_at(packed, rules.floor), wind_speed_at(packed, rules.ceiling))
+    table = rules.aircraft
+    wind = max(wind_speed_at(table, rules.floor), wind_speed_at(table, rules.ceiling))
     angle = math.inf
-    for k in range(int(packed[0, 6])):
-        angle = min(angle, packed[row, 8 + k])
-    if not angle > 0.0 or wind >= 0.99 * packed[0, 0] * math.cos(angle):
+    for k in range(angles.size):
+        angle = min(angle, angles[k])
+    if not angle > 0.0 or wind >= 0.99 * table.airspeed * math.cos(angle):
         return -1.0
-    return math.atan2(packed[0, 0] * math.sin(angle), packed[0, 0] * math.cos(angle) + wind)
+    return math.atan2(table.airspeed * math.sin(angle), table.airspeed * math.cos(angle) + wind)
 
 
 @compiled_views
@@ -155,18 +156,18 @@ def measure_corners(
     rules: Rules, gauge: Gauge, paths: Floats, n: int, legs: Floats, corners: Floats
 ) -> None:  # pragma: no cover - compiled
     """Fill corners (w, 2) of path n: length of leg that its arc takes on either side and the arc's radius, m."""
-    packed, wx, wy = rules.aircraft, gauge.wind_east, gauge.wind_north
+    table, wx, wy = rules.aircraft, gauge.wind_east, gauge.wind_north
     last = legs.shape[0]
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1, 0], legs[i - 1, 1], legs[i, 0], legs[i, 1]
         corners[i, 0], corners[i, 1] = 0.0, 0.0
         if (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0):
-            corners[i, 0], corners[i, 1] = corner_tangent(packed, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
+            corners[i, 0], corners[i, 1] = corner_tangent(table, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
     for i, asked in ((0, rules.start_course), (last, rules.destination_course)):
         corners[i, 0], corners[i, 1] = 0.0, 0.0
         if not math.isnan(asked) and legs[min(i, last - 1), 2] > 0.0:
             ux, uy, vx, vy = _courses(rules, legs, i)
-            corners[i, 0], corners[i, 1] = corner_tangent(packed, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
+            corners[i, 0], corners[i, 1] = corner_tangent(table, ux, uy, vx, vy, paths[n, i, 2], wx, wy)
 
 
 @compiled_views
@@ -261,11 +262,11 @@ def turn_need(rules: Rules, legs: Floats, corners: Floats, i: int) -> float:  # 
 
 @compiled
 def roll_need(
-    packed: Floats, legs: Floats, corners: Floats, i: int, amsl: float, wx: float, wy: float
+    table: PerformanceTable, legs: Floats, corners: Floats, i: int, amsl: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
     """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side.
 
-    packed: the aircraft.  w: downwind.
+    table: of the aircraft.  w: downwind.
     """
     if i == 0 or i == legs.shape[0] - 1 or corners[i, 0] <= 0.0 or corners[i + 1, 0] <= 0.0:
         return 0.0
@@ -273,7 +274,7 @@ def roll_need(
     into, onward = legs[i - 1, 0] * uy - legs[i - 1, 1] * ux, ux * legs[i + 1, 1] - uy * legs[i + 1, 0]
     if into * onward >= 0.0 or math.isinf(corners[i, 0] + corners[i + 1, 0]):
         return 0.0
-    room: float = reversal_room(packed, ux, uy, amsl, corners[i, 1], corners[i + 1, 1], wx, wy)
+    room: float = reversal_room(table, ux, uy, amsl, corners[i, 1], corners[i + 1, 1], wx, wy)
     return room
 
 

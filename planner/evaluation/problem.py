@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import Limits
+from aircraft.path_limits import Limits, derated
 from planner.evaluation.encoding import Space
 from planner.evaluation.missile_index import make_missiles
 from planner.evaluation.problem_arrays import Rules, Steep, pack_spheres
@@ -93,7 +93,7 @@ def _rules(scenario: Scenario, limits: Limits) -> Rules:
         to_pixel=terrain.to_pixel.packed,
         threats=units,
         spheres=pack_spheres(units),
-        aircraft=_with_share(limits, scenario.wind.turbulence),
+        aircraft=derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence]),
         bounds=scenario.bounds,
         start=scenario.start,
         destination=scenario.destination,
@@ -147,15 +147,6 @@ def _steep(terrain: Terrain) -> Steep:
     around = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
     around.setflags(write=False)
     return Steep(most, around, TILE * terrain.spacing)
-
-
-def _with_share(limits: Limits, turbulence: str) -> Floats:
-    """Packed aircraft of which a plan uses the share of climb and dive that turbulence leaves."""
-    packed = limits.packed()
-    angles = packed[1:, 8:]
-    # What is below 0 is a loss of height, of which no share helps.
-    packed[1:, 8:] = np.where(angles > 0.0, TURBULENCE_SHARE[turbulence] * angles, angles)
-    return packed
 
 
 def _inset(rules: Rules) -> Rules:

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.path_limits import PerformanceTable
 from planner.evaluation.missile_index import Missiles
 from planner.evaluation.threat_grid import Cells
 
@@ -32,7 +33,7 @@ class Rules(NamedTuple):
     """What paths are judged against, in the form that the compiled functions take.
 
     threats: (m, 7) east, north, up, kill radius and scale, detection radius and scale.  spheres: the same, of
-    `pack_spheres`.  aircraft: packed limits.
+    `pack_spheres`.  aircraft: what it can do.
     max_turn: rad.  room: whether a leg must hold its turns.  fly_over: whether a
     turn begins at its waypoint, not before it.  climb, dive: rad, NaN to ask the aircraft.
     spare: rad kept inside slope limits.  clearance, reserve: m, required and kept on top.  kill_margin: m.
@@ -46,7 +47,7 @@ class Rules(NamedTuple):
     to_pixel: Floats
     threats: Floats
     spheres: Floats
-    aircraft: Floats
+    aircraft: PerformanceTable
     bounds: Floats
     start: Floats
     destination: Floats

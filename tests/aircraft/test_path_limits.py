@@ -98,11 +98,11 @@ def test_a_speed_outside_the_envelope_has_no_slope() -> None:
 
 def test_gradient_moves_the_limits_with_height() -> None:
     limits = _limits(Wind(4.0, math.radians(270.0), gradient=0.01, reference_amsl=200.0))
-    assert wind_speed_at(limits.packed(), 800.0) == pytest.approx(10.0)
-    assert wind_speed_at(limits.packed(), -500.0) == 0.0
-    assert ground_speed_on(limits.packed(), EAST, 800.0) == pytest.approx(35.0)
-    assert ground_speed_on(limits.packed(), WEST, 800.0) == pytest.approx(15.0)
-    assert ground_speed_on(limits.packed(), NORTH, 800.0) == pytest.approx(math.sqrt(525.0))
+    assert wind_speed_at(limits.performance(), 800.0) == pytest.approx(10.0)
+    assert wind_speed_at(limits.performance(), -500.0) == 0.0
+    assert ground_speed_on(limits.performance(), EAST, 800.0) == pytest.approx(35.0)
+    assert ground_speed_on(limits.performance(), WEST, 800.0) == pytest.approx(15.0)
+    assert ground_speed_on(limits.performance(), NORTH, 800.0) == pytest.approx(math.sqrt(525.0))
 
 
 @given(st.floats(0.0, 24.0), st.floats(-6.3, 6.3), st.floats(-math.pi, math.pi), st.floats(-3.1, 3.1))
@@ -111,7 +111,7 @@ def test_radius_is_for_the_highest_ground_speed_on_the_arc(
 ) -> None:
     assume(abs(turn) > 1e-3)
     wind = Wind(speed, source)
-    radius = turn_radius_between(_limits(wind).packed(), course, course + turn, 500.0)
+    radius = turn_radius_between(_limits(wind).performance(), course, course + turn, 500.0)
     courses = course + turn * np.linspace(0.0, 1.0, 2001)
     # The ground speed on each course, by the triangle of speeds.
     east, north = wind.at(500.0)
@@ -134,22 +134,22 @@ def test_turbulence_widens_turns() -> None:
 
 
 def test_tangents_of_a_path() -> None:
-    packed = _limits().packed()
+    table = _limits().performance()
     way = np.array(
         [[0, 0, 500], [0, 1000, 500], [1000, 1000, 500], [2000, 1000, 500], [2000, 1000, 600], [1000, 1000, 500.0]]
     )
     radius = 25.0**2 / (G * math.tan(BANK))
-    tangents = turn_tangents(packed, way)
+    tangents = turn_tangents(table, way)
     assert tangents[:3] == pytest.approx([0.0, radius, 0.0])  # a right angle, then straight on
     assert tangents[3:].tolist() == [0.0, 0.0, 0.0]  # legs without length have no course
     out_and_back = np.array([[0, 0, 500], [0, 1000, 500], [0, 0, 500.0]])
-    assert turn_tangents(packed, out_and_back)[1] == math.inf
+    assert turn_tangents(table, out_and_back)[1] == math.inf
 
 
 @given(st.floats(0.0, 20.0), st.floats(-6.3, 6.3), st.floats(-6.3, 6.3))
 def test_turning_the_world_turns_nothing(speed: float, source: float, angle: float) -> None:
     # Wind and courses turned alike leave slopes and radii as they are.
-    here, there = _limits(Wind(speed, source)).packed(), _limits(Wind(speed, source + angle)).packed()
+    here, there = _limits(Wind(speed, source)).performance(), _limits(Wind(speed, source + angle)).performance()
     assert aircraft_slopes(there, 0.3 + angle, 400.0) == pytest.approx(aircraft_slopes(here, 0.3, 400.0), abs=1e-9)
     assert turn_radius_between(there, 0.3 + angle, 1.7 + angle, 400.0) == pytest.approx(
         turn_radius_between(here, 0.3, 1.7, 400.0), rel=1e-7

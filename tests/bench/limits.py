@@ -13,7 +13,7 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.gains import load_gains
 from flight.mission.items import Mission
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from logs.verdict.measures.route_demands import route_demands
@@ -87,15 +87,14 @@ def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: fl
     speeds = np.full(count - 1, aircraft.airspeed)
     route = Route(way, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
     battery = aircraft.battery_energy / 3600.0
+    scenario = from_spec(spec, "limits", external=True)
     return FlightSetup(
-        scenario=from_spec(spec, "limits", external=True),
+        scenario=scenario,
         mission=Mission(None, (), source="limits"),
         mission_text="",
         route=route,
-        envelope=load_envelope(aircraft),
+        limits=make_limits(scenario, load_envelope(aircraft), aircraft.airspeed, BANK),
         aircraft=aircraft.name,
-        airspeed=aircraft.airspeed,
-        max_bank=BANK,
         battery=battery,
         seed=1,
     )
@@ -132,7 +131,7 @@ def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_fr
     setup = made_setup(leg(0.05), aircraft, wind, wind_from)
 
     def predict(amsl: float) -> float:
-        return limits_of(setup).slopes(COURSE, amsl)[0 if direction > 0.0 else 1]
+        return setup.limits.slopes(COURSE, amsl)[0 if direction > 0.0 else 1]
 
     flown = bisect(holds, 0.3 * predict(AMSL), 1.6 * predict(AMSL))
     ends = leg(flown)[1:, 2] if math.isfinite(flown) else np.array([AMSL])

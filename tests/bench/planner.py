@@ -129,7 +129,6 @@ def scaled(threats: int) -> Scenario:
 
 def scale() -> dict[str, Any]:
     """10,000 threats of the coverage of 60: cost a path."""
-    from flight.simulation.flight_setup import make_limits
     from planner.evaluation.problem import make_problem
 
     task = make_task("paper-60")
@@ -138,8 +137,7 @@ def scale() -> dict[str, Any]:
     for threats in (60, MANY):
         scenario = scaled(threats)
         airframe = load_airframe(scenario)
-        limits = make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank)
-        rules = make_problem(scenario, limits).search
+        rules = make_problem(scenario, airframe.limits).search
         for name, judge in (("paper", paper_scores), ("graded", graded_scores)):
             judge(rules, paths)
             spent = best_cpu(partial(repeated, judge, rules, paths, 5))

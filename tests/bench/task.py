@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import make_limits
 from planfly.airframe import Airframe, load_airframe
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_vectors
@@ -66,7 +65,7 @@ def make_task(name: str) -> Task:
     """The task of an embedded scenario."""
     scenario = load_scenario(name)
     airframe = load_airframe(scenario)
-    problem = make_problem(scenario, make_limits(scenario, airframe.envelope, airframe.airspeed, airframe.max_bank))
+    problem = make_problem(scenario, airframe.limits)
     return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
 
 

@@ -12,7 +12,7 @@ from aircraft.catalog import Aircraft, load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Mission
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from world.scenario import from_spec
 
 MakeSetup = Callable[..., FlightSetup]
@@ -80,7 +80,7 @@ def setup_maker(aircraft: Aircraft) -> MakeSetup:
         route = Route(way, np.full(legs, speeds, dtype=np.float64), np.zeros(len(way)), over, items, "")
         cruise = float(route.airspeed[0])
         mission = Mission(None, (), source="made")
-        bank = math.radians(bank_deg)
-        return FlightSetup(scenario, mission, "", route, envelope, aircraft.name, cruise, bank, 888.0, seed)
+        limits = make_limits(scenario, envelope, cruise, math.radians(bank_deg))
+        return FlightSetup(scenario, mission, "", route, limits, aircraft.name, 888.0, seed)
 
     return make

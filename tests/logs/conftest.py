@@ -10,7 +10,7 @@ import pytest
 from aircraft.envelope import Envelope
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import Track
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
@@ -87,10 +87,8 @@ def make_setup(*, with_plan: bool = True, **changes: object) -> FlightSetup:
         mission=mission,
         mission_text="QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t45.99\t7.99\t301.5\t1\n",
         route=route,
-        envelope=envelope,
+        limits=make_limits(scenario, envelope, 25.25, 0.5235987755982988),
         aircraft="aerosonde",
-        airspeed=25.25,
-        max_bank=0.5235987755982988,
         battery=180.5,
         seed=7,
         plan=plan if with_plan else None,

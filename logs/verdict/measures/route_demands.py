@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import BLEND_ACCELERATION, Limits, aircraft_slopes, ground_speed_on
+from aircraft.path_limits import BLEND_ACCELERATION, Limits, PerformanceTable, aircraft_slopes, ground_speed_on
 from flight.guidance.fly_by_path import fly_by_path, path_polyline
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, limits_of
-from logs.verdict.measures.turn_demands import TurnDemands, packed_limits, turn_demands
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.measures.turn_demands import TurnDemands, performance_tables, turn_demands
 from logs.verdict.places import Place
 from logs.verdict.tolerances import LARGEST_CUT
 from world.geometry import arc_cut, leg_courses, leg_runs, leg_slopes
@@ -51,7 +51,6 @@ class RouteDemands:
     """
 
     setup: FlightSetup
-    limits: Limits
     points: Floats
     runs: Floats
     courses: Floats
@@ -70,6 +69,11 @@ class RouteDemands:
     dive: Floats
     ground_speed: Floats
     path: PlannedPath
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of scenario and aircraft."""
+        return self.setup.limits
 
     @property
     def legs(self) -> int:
@@ -103,9 +107,9 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
 
     envelope: False leaves the aircraft's limits out, for flown evidence alone.
     """
-    route, limits = setup.route, limits_of(setup)
+    route, limits = setup.route, setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
-    tables = packed_limits(route, limits)
+    tables = performance_tables(route, limits)
     turning = turn_demands(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
@@ -114,7 +118,6 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     blend, deviation = _blends(setup, points, runs, turning)
     return RouteDemands(
         setup=setup,
-        limits=limits,
         points=points,
         runs=runs,
         courses=courses,
@@ -144,7 +147,7 @@ def _planned_path(route: Route, limits: Limits, ground_speed: Floats) -> Planned
 
 
 def _leg_limits(
-    route: Route, tables: dict[float, Floats], points: Floats, courses: Floats
+    route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
 ) -> tuple[Floats, Floats, Floats]:
     """Climb and dive over the ground, rad, and ground speed, m/s, that the aircraft has all along each leg."""
     legs = len(courses)

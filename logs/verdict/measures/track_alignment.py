@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flight.simulation.track import Track
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.tolerances import ARRIVED, FARTHEST, FASTEST, REACH
+from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, FARTHEST, FASTEST
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
@@ -115,14 +115,14 @@ def along_across(demands: RouteDemands, leg: int, position: Floats) -> tuple[Flo
     return east * ux + north * uy, east * uy - north * ux
 
 
-def approaches(position: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Least horizontal distance of each segment of a track from a place, m, and the fraction where that is.
+def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Least horizontal distance of each segment of a track from a target, m, and the fraction where that is.
 
-    position: (n, 3).  place: (2,) or (3,).  Returns (n - 1,) twice.
+    position: (n, 3).  target: (2,) or (3,).  Returns (n - 1,) twice.
     """
     start = position[:-1, :2]
     step = position[1:, :2] - start
-    away = place[:2] - start
+    away = target[:2] - start
     length2 = np.maximum((step * step).sum(axis=1), 1e-12)
     fraction = np.clip((step * away).sum(axis=1) / length2, 0.0, 1.0)
     rest = away - fraction[:, None] * step
@@ -153,7 +153,7 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
     step = max(1, int(_CHORD / tick), -(-len(track) * count // _CELLS))
-    chords, capped = _align(position, apexes, step, REACH)
+    chords, capped = _align(position, apexes, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; those after the last one met lie at the end.
@@ -179,11 +179,11 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
 
 @compiled
 def _align(
-    position: Floats, marks: Floats, step: int, reach: float
+    position: Floats, marks: Floats, step: int, capture: float
 ) -> tuple[Rows, NDArray[np.bool_]]:  # pragma: no cover - compiled
-    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, reach)^2.
+    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
 
-    By dynamic programming; of equal assignments the earliest.  Also which marks are out of reach of their chord.
+    By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures.
     """
     last = position.shape[0] - 1
     chords = (last + step - 1) // step
@@ -205,7 +205,7 @@ def _align(
                 start2 += out * out
             f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
             away2 = max(0.0, start2 - 2.0 * f * along + f * f * length2)
-            total = best[j] + min(away2, reach * reach)
+            total = best[j] + min(away2, capture * capture)
             if total < lowest:
                 lowest = total
                 fresh[i, j] = 1
@@ -223,5 +223,5 @@ def _align(
             for k in range(3):
                 away2 += (marks[i, k] - position[row, k]) ** 2
             nearest2 = min(nearest2, away2)
-        capped[i] = nearest2 >= reach * reach
+        capped[i] = nearest2 >= capture * capture
     return chosen, capped

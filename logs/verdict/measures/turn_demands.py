@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import Limits, downwind, fly_over_run, reversal_room, turn_radius_between
+from aircraft.path_limits import Limits, PerformanceTable, downwind, fly_over_run, reversal_room, turn_radius_between
 from flight.mission.route import Route
 from logs.verdict.tolerances import U_TURN
 from world.geometry import arc_reach, leg_courses, leg_runs, signed_turns
@@ -35,13 +35,13 @@ class TurnDemands:
     limit: Floats
 
 
-def packed_limits(route: Route, limits: Limits) -> dict[float, Floats]:
-    """The limits' packed tables at each airspeed of a route, m/s."""
-    return {float(speed): limits.packed(float(speed)) for speed in route.airspeed}
+def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceTable]:
+    """The aircraft's performance at each airspeed of a route, m/s."""
+    return {float(speed): limits.performance(float(speed)) for speed in route.airspeed}
 
 
-def turn_demands(route: Route, tables: dict[float, Floats]) -> TurnDemands:
-    """Work out what each turn takes, by the packed limits at the route's airspeeds."""
+def turn_demands(route: Route, tables: dict[float, PerformanceTable]) -> TurnDemands:
+    """Work out what each turn takes, by the aircraft's performance at the route's airspeeds."""
     points = np.asarray(route.waypoints, dtype=np.float64)
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
     turns = np.zeros(count)
@@ -71,7 +71,7 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
 
 
 def _reversals(
-    route: Route, tables: dict[float, Floats], courses: Floats, turns: Floats, radius: Floats, up: Floats
+    route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
 ) -> Floats:
     """Length of each leg that the roll from one bank into the other uses, (w - 1,) m; 0 between turns of one side."""
     out = np.zeros(len(courses))

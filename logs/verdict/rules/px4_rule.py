@@ -248,8 +248,8 @@ def _fence(setup: FlightSetup) -> Iterator[_Remark]:
         yield True, None, "the mission has no geofence"
         return
     origin, route = setup.scenario.origin, setup.route
-    for place, item in zip(route.waypoints, route.items, strict=True):
-        problem = fence_problem(setup.mission.fences, origin, float(place[0]), float(place[1]))
+    for point, item in zip(route.waypoints, route.items, strict=True):
+        problem = fence_problem(setup.mission.fences, origin, float(point[0]), float(point[1]))
         if problem is not None:
             broken, fence_item = problem
             why = message(f"geofence violation: {broken}", f" (fence item {fence_item})")

@@ -1,13 +1,14 @@
 """The threat rule: time and exposure inside each missile's and radar's sphere, planned and flown."""
 
 import math
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.path_sweeps import path_spheres
+from logs.verdict.measures.path_sweeps import SphereVisits, path_spheres
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
@@ -31,17 +32,18 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
     for side in ("missile", "radar"):
         radii, scales = _spheres(threats, side)
         plan = path_spheres(demands.path.points, demands.path.times, threats.position, radii, scales)
-        track = np.full_like(plan, math.nan)
+        track = None
         if aligned is not None:
             track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
         for m, name in enumerate(threats.names):
             if radii[m] <= 0.0:
                 continue
             if side == "missile":
-                nearest = min(nearest, (plan if geometric or aligned is None else track)[m, 2] - radii[m])
-            if plan[m, 2] <= radii[m] or track[m, 2] <= radii[m]:
-                place = Place(side, m, name=name)
-                touched.append(_touched(place, plan[m], None if geometric else track[m], float(radii[m])))
+                judged = plan if geometric or track is None else track
+                nearest = min(nearest, float(judged.closest[m] - radii[m]))
+            if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
+                visit = None if geometric else _visit(track, m)
+                touched.append(_touched(Place(side, m, name=name), _visit(plan, m), visit, float(radii[m])))
     if not any(item.place.kind == "missile" for item in touched):
         touched.insert(0, _untouched(len(threats), nearest, aligned is not None or geometric))
     return touched
@@ -52,6 +54,23 @@ def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
     if side == "missile":
         return threats.kill_radius, threats.kill_scale
     return threats.detection_radius, threats.detection_scale
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """How one sphere is met: s inside, exposure in s, m from its centre at the least and when; NaN where not flown."""
+
+    inside: float = math.nan
+    exposure: float = math.nan
+    closest: float = math.nan
+    closest_time: float = math.nan
+
+
+def _visit(visits: SphereVisits | None, m: int) -> _Visit:
+    if visits is None:
+        return _Visit()
+    columns = (visits.inside, visits.exposure, visits.closest, visits.closest_time)
+    return _Visit(*(float(column[m]) for column in columns))
 
 
 def _untouched(count: int, nearest: float, judged: bool) -> Finding:
@@ -74,36 +93,37 @@ def _untouched(count: int, nearest: float, judged: bool) -> Finding:
     )
 
 
-def _touched(place: Place, plan: Floats, track: Floats | None, radius: float) -> Finding:
+def _touched(place: Place, plan: _Visit, track: _Visit | None, radius: float) -> Finding:
     judged = plan if track is None else track
-    missing = bool(np.isnan(judged[2]))
-    facts = f"planned {plan[0]:.1f} s inside {radius:.0f} m, exposure {plan[1]:.3g} s"
+    missing = math.isnan(judged.closest)
+    facts = f"planned {plan.inside:.1f} s inside {radius:.0f} m, exposure {plan.exposure:.3g} s"
     if track is not None and not missing:
-        facts += f"; flown {track[0]:.1f} s, exposure {track[1]:.3g} s, nearest {track[2]:.0f} m at {track[3]:.1f} s"
-    flown = None if track is None else float(track[0])
+        facts += f"; flown {track.inside:.1f} s, exposure {track.exposure:.3g} s, nearest {track.closest:.0f} m"
+        facts += f" at {track.closest_time:.1f} s"
+    flown = None if track is None else track.inside
     if place.kind == "radar":
         return make_finding(
             "threat",
             place,
             ok=True,
             reason=f"reported; detection has no limit: {facts}",
-            planned=float(plan[0]),
+            planned=plan.inside,
             flown=flown,
             unit="s",
             method=_METHOD,
         )
-    ok = None if missing else bool(judged[2] > radius)
+    ok = None if missing else judged.closest > radius
     return make_finding(
         "threat",
         place,
         ok=ok,
         reason=facts if ok is not False else f"inside the missile's reach: {facts}",
-        planned=float(plan[0]),
+        planned=plan.inside,
         flown=flown,
         limit=0.0,
         source="scenario",
         tolerance=0.0,
-        margin=-float(judged[0]),
+        margin=-judged.inside,
         unit="s",
         method=_METHOD,
     )

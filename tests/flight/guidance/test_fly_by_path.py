@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flight.guidance.fly_by_path import FlyByPath, arc_point, fly_by_path, sample_path
 from flight.guidance.path_kernels import profile
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from world.geometry import leg_runs, turning_angles
 
 Floats = NDArray[np.float64]
@@ -21,7 +21,7 @@ RADIUS = 25.0**2 / (9.80665 * math.tan(math.radians(30.0)))
 
 
 def _path(setup: FlightSetup) -> FlyByPath:
-    return fly_by_path(setup.route, limits_of(setup))
+    return fly_by_path(setup.route, setup.limits)
 
 
 def _ends(piece: Floats) -> tuple[Floats, float]:
@@ -90,7 +90,7 @@ def test_any_route_with_room(make_setup: MakeSetup, data: Any) -> None:
         points.append(points[-1] + length * np.array([math.sin(course), math.cos(course), slope]))
     wind = (data.draw(st.floats(0.0, 10.0)), data.draw(st.floats(0.0, 359.0)))
     setup = make_setup(points, wind=wind)
-    path, limits = _path(setup), limits_of(setup)
+    path, limits = _path(setup), setup.limits
     _whole(path, setup)
     _smooth_profile(path)
     # The radius is at the bank limit, no smaller and no larger.
@@ -194,7 +194,7 @@ def test_slope_blends_take_the_stated_acceleration(make_setup: MakeSetup) -> Non
 
 def test_a_leg_that_the_wind_forbids_still_has_a_path(make_setup: MakeSetup) -> None:
     setup = make_setup([[0, 0, 500], [0, 1000, 500], [1000, 1000, 500]], wind=(30.0, 90.0))
-    assert limits_of(setup).turn_radius(0.0, math.pi / 2, 500.0) == math.inf
+    assert setup.limits.turn_radius(0.0, math.pi / 2, 500.0) == math.inf
     path = _path(setup)
     _whole(path, setup)
     assert np.isfinite(path.pieces[:, :7]).all()

@@ -18,7 +18,7 @@ from flight.guidance.gains import Gains, load_gains
 from flight.guidance.lateral import guide
 from flight.guidance.path_kernels import mean_curvature, profile, project
 from flight.guidance.rows import MEMORY_SIZE, G, M
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from world.errors import FlightError
 from world.geometry import signed_turns
 
@@ -86,7 +86,7 @@ class Tick:
     """One call of the core on a straight level path to the north at 500 m."""
 
     def __init__(self, setup: FlightSetup, gains: Gains) -> None:
-        path = fly_by_path(setup.route, limits_of(setup))
+        path = fly_by_path(setup.route, setup.limits)
         self.pieces, self.nodes, self.speeds = path.pieces, path.nodes, setup.route.airspeed
         way = setup.route.waypoints
         turns = np.concatenate([[0.0], np.abs(signed_turns(way)), [0.0]])

@@ -31,7 +31,7 @@ def test_a_thousand_items_arrive_as_they_were_sent() -> None:
 
 
 @pytest.mark.parametrize("seed", range(20 if SOAK else 2))
-def test_a_thousand_items_over_a_bad_link(seed: int) -> None:
+def test_a_thousand_items_survive_a_bad_link(seed: int) -> None:
     """30 % lost, doubled and reordered each way: all or, until then, nothing."""
     server, items, old = MissionServer(), many_items(1000, mark=seed), many_items(5, mark=99)
     Medium(server, [Uploader(ONE, old)]).run(5.0)
@@ -49,7 +49,7 @@ def test_a_thousand_items_over_a_bad_link(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(100))
-def test_two_stations_at_once(seed: int) -> None:
+def test_of_two_stations_at_once_one_wins(seed: int) -> None:
     """One wins and the other is denied, on a link that loses and reorders; never a mixture."""
     server = MissionServer()
     first, second = many_items(12, mark=1), many_items(12, mark=2)
@@ -170,7 +170,7 @@ def test_a_slow_station_is_not_pressed() -> None:
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.1, 0.2])
-def test_fence_and_mission_one_after_the_other_on_a_slow_link(delay: float) -> None:
+def test_fence_and_mission_follow_each_other_on_a_slow_link(delay: float) -> None:
     server = MissionServer()
     for kind, command in ((MissionType.FENCE, 5004), (MissionType.MISSION, 16), (MissionType.MISSION, 16)):
         items = [item(k, 460_000_000 + k, 80_000_000, 50.0, command=command, kind=kind, p1=50.0) for k in range(5)]
@@ -192,7 +192,7 @@ def test_fence_and_mission_one_after_the_other_on_a_slow_link(delay: float) -> N
         (item(1, 10, 10, 5.0, kind=2), 2, mavlink.MAV_MISSION_UNSUPPORTED),
     ],
 )
-def test_an_unsound_item_refuses_the_whole(wrong: object, kind: int, result: int) -> None:
+def test_an_invalid_item_refuses_the_whole(wrong: object, kind: int, result: int) -> None:
     good = {
         0: item(0, 1, 1, 5.0),
         1: item(0, 1, 1, 5.0, command=5004, kind=1, p1=9.0),
@@ -208,7 +208,7 @@ def test_an_unsound_item_refuses_the_whole(wrong: object, kind: int, result: int
     assert medium.texts[0].endswith("nothing changed")
 
 
-def test_three_lists_at_once_from_one_station() -> None:
+def test_one_station_uploads_three_lists_at_once() -> None:
     server = MissionServer()
     items = [
         many_items(40),
@@ -234,7 +234,7 @@ def test_download_gives_the_integers_back() -> None:
     assert beyond.message.type == mavlink.MAV_MISSION_INVALID_SEQUENCE
 
 
-def test_clear_lock_size_and_floats() -> None:
+def test_a_locked_or_too_large_upload_is_denied() -> None:
     server = MissionServer()
     Medium(server, [Uploader(ONE, many_items(3))]).run(5.0)
     server.locked = "in flight"

@@ -11,21 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
-from flight.dynamics.envelope_tables import load_envelope
 from flight.guidance.fly_by_path import fly_by_path, sample_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.route import Route
-from flight.mission.routing import make_route
-from flight.simulation.flight_setup import FlightSetup, limits_of
+from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.replay.timeline import timeline
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from tests.flight.mission.test_routing import ORIGIN, ground, mission, refusal, route, wp
+from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
-from world.scenario import from_spec
 from world.scenario_file import MAP_REACH
 
 TURN = 2.0 * math.pi
@@ -38,29 +35,6 @@ def circled(flown: Route, item: int) -> tuple[float, float]:
     at = (flown.items == item) & (flown.arcs > 0.0)
     assert np.ptp(flown.arcs[at]) == 0.0
     return float(turns[at].sum()) / TURN, float(flown.arcs[at][0])
-
-
-def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> FlightSetup:
-    """A mission over flat ground at 100 m, ready to fly."""
-    read = mission(*lines, home=home)
-    end = {"east_m": 0.0, "north_m": 0.0, "amsl_m": 400.0}
-    spec: dict[str, Any] = {
-        "name": "loiters",
-        "origin": {"lat_deg": ORIGIN.lat_deg, "lon_deg": ORIGIN.lon_deg},
-        "terrain": {"kind": "flat", "amsl_m": 100.0},
-        "area": {"east_m": [-6000, 6000], "north_m": [-6000, 6000], "ceiling_amsl_m": 3000.0},
-        "start": end,
-        "destination": end | {"east_m": 500.0},
-    }
-    scenario = from_spec(spec | tables, "loiters", external=True)
-    aircraft = load_aircraft("aerosonde")
-    bank = math.radians(30.0)
-    blank = Route(
-        np.array([[0.0, 0, 400], [500, 0, 400]]), np.array([25.0]), np.zeros(2), np.zeros(2, bool), np.arange(2), ""
-    )
-    envelope = load_envelope(aircraft)
-    setup = FlightSetup(scenario, read, "", blank, envelope, "aerosonde", 25.0, bank, 888.0, 1)
-    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, limits_of(setup)))
 
 
 @settings(max_examples=60, deadline=None)
@@ -84,10 +58,10 @@ def test_the_path_is_the_circle(
     assert step <= math.pi / 4.0 + 1e-6
     middle = np.array([float(v) for v in to_map(ORIGIN, *place_of(east, north))])
     # A polygon around the circle: its corners are as far out as its angle says, its sides touch.
-    reach = np.hypot(*(corners - middle).T)
-    assert reach == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
+    distances = np.hypot(*(corners - middle).T)
+    assert distances == pytest.approx(np.full(len(corners), radius / math.cos(step / 2.0)), abs=0.05)
     setup = replace(FLAT, route=flown)
-    drawn = sample_path(fly_by_path(flown, limits_of(setup)), 5.0)[:, :2]
+    drawn = sample_path(fly_by_path(flown, setup.limits), 5.0)[:, :2]
     near = np.hypot(*(drawn - middle).T)
     # No point of the path is inside the circle, and the arcs lie on it.
     assert near.min() > radius - 0.05
@@ -102,7 +76,7 @@ def place_of(east: float, north: float) -> tuple[float, float]:
 FLAT = setup_of(wp(0, 0), wp(0, 2000))
 
 
-def test_how_long() -> None:
+def test_loiters_last_as_long_as_asked() -> None:
     timed = route(wp(0, 0), wp(0, 2000, command=19, p="90 0 200 0"), wp(3000, 2000))
     assert 90.0 <= abs(circled(timed, 2)[0]) * TURN * 200.0 / 25.0 < 90.0 + TURN * 200.0 / 25.0
     endless = route(wp(0, 0), wp(0, 2000, command=17, p="0 0 -150 0"), wp(3000, 2000))
@@ -124,7 +98,7 @@ def test_to_height_spirals_within_the_envelope() -> None:
     assert circled(down, 2)[0] < -1.0
 
 
-def test_its_own_radius() -> None:
+def test_a_loiter_without_a_radius_has_the_aircrafts_own() -> None:
     """R = 625 / (9.80665 tan 30) = 110.39 m in calm air; a tenth over it in whole tens of metres is 130 m."""
     lines = (wp(0, 0), wp(0, 2000, command=18, p="1 0 0 0"), wp(3000, 2000))
     assert circled(setup_of(*lines).route, 2)[1] == 130.0
@@ -133,7 +107,7 @@ def test_its_own_radius() -> None:
     assert circled(setup_of(*lines, wind={"speed_mps": 8.0, "from_deg": 0.0}).route, 2)[1] == 220.0
 
 
-def test_places_inside_a_circle() -> None:
+def test_stops_inside_a_circle_are_left_out() -> None:
     over = route(wp(0, 0), wp(0, 2000), wp(0, 2000, command=18, p="1 0 120 0"), wp(10, 1990), wp(3000, 2000))
     assert list(dict.fromkeys(over.items.tolist())) == [1, 3, 5]
     assert [note.split(":")[0] for note in over.notes] == ["items 2, 4"]
@@ -148,12 +122,12 @@ def test_places_inside_a_circle() -> None:
     assert (here.waypoints[here.items == 3, 2] == 400.0).all()
 
 
-def test_a_jump_back_to_a_loiter() -> None:
+def test_a_jump_back_to_a_loiter_flies_it_again() -> None:
     flown = route(wp(0, 0), wp(0, 2000, command=18, p="1 0 150 0"), wp(3000, 2000), "2 177 2 1 0 0 0 0 0")
     assert circled(flown, 2)[0] > 2.0
 
 
-def test_refusals() -> None:
+def test_circles_too_wide_or_too_long_are_refused() -> None:
     assert "item 2: loiter radius 30000 m" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1 0 30000 0"))
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=18, p="1e9 0 100 0"))
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=19, p="3e38 0 100 0"))
@@ -216,7 +190,7 @@ def test_a_loiter_cut_short_is_not_complete(flight: tuple[FlightSetup, Any]) -> 
     assert not any(item.ok for item in verdict.findings if item.rule == "loiter")
 
 
-def test_terrain_and_relative_heights_of_loiters() -> None:
+def test_loiters_over_terrain_have_the_height_of_their_middle() -> None:
     flown = route(wp(0, 0), wp(0, 2000, 250, command=18, frame=10, p="1 0 150 0"), wp(2500, 0), terrain=ground(320.0))
     assert (flown.waypoints[flown.items == 2, 2] == 570.0).all()
 

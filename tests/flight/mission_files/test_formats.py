@@ -35,7 +35,7 @@ def test_every_sample_is_expected() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(DIALECTS))
-def test_dialects(name: str) -> None:
+def test_every_dialect_is_read(name: str) -> None:
     items, places, warnings = DIALECTS[name]
     mission = read_mission(SAMPLES / name)
     assert len(mission.items) == items
@@ -66,7 +66,7 @@ def test_samples_survive_both_forms(name: str, kind: Any) -> None:
     ]
 
 
-def test_fence_and_rally_of_a_plan() -> None:
+def test_fence_and_rally_of_a_plan_are_kept() -> None:
     mission = read_mission(SAMPLES / "qgc_takeoff.plan")
     assert [item.command for item in mission.fences] == [5001] * 4 + [5004]
     assert mission.fences[4].params[0] == 800.5
@@ -154,7 +154,7 @@ def test_grid_rounds_and_never_truncates(degrees: float) -> None:
     assert on_grid(on_grid(degrees)) == on_grid(degrees)
 
 
-def test_written_forms() -> None:
+def test_what_is_written_to_the_byte() -> None:
     item = MissionItem(1, 16, 0, (0.0, 25.0, 0.0, math.nan), 36.5, -84.25, 850.125)
     mission = Mission(Home(36.5, -84.25, 354.5), (item,))
     assert mission_text(mission, "waypoints") == (

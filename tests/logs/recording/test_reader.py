@@ -22,6 +22,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import Writer
 
 from aircraft.envelope import Envelope
+from aircraft.path_limits import Limits
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
@@ -144,8 +145,10 @@ def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: boo
 
 def test_no_field_of_a_setup_is_left_behind() -> None:
     # A field with a default could be forgotten in silence: these are all that the log knows of.
-    names = {kind: [item.name for item in dataclasses.fields(kind)] for kind in (FlightSetup, Mission, Route, Envelope)}
-    assert len(names[FlightSetup]) == 14
+    kinds = (FlightSetup, Limits, Mission, Route, Envelope)
+    names = {kind: [item.name for item in dataclasses.fields(kind)] for kind in kinds}
+    assert len(names[FlightSetup]) == 12
+    assert len(names[Limits]) == 8
     assert len(names[Mission]) == 7
     assert len(names[Route]) == 8
     assert len(names[Envelope]) == 14

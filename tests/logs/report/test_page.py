@@ -20,7 +20,7 @@ import logs.figures.draw_all
 from aircraft.envelope import Envelope
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.figures.draw_all import FIGURE_FILES
 from logs.figures.exposure import exposure_rates
@@ -74,8 +74,9 @@ def make_setup(**changes: Any) -> FlightSetup:
         max_bank=0.7,
     )
     items = tuple(MissionItem(k + 1, 16, 0, (0.0, 0.0, 0.0, 0.0), 46.0, 8.0 + k, float(ROUTE[k, 2])) for k in range(4))
+    scenario = from_spec(spec | changes, "test")
     return FlightSetup(
-        scenario=from_spec(spec | changes, "test"),
+        scenario=scenario,
         mission=Mission(None, items, warnings=("line 7: CRLF",), source="his.waypoints"),
         mission_text="QGC WPL 110\n",
         route=Route(
@@ -87,10 +88,8 @@ def make_setup(**changes: Any) -> FlightSetup:
             "starts trimmed",
             ("item 9: no loiter",),
         ),
-        envelope=envelope,
+        limits=make_limits(scenario, envelope, 25.0, math.radians(30.0)),
         aircraft="aerosonde",
-        airspeed=25.0,
-        max_bank=math.radians(30.0),
         battery=100.0,
         seed=7,
     )

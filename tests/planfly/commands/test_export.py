@@ -12,7 +12,7 @@ from flight.mission_files.formats import read_mission
 from logs.recording.reader import read_log
 from planfly.cli import main
 from planner.plan import plan_json
-from tests.flight.mission.test_routing import a_plan
+from tests.mission_lines import a_plan
 
 MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
 KML = "{http://www.opengis.net/kml/2.2}"

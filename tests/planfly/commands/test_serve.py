@@ -54,7 +54,7 @@ def served_log(tmp_path: Path) -> Path:
     return log
 
 
-def test_a_flight_at_real_time(serve: Callable[..., Served]) -> None:
+def test_a_served_flight_is_the_flight_of_fly_at_real_time(serve: Callable[..., Served]) -> None:
     """Rates within 5 %, under 15 % of a core, and the very flight that ``planfly fly`` gives."""
     vehicle = serve("--scenario", "field.toml")
     with UdpStation(vehicle.port) as station:
@@ -86,7 +86,7 @@ def test_a_flight_at_real_time(serve: Callable[..., Served]) -> None:
     assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 0
 
 
-def test_a_mission_that_cannot_be_flown(serve: Callable[..., Served]) -> None:
+def test_a_mission_that_cannot_be_flown_is_armed_only_by_force(serve: Callable[..., Served]) -> None:
     """It is stored, warned of, and armed only by force; the forced flight is logged and judged."""
     vehicle = serve("--scenario", "field.toml", "--speed", "50")
     with UdpStation(vehicle.port) as station:
@@ -109,7 +109,7 @@ def test_a_mission_that_cannot_be_flown(serve: Callable[..., Served]) -> None:
     assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 4
 
 
-def test_two_stations_over_sockets(serve: Callable[..., Served]) -> None:
+def test_of_two_stations_over_sockets_one_wins(serve: Callable[..., Served]) -> None:
     vehicle = serve("--scenario", "field.toml")
     rng = random.Random(4)
     with UdpStation(vehicle.port) as one, UdpStation(vehicle.port, system=254) as two:
@@ -149,7 +149,7 @@ def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], seed: 
     assert np.array_equal(whole.controls[:count], log.track.controls)
 
 
-def test_the_process_that_flies_may_die(serve: Callable[..., Served]) -> None:
+def test_the_vehicle_outlives_the_process_that_flies(serve: Callable[..., Served]) -> None:
     """The vehicle stays, says so, and flies the next mission."""
     vehicle = serve("--scenario", "field.toml", "--speed", "20")
     with UdpStation(vehicle.port) as station:
@@ -224,7 +224,7 @@ def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path)
     assert vehicle.stop() == 0
 
 
-def test_the_default_scenario_stands_ready(serve: Callable[..., Served]) -> None:
+def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
     """And a log is played into a station as it was flown."""
     vehicle = serve()
     with UdpStation(vehicle.port) as station:

@@ -103,7 +103,7 @@ def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_
     assert log.setup.route.waypoints[:, 2] == pytest.approx([100.0, 100.0, 110.0])
 
 
-def test_mavsdk_over_a_bad_link(serve: Callable[..., Served], tmp_path: Path) -> None:
+def test_mavsdk_uploads_over_a_bad_link(serve: Callable[..., Served], tmp_path: Path) -> None:
     """One datagram in ten lost each way: 200 items in the soak, 40 here; all arrive as they were sent."""
     need("mavsdk")
     count = 200 if SOAK else 40
@@ -178,7 +178,7 @@ def mavproxy(tmp_path: Path) -> Iterator[Callable[[int], MavProxy]]:
         one.close()
 
 
-def test_a_session_with_mavproxy(
+def test_mavproxy_loads_arms_flies_and_saves(
     serve: Callable[..., Served], mavproxy: Callable[[int], MavProxy], tmp_path: Path
 ) -> None:
     for name, text in (("m.waypoints", WPL), ("f.txt", FENCE), ("r.txt", RALLY)):

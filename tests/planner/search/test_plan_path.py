@@ -50,7 +50,7 @@ def test_certificate_against_fine_samples(embedded: Plan) -> None:
 
 def fits(path: np.ndarray, limits: Limits) -> bool:
     """Whether every leg is as long as its two turns."""
-    tangents = turn_tangents(limits.packed(), path)
+    tangents = turn_tangents(limits.performance(), path)
     return bool(np.all(tangents[:-1] + tangents[1:] <= np.hypot(*np.diff(path[:, :2], axis=0).T)))
 
 

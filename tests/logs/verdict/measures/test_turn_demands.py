@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import ROLL_TIME
-from flight.simulation.flight_setup import limits_of
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_demands import route_demands
 from planner.evaluation.certify import turn_needs
@@ -43,7 +42,7 @@ def test_planner_and_check_need_the_same(turn: float, wind: float, same_way: boo
         scenario = make_scenario(points, wind={"speed_mps": wind, "from_deg": from_deg})
         setup = make_setup(points, scenario=scenario)
         demands = route_demands(setup)
-        needs, rolls = turn_needs(make_problem(scenario, limits_of(setup)).certified, points)
+        needs, rolls = turn_needs(make_problem(scenario, setup.limits).certified, points)
         np.testing.assert_allclose(needs, demands.after[:-1] + demands.before[1:], atol=1e-6)
         np.testing.assert_allclose(rolls, demands.reversal, atol=1e-6)
         assert (rolls.max() == 0.0) or not same_way

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
+from aircraft.envelope import Envelope
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.state import STATE_SIZE, S
@@ -19,13 +20,14 @@ from logs.verdict.places import FLIGHT
 from logs.verdict.rules.energy_rule import air_angle, predicted_energy
 from tests.logs.verdict.judging import failing, judge, of
 from tests.synthetic import fly_path, make_scenario, make_setup
+from world.scenario import Scenario
 
 AEROSONDE = load_aircraft("aerosonde")
 ROUTE = [[0, 0, 500], [0, 3000, 500], [2000, 5000, 800], [2000, 8000, 500]]
 
 
-def real_setup(**changes: object) -> FlightSetup:
-    return replace(make_setup(ROUTE, table=load_envelope(AEROSONDE)), **changes)  # type: ignore[arg-type]  # fields by name
+def real_setup(*, table: Envelope | None = None, scenario: Scenario | None = None) -> FlightSetup:
+    return make_setup(ROUTE, table=table or load_envelope(AEROSONDE), scenario=scenario)
 
 
 @pytest.mark.parametrize("airspeed", [20.0, 25.0, 29.0])
@@ -56,7 +58,7 @@ def test_prediction_and_flight_agree() -> None:
 def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:
     predicted, _ = predicted_energy(route_demands(real_setup()))
     for battery, ok in ((predicted / 0.8 * 1.01, True), (predicted / 0.8 * 0.99, False)):
-        item = of(judge_geometry(real_setup(battery=battery)), "energy")
+        item = of(judge_geometry(replace(real_setup(), battery=battery)), "energy")
         assert item.ok is ok
         assert item.limit == pytest.approx(0.8 * battery)
         assert ("battery" in [change.what for one in item.suggestions for change in one]) is not ok
@@ -88,8 +90,8 @@ def test_what_is_not_known_is_not_judged() -> None:
 def test_an_aircraft_that_burns_fuel_has_no_current() -> None:
     envelope = replace(load_envelope(AEROSONDE), volts=0.0)
     for verdict in (
-        judge_geometry(real_setup(envelope=envelope)),
-        judge_flight(real_setup(envelope=envelope), simulate(real_setup(), AEROSONDE).track, "completed"),
+        judge_geometry(real_setup(table=envelope)),
+        judge_flight(real_setup(table=envelope), simulate(real_setup(), AEROSONDE).track, "completed"),
     ):
         reason = of(verdict, "energy").reason
         assert "of fuel heat used" in reason

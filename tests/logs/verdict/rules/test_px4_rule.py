@@ -5,8 +5,7 @@ import pytest
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Place
-from tests.flight.mission.test_loiter_circles import setup_of
-from tests.flight.mission.test_routing import wp
+from tests.mission_lines import setup_of, wp
 
 GOOD = (wp(0, 500, command=22), wp(0, 1500), wp(1500, 1500))
 HOME_FAR = "36.5 -84.0 300"

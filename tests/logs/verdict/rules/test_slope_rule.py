@@ -158,6 +158,6 @@ def test_its_suggestion_passes() -> None:
 
 
 def test_a_narrower_envelope_is_not_the_scenario(setup: FlightSetup) -> None:
-    weak = replace(setup, envelope=envelope(climb_deg=1.5))
+    weak = replace(setup, limits=replace(setup.limits, envelope=envelope(climb_deg=1.5)))
     item = of(judge(weak, fly_path(weak)), "slope", leg(1))
     assert (item.ok, item.limit_source) == (False, "aircraft")

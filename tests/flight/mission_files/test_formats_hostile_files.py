@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.flight.mission_files.test_bad_mission_files import BAD_BYTES, BAD_PLAN, BAD_WPL, HOME_LINE, plan_data, wpl
+from tests.flight.mission_files.malformed_files import BAD_BYTES, BAD_PLAN, BAD_WPL, HOME_LINE, plan_data, wpl
 
 SECONDS, MEBIBYTES = 2.0, 300.0
 

@@ -1,0 +1,84 @@
+"""Arming and modes: what is refused, and that the flight starts once the vehicle is armed, in AUTO and judged."""
+
+import pytest
+
+from flight.live.arming import ACCEPTED, DENIED, IN_PROGRESS, ArmingState
+from flight.live.flight_process import MissionJudged
+from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, LOITER, MANUAL, NO_MISSION, NOT_STARTED
+
+FORCED = 21196.0
+
+
+def judged(*, possible: bool = True, flyable: bool = True) -> ArmingState:
+    """A vehicle whose mission has this verdict."""
+    state = ArmingState()
+    state.mission_uploaded()
+    state.mission_judged(MissionJudged(1, possible, flyable, ()))
+    return state
+
+
+def test_armed_in_auto_with_a_verdict_starts() -> None:
+    state = judged()
+    assert state.arm(True, 0.0).result == ACCEPTED
+    assert not state.starts
+    assert state.set_mode(AUTO).result == ACCEPTED
+    assert state.starts
+    state.flight_started()
+    assert (state.starts, state.flying, state.mission_state) == (False, True, ACTIVE)
+    state.flight_ended(True)
+    assert (state.armed, state.mode, state.mission_state) == (False, MANUAL, COMPLETE)
+
+
+def test_an_arm_command_waits_for_the_verdict() -> None:
+    state = ArmingState()
+    state.mission_uploaded()
+    assert state.arm(True, 0.0).result == IN_PROGRESS
+    assert not state.armable
+
+
+@pytest.mark.parametrize(
+    ("possible", "flyable", "param2", "result"),
+    [
+        (True, True, 0.0, ACCEPTED),
+        (True, False, 0.0, DENIED),
+        (True, False, FORCED, ACCEPTED),
+        (False, False, 0.0, DENIED),
+        (False, False, FORCED, DENIED),
+    ],
+)
+def test_only_what_is_flyable_is_armed_unless_forced(possible: bool, flyable: bool, param2: float, result: int) -> None:
+    assert judged(possible=possible, flyable=flyable).arm(True, param2).result == result
+
+
+def test_a_verdict_against_an_armed_vehicle_disarms_it() -> None:
+    state = judged()
+    state.arm(True, 0.0)
+    state.mission_uploaded()
+    text = state.mission_judged(MissionJudged(2, True, False, ()))
+    assert text.startswith("disarmed: ")
+    assert not state.armed
+
+
+def test_in_flight_only_a_forced_disarm_ends_it() -> None:
+    state = judged()
+    state.arm(True, 0.0)
+    state.set_mode(AUTO)
+    state.flight_started()
+    assert state.arm(False, 0.0).result == DENIED
+    assert state.set_mode(LOITER).result == DENIED
+    assert state.pause(False).result == DENIED
+    assert state.pause(True).result == ACCEPTED
+    assert not state.end_requested
+    assert state.arm(False, FORCED).result == ACCEPTED
+    assert state.end_requested
+
+
+def test_auto_needs_a_mission_and_goes_with_it() -> None:
+    state = ArmingState()
+    assert state.set_mode(AUTO).result == DENIED
+    assert state.set_mode(5).text.startswith("FLY_BY_WIRE_A denied")
+    state = judged()
+    assert state.mission_state == NOT_STARTED
+    state.set_mode(AUTO)
+    state.mission_cleared()
+    assert (state.mode, state.mission_state) == (MANUAL, NO_MISSION)

@@ -1,0 +1,122 @@
+"""The process that flies: orders in, events out, and a log that is closed however the flight ends."""
+
+from dataclasses import dataclass, field
+from multiprocessing import Pipe
+from threading import Thread
+
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.live.flight_process import (
+    STOPPED,
+    EndFlight,
+    FlightEnded,
+    FlightJudged,
+    JudgeMission,
+    MissionJudged,
+    StartFlight,
+    read_event,
+    serve_flights,
+)
+from flight.live.snapshot import Snapshot
+from flight.mission.items import Mission
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from tests.mission_lines import setup_of, wp
+
+
+@dataclass
+class MemoryLog:
+    """A log that keeps its rows; ``full``: whose disk is."""
+
+    full: bool = False
+    rows: int = 0
+    closed: list[str] = field(default_factory=list)
+
+    def write(self, block: Track) -> None:
+        if self.full:
+            raise OSError(28, "No space left on device")
+        self.rows += len(block)
+
+    def finish(self, ended: str) -> FlightJudged:
+        self.closed.append(ended)
+        return FlightJudged(ended == "completed", ())
+
+    def abandon(self) -> None:
+        self.closed.append("abandoned")
+
+
+@dataclass
+class OneSetup:
+    """Flies one setup, whatever the mission is."""
+
+    setup: FlightSetup
+    log: MemoryLog
+    speed: float = 100.0
+
+    def __post_init__(self) -> None:
+        self.aircraft = load_aircraft("aerosonde")
+
+    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
+        return self.setup, MissionJudged(order.number, True, True, ())
+
+    def open_log(self, setup: FlightSetup) -> MemoryLog:
+        return self.log
+
+
+def events_of(log: MemoryLog, *, stop_after: int | None = None) -> list[object]:
+    """Events of one mission judged and flown, stopped after so many snapshots."""
+    ours, theirs = Pipe()
+    factory = OneSetup(setup_of(wp(0, 0), wp(0, 1500)), log)
+    thread = Thread(target=serve_flights, args=(theirs, factory))
+    thread.start()
+    ours.send(JudgeMission(Mission(None, ()), 7))
+    ours.send(StartFlight())
+    found: list[object] = []
+    while not (found and isinstance(found[-1], FlightJudged)):
+        found.append(read_event(ours.recv_bytes()))
+        if sum(isinstance(event, Snapshot) for event in found) == stop_after:
+            ours.send(EndFlight())
+            stop_after = None
+    ours.send(EndFlight(quit=True))
+    thread.join(20.0)
+    assert not thread.is_alive()
+    ours.close()
+    theirs.close()
+    return found
+
+
+def test_a_flight_is_judged_flown_and_judged() -> None:
+    log = MemoryLog()
+    events = events_of(log)
+    assert events[0] == MissionJudged(7, True, True, ())
+    assert events[-2:] == [FlightEnded("completed"), FlightJudged(True, ())]
+    snapshots = [event for event in events if isinstance(event, Snapshot)]
+    assert [one.time for one in snapshots] == sorted(one.time for one in snapshots)
+    assert log.closed == ["completed"]
+    assert log.rows > 3000
+
+
+def test_a_station_ends_the_flight() -> None:
+    log = MemoryLog()
+    assert events_of(log, stop_after=3)[-2:] == [FlightEnded(STOPPED), FlightJudged(False, ())]
+    assert log.closed == [STOPPED]
+
+
+def test_a_full_disk_ends_the_flight_and_not_the_process() -> None:
+    log = MemoryLog(full=True)
+    ended, judged = events_of(log)[-2:]
+    assert ended == FlightEnded("log: No space left on device")
+    assert isinstance(judged, FlightJudged)
+    assert "cannot be written" in judged.texts[0].text
+    assert log.closed == ["abandoned"]
+
+
+@pytest.mark.parametrize("order", [EndFlight(quit=True), None])
+def test_the_process_ends_when_it_is_to_or_its_link_is_gone(order: EndFlight | None) -> None:
+    ours, theirs = Pipe()
+    if order is not None:
+        ours.send(order)
+    ours.close()
+    serve_flights(theirs, OneSetup(setup_of(wp(0, 0), wp(0, 1500)), MemoryLog()))
+    theirs.close()

@@ -1,0 +1,60 @@
+"""Signing: pymavlink accepts our signatures, and neither a forged frame nor a replayed one is accepted."""
+
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.mavlink_frames import split_frames
+from flight.live.signing import EPOCH, Signing, read_key
+from tests.flight.live.fake_vehicle import HEARTBEAT, KEY, WALL, packed
+from world.errors import FlightError
+
+
+def test_pymavlink_accepts_our_signatures_and_we_its() -> None:
+    """An independent implementation accepts ours, and ours accepts its."""
+    ours, theirs = Signing(KEY, 3), mavlink.MAVLink(None, 255, 190)
+    theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
+    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - EPOCH) * 1e5)
+    receiver = mavlink.MAVLink(None)
+    receiver.signing.secret_key, receiver.signing.timestamp = KEY, int((WALL - EPOCH) * 1e5)
+    message = receiver.decode(bytearray(ours.sign(packed(HEARTBEAT, 1), WALL)))
+    assert message.get_type() == "HEARTBEAT"
+    assert message.get_signed()
+    (frame,) = split_frames(HEARTBEAT.pack(theirs))
+    assert ours.accepts(frame, WALL)
+    assert not ours.accepts(frame, WALL), "a replayed frame"
+    assert not ours.accepts(split_frames(packed(HEARTBEAT))[0], WALL), "an unsigned frame"
+
+
+def test_a_forged_timestamp_locks_nobody_out() -> None:
+    vehicle, station, thief = Signing(KEY), Signing(KEY), Signing(bytes(32))
+    future = WALL + 1e8
+    for link_id in range(256):
+        thief.link = link_id
+        (forged,) = split_frames(thief.sign(packed(HEARTBEAT), future))
+        assert not vehicle.accepts(forged, WALL)
+    (good,) = split_frames(station.sign(packed(HEARTBEAT), WALL))
+    flipped = bytearray(good.raw)
+    flipped[-7] ^= 0x40  # a later time under a signature that was good
+    assert not vehicle.accepts(split_frames(bytes(flipped))[0], WALL)
+    assert vehicle.accepts(good, WALL)
+    (old,) = split_frames(Signing(KEY, 9).sign(packed(HEARTBEAT), WALL - 120.0))
+    assert not vehicle.accepts(old, WALL), "a recording from two minutes ago, on a new link"
+
+
+def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "key"
+    path.write_text(KEY.hex() + "\n", encoding="ascii")
+    path.chmod(0o644)
+    with pytest.raises(FlightError, match="644"):
+        read_key(path)
+    path.chmod(0o600)
+    assert read_key(path) == KEY
+    path.write_text("correct horse battery", encoding="ascii")
+    assert len(read_key(path)) == 32
+    path.write_text("short", encoding="ascii")
+    with pytest.raises(FlightError, match="5 bytes"):
+        read_key(path)
+    with pytest.raises(FlightError, match="cannot be read"):
+        read_key(tmp_path / "none")

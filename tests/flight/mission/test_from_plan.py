@@ -1,0 +1,51 @@
+"""Plans as missions: waypoints come back from either file form, and corners have their acceptance radius."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import item_problem
+from flight.mission.routing import make_route
+from flight.mission_files.formats import mission_text, parse_mission
+from tests.mission_lines import a_plan
+from world.scenario import load_scenario
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    st.lists(
+        st.tuples(st.floats(-12_000, 12_000), st.floats(-9000, 9000), st.floats(300, 1100)),
+        min_size=2,
+        max_size=20,
+        unique_by=lambda p: (round(p[0] / 10), round(p[1] / 10)),
+    )
+)
+def test_an_exported_plan_comes_back(points: list[tuple[float, float, float]]) -> None:
+    """Through both forms, with equal numbers, to the planned waypoints within the grid's 8 mm."""
+    plan = a_plan(points)
+    exported = plan_mission(plan, 25.0, math.radians(30.0))
+    assert all(item_problem(item) is None for item in exported.items)
+    assert parse_mission(mission_text(exported, "waypoints"), "a.waypoints") == exported
+    assert parse_mission(mission_text(exported, "plan"), "a.plan") == exported
+    assert parse_mission(mission_text(exported, "plan"), "a.plan").cruise_speed == 25.0
+    flown = make_route(exported, plan.scenario.origin, plan.scenario.terrain, 18.0, False)
+    assert flown.waypoints.shape == plan.waypoints.shape
+    assert np.abs(flown.waypoints - plan.waypoints).max() < 0.008
+    assert set(flown.airspeed.tolist()) == {25.0}
+    assert flown.notes == ()
+    assert (flown.acceptance >= 10.0).all()
+
+
+def test_a_corner_has_its_fly_by_offset_as_acceptance() -> None:
+    """R = 625 / (9.80665 tan 30) = 110.39 m; at 60 degrees the arc passes R(1/cos 30 - 1) = 17.08 m from the corner."""
+    corner = [(0.0, 0.0, 700.0), (0.0, 1000.0, 700.0), (866.0, 1500.0, 700.0)]
+    exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0))
+    assert [item.params[1] for item in exported.items] == [25.0, 10.0, 28.0, 10.0]
+    assert exported.home is not None
+    terrain = load_scenario("jacksboro").terrain
+    assert terrain is not None
+    assert exported.home.alt == pytest.approx(float(terrain.height(0.0, 0.0)), abs=0.001)

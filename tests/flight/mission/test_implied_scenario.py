@@ -1,0 +1,112 @@
+"""Scenarios made around external missions: their area, terrain and origin, and the routes in them."""
+
+from itertools import groupby
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flight.mission.implied_scenario import implied_scenario, mission_origin
+from flight.mission.items import Mission
+from flight.mission.itinerary import make_itinerary
+from flight.mission.routing import make_route
+from flight.mission_files.formats import read_mission
+from tests.mission_lines import mission, wp
+from world.errors import MissionError, TerrainError
+from world.frames import GeoOrigin
+from world.geometry import leg_runs, leg_slopes, turning_angles
+from world.scenario import from_spec
+
+SAMPLES = Path(__file__).parents[1] / "missions"
+
+
+# Counted by hand in the files: legs, and the items that the route goes through (-1: over home).  A loiter is several
+# corners of one item: as many eighths of a turn as it takes to leave towards the next place.
+LEGS = {
+    "by_hand.waypoints": (3, [1, 2, 3, 5]),
+    "endless.waypoints": (7, [1, 2, 3, 4, 1, 2, 3, 4]),
+    "mavproxy.txt": (21, [1, 2, 4, 7, 8]),
+    "mavproxy_terrain.txt": (3, [1, 2, 3, 4]),
+    "mission_planner.waypoints": (10, [1, 3, 4, 5, 6, 7, 4, 5, 6, 7, 10]),
+    "mission_planner_land.waypoints": (5, [1, 2, 3, 6, 7]),
+    "qgc.waypoints": (14, [3, 5, 7, 9, 10, 11]),
+    "qgc_amsl.plan": (4, [1, 3, 4, 5, 6]),
+    "qgc_takeoff.plan": (7, [-1, 1, 3, 4, 6, 8, 10, 11]),
+}
+
+
+# Those that need ground to count heights from.
+ON_TERRAIN = {"endless.waypoints", "mavproxy_terrain.txt"}
+
+
+@pytest.mark.parametrize("name", sorted(LEGS))
+def test_samples_fly_over_the_tile(name: str) -> None:
+    """Each sample's legs, and that an Aerosonde can fly them: what the flight tests build on."""
+    legs, items = LEGS[name]
+    read = read_mission(SAMPLES / name)
+    scenario = implied_scenario(read, "jacksboro")
+    flown = make_route(read, scenario.origin, scenario.terrain, 25.0, False)
+    assert flown.legs == legs
+    assert [item for item, _ in groupby(flown.items.tolist())] == items
+    circling = flown.arcs > 0.0
+    assert leg_runs(flown.waypoints)[~(circling[1:] | circling[:-1])].min() >= 600.0
+    assert np.degrees(turning_angles(flown.waypoints)).max() < 105.0
+    assert np.degrees(np.abs(leg_slopes(flown.waypoints))).max() < 2.5
+    assert scenario.terrain is not None
+    pairs = zip(flown.waypoints[:-1], flown.waypoints[1:], strict=True)
+    assert min(scenario.terrain.clearance(a, b)[0] for a, b in pairs) > 100.0
+    assert scenario.external
+    assert len(scenario.threats.names) == 0
+
+
+@pytest.mark.parametrize("name", sorted(set(LEGS) - ON_TERRAIN))
+def test_samples_have_a_scenario_without_terrain(name: str) -> None:
+    read = read_mission(SAMPLES / name)
+    scenario = implied_scenario(read, None)
+    assert scenario.terrain is None
+    assert make_route(read, scenario.origin, None, 25.0, False).legs == LEGS[name][0]
+    again = from_spec(scenario.to_json(), "log", external=True)
+    assert again.to_json() == scenario.to_json()
+    assert again.origin == scenario.origin
+    assert np.array_equal(again.bounds, scenario.bounds)
+
+
+def test_heights_over_terrain_need_terrain() -> None:
+    with pytest.raises(MissionError, match=r"item 1: height above terrain.*no terrain is given"):
+        implied_scenario(read_mission(SAMPLES / "mavproxy_terrain.txt"), None)
+
+
+def test_a_log_gives_the_same_scenario() -> None:
+    """A log keeps the scenario's JSON and the terrain, and makes the same scenario of them."""
+    scenario = implied_scenario(read_mission(SAMPLES / "qgc.waypoints"), "jacksboro")
+    again = from_spec(scenario.to_json(), "log", ground=scenario.terrain, external=True)
+    assert again.to_json() == scenario.to_json()
+    assert again.origin == scenario.origin
+    assert again.ceiling == scenario.ceiling
+    for name in ("bounds", "start", "destination"):
+        assert np.array_equal(getattr(again, name), getattr(scenario, name))
+
+
+def test_a_mission_off_the_tile_is_refused() -> None:
+    with pytest.raises(TerrainError, match="the mission flies to east"):
+        implied_scenario(mission(wp(0, 0), wp(0, -9000), home="40 -84 0"), "jacksboro")
+
+
+def test_a_mission_through_a_hill_has_a_scenario() -> None:
+    """A mission through a hill is not bad input: it has a scenario, and its verdict says no."""
+    read = mission(wp(3000, 3000, 20, frame=0), wp(3000, 6000, 20, frame=0))
+    scenario = implied_scenario(read, "jacksboro")
+    assert scenario.terrain is not None
+    assert scenario.destination[2] > 100.0
+    assert make_route(read, scenario.origin, scenario.terrain, 25.0, False).waypoints[:, 2].tolist() == [20.0, 20.0]
+
+
+def origin_of(read: Mission) -> GeoOrigin:
+    return mission_origin(read, make_itinerary(read, 25.0).stops)
+
+
+def test_the_origin_is_home_if_home_is_near() -> None:
+    assert origin_of(mission(wp(0, 500), wp(0, 900))) == GeoOrigin(36.5, -84.2)
+    # A ground station's default home on the other side of the world is nobody's home.
+    away = origin_of(mission(wp(0, 500), wp(0, 900), home="47.4 8.5 488"))
+    assert away.lat_deg == pytest.approx(36.5045, abs=1e-4)

@@ -1,0 +1,101 @@
+"""Itineraries: the order in which items are flown, their speeds, and a note for each that is not flown as written."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flight.mission.itinerary import make_itinerary
+from tests.mission_lines import ground, mission, refusal, route, wp
+
+
+def test_speeds_count_for_the_legs_after_them() -> None:
+    flown = route(
+        wp(0, 0),
+        wp(0, 900),
+        "2 178 0 22 -1 0 0 0 0",
+        wp(0, 1800),
+        "2 178 1 28 80 0 0 0 0",
+        "2 178 2 3 -1 0 0 0 0",
+        wp(0, 2700),
+        "2 178 0 -1 -1 0 0 0 0",
+        wp(0, 3600),
+        "2 178 0 -2 -1 0 0 0 0",
+        wp(0, 4500),
+        "2 178 0 0 -1 0 0 0 0",
+        wp(0, 5400),
+    )
+    assert flown.airspeed.tolist() == [25.0, 22.0, 28.0, 28.0, 25.0, 25.0]
+    assert flown.notes == (
+        "item 5: DO_CHANGE_SPEED of ground speed: flown as airspeed",
+        "item 5: DO_CHANGE_SPEED's throttle: ignored",
+        "item 6: DO_CHANGE_SPEED of type 2, neither airspeed nor ground speed: ignored",
+        "item 12: DO_CHANGE_SPEED to 0 m/s: ignored",
+    )
+
+
+def test_jumps_are_followed_as_often_as_they_say() -> None:
+    corners = [wp(0, 0), wp(0, 900), wp(900, 900)]
+    assert route(*corners, "2 177 2 2 0 0 0 0 0").items.tolist() == [1, 2, 3, 2, 3, 2, 3]
+    assert route(*corners, "2 177 1 0 0 0 0 0 0").items.tolist() == [1, 2, 3]
+    endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
+    assert endless.items.tolist() == [1, 2, 3, 2, 3]
+    assert endless.notes == ("item 4: DO_JUMP without end: taken once",)
+    skipping = route(wp(0, 0), "2 177 4 1 0 0 0 0 0", wp(0, 900), wp(900, 900))
+    assert skipping.items.tolist() == [1, 4]
+    assert skipping.notes == ("item 3: never reached",)
+    # A counter is never reset: the inner jump is taken once, not once each time round.
+    nested = route(*corners, "2 177 2 1 0 0 0 0 0", "2 177 1 1 0 0 0 0 0")
+    assert nested.items.tolist() == [1, 2, 3, 2, 3, 1, 2, 3]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(2, 6), st.integers(0, 30))
+def test_a_jump_flies_its_body_once_more_each_time(corners: int, repeats: int) -> None:
+    places = [wp(900 * math.cos(k), 900 * math.sin(k)) for k in range(corners)]
+    flown = route(*places, f"2 177 1 {repeats} 0 0 0 0 0")
+    assert flown.items.tolist() == list(range(1, corners + 1)) * (repeats + 1)
+
+
+def test_jumps_to_nowhere_or_too_often_are_refused() -> None:
+    assert "item 3: DO_JUMP p1 9: the mission has no item 9" in refusal(wp(0, 0), wp(0, 900), "2 177 9 1 0 0 0 0 0")
+    assert "DO_JUMP p1 0" in refusal(wp(0, 0), wp(0, 900), "2 177 0 1 0 0 0 0 0")
+    assert "more than 10,000 places" in refusal(wp(0, 0), wp(0, 900), "2 177 1 9999 0 0 0 0 0")
+    assert "more than 200,000 items" in refusal(wp(0, 0), wp(0, 900), "2 177 3 999999 0 0 0 0 0")
+
+
+def test_a_return_or_a_landing_ends_the_itinerary() -> None:
+    home = route(wp(0, 500, 150), wp(0, 1500, 200), "0 20 0 0 0 0 0 0 0", wp(5, 5))
+    assert home.waypoints[-1] == pytest.approx([0.0, 0.0, 500.0], abs=0.01)
+    assert home.notes == (
+        "item 3: NAV_RETURN_TO_LAUNCH: flown as a leg to home at the last height",
+        "item 4: never reached",
+    )
+    landed = route(
+        wp(0, 500, 150), "3 189 0 0 0 0 36.5 -84.2 0", wp(0, 1500, 60), wp(900, 1500, 0, command=21), wp(0, 0)
+    )
+    assert landed.waypoints[-1] == pytest.approx([900.0, 1500.0, 360.0], abs=0.02)
+    assert [note.split(":")[0] for note in landed.notes] == ["item 2", "item 4", "item 5"]
+    here = route(wp(0, 500), wp(0, 1500), "3 85 0 0 0 0 0 0 0")
+    assert here.items.tolist() == [1, 2]
+    assert "without a position" in here.notes[0]
+    ignored = route(wp(0, 500), wp(0, 1500), "0 20 0 0 0 0 0 0 0", home="0 0 0", terrain=ground())
+    assert ignored.legs == 1
+    assert ignored.notes[0] == "item 3: NAV_RETURN_TO_LAUNCH without a home: ignored"
+
+
+# One line each of the commands that a fixed wing's mission may hold; none may go in silence.
+@pytest.mark.parametrize(
+    "command", [17, 18, 19, 30, 31, 80, 82, 92, 93, 94, 112, 115, 183, 189, 201, 206, 530, 601, 2000, 50_000]
+)
+def test_nothing_is_dropped_in_silence(command: int) -> None:
+    flown = route(wp(0, 0), wp(0, 900, command=command), wp(900, 900), f"2 {command} 1 2 3 4 0 0 0")
+    flies = command in (17, 18, 19, 31, 82, 94)
+    assert (2 in flown.items) == flies
+    assert {number for note in flown.notes for number in ("2", "4") if number in note.split(":")[0]} == {"2", "4"}
+
+
+def test_long_missions_walk_in_linear_time() -> None:
+    stops = make_itinerary(mission(*[wp(k, k) for k in range(9000)]), 25.0).stops
+    assert len(stops) == 9000
