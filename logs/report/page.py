@@ -117,7 +117,7 @@ def _page(
         flight_line=tables.flight_sentence(setup, track),
         rules=rule_rows(verdict.findings),
         findings=rows,
-        notes=[note for note in tables.notes_of(setup) if note not in verdict.summary],
+        notes=[note for note in tables.notes_of(setup) if note not in verdict.notes],
         pictures=report_pictures(setup, track is not None, pictures),
         leg_columns=tables.LEG_COLUMNS,
         legs=tables.leg_rows(setup, track, frozenset(failed.legs)),

@@ -87,6 +87,7 @@ class Verdict:
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
     prediction: of a flown verdict, what the geometric level says beside it.
+    notes: what is not flown as the mission has it; the lines say it too.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -99,6 +100,7 @@ class Verdict:
     lines: tuple[str, ...]
     level: str
     prediction: Prediction | None = None
+    notes: tuple[str, ...] = ()
 
     @property
     def headline(self) -> str:

@@ -72,7 +72,7 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     findings = with_suggestions(demands, aligned, findings)
     prediction = _predict(demands, findings) if envelope else None
     lines = summary_lines(findings, flyable, setup, "flown", prediction)
-    return Verdict(findings, flyable, complete, lines, "flown", prediction)
+    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes)
 
 
 def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:

@@ -58,7 +58,8 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     )
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
-    return Verdict(findings, flyable, complete, summary_lines(findings, flyable, setup, "geometric"), "geometric")
+    lines = summary_lines(findings, flyable, setup, "geometric")
+    return Verdict(findings, flyable, complete, lines, "geometric", notes=setup.route.notes)
 
 
 def judge_plan_only(plan: Plan) -> Verdict:
