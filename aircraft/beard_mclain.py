@@ -31,8 +31,12 @@ CT_0, CT_1, CT_2 = 0.09357, -0.06044, -0.1079
 
 
 @dataclass(frozen=True, slots=True)
-class World:
-    """What surrounds the aircraft: air density, kg/m^3; gravity, m/s^2; parasite drag; whether the motor may brake."""
+class BookAtmosphere:
+    """What the book takes as given about the aircraft's surroundings, and two of its choices.
+
+    density: of the air, kg/m^3.  gravity: m/s^2.  parasite_drag: coefficient.  motor_braking: whether the motor may
+    brake the propeller.
+    """
 
     density: float = 1.2682
     gravity: float = 9.81
@@ -40,30 +44,30 @@ class World:
     motor_braking: bool = False
 
 
-def propulsion(airspeed: float, throttle: float, world: World) -> tuple[float, float, float]:
+def propulsion(airspeed: float, throttle: float, air: BookAtmosphere) -> tuple[float, float, float]:
     """Return thrust, N, torque on the propeller, N m, and motor current, A (section 4.3).
 
     Without braking the current is held at or above zero: where the motor would brake, the propeller turns it
     against its no-load torque instead.
     """
     volts = BATTERY * throttle
-    speed = _propeller_speed(airspeed, KQ * KV / RESISTANCE, KQ * (NO_LOAD_CURRENT - volts / RESISTANCE), world)
+    speed = _propeller_speed(airspeed, KQ * KV / RESISTANCE, KQ * (NO_LOAD_CURRENT - volts / RESISTANCE), air)
     current = (volts - KV * speed) / RESISTANCE
-    if current < 0.0 and not world.motor_braking:
-        speed = _propeller_speed(airspeed, 0.0, KQ * NO_LOAD_CURRENT, world)
+    if current < 0.0 and not air.motor_braking:
+        speed = _propeller_speed(airspeed, 0.0, KQ * NO_LOAD_CURRENT, air)
         current = 0.0
     turns = speed / (2.0 * math.pi)
     advance = airspeed / (turns * DIAMETER)
-    thrust = world.density * turns**2 * DIAMETER**4 * (CT_2 * advance**2 + CT_1 * advance + CT_0)
-    torque = world.density * turns**2 * DIAMETER**5 * (CQ_2 * advance**2 + CQ_1 * advance + CQ_0)
+    thrust = air.density * turns**2 * DIAMETER**4 * (CT_2 * advance**2 + CT_1 * advance + CT_0)
+    torque = air.density * turns**2 * DIAMETER**5 * (CQ_2 * advance**2 + CQ_1 * advance + CQ_0)
     return thrust, torque, current
 
 
-def _propeller_speed(airspeed: float, slope: float, constant: float, world: World) -> float:
+def _propeller_speed(airspeed: float, slope: float, constant: float, air: BookAtmosphere) -> float:
     # Propeller torque + slope * speed + constant = 0: the larger root of a quadratic.
-    a = CQ_0 * world.density * DIAMETER**5 / (2.0 * math.pi) ** 2
-    b = CQ_1 * world.density * DIAMETER**4 * airspeed / (2.0 * math.pi) + slope
-    c = CQ_2 * world.density * DIAMETER**3 * airspeed**2 + constant
+    a = CQ_0 * air.density * DIAMETER**5 / (2.0 * math.pi) ** 2
+    b = CQ_1 * air.density * DIAMETER**4 * airspeed / (2.0 * math.pi) + slope
+    c = CQ_2 * air.density * DIAMETER**3 * airspeed**2 + constant
     return (-b + math.sqrt(b**2 - 4.0 * a * c)) / (2.0 * a)
 
 
@@ -76,25 +80,25 @@ def lift(alpha: float) -> float:
     return (1.0 - blend) * (CL_0 + CL_ALPHA * alpha) + blend * plate
 
 
-def rates(states: Floats, commands: Floats, world: World) -> Floats:
+def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
     """(8,) rates of the states (u, v, w, p, q, r, roll, pitch) at elevator, aileron, rudder, throttle (4,)."""
     u, v, w, p, q, r, roll, pitch = (float(x) for x in states)
     elevator, aileron, rudder, throttle = (float(x) for x in commands)
     airspeed = math.sqrt(u * u + v * v + w * w)
     alpha, beta = math.atan2(w, u), math.asin(v / airspeed)
-    pressure = 0.5 * world.density * airspeed**2 * AREA
+    pressure = 0.5 * air.density * airspeed**2 * AREA
     half_span, half_chord = SPAN / (2.0 * airspeed), CHORD / (2.0 * airspeed)
 
     aspect = SPAN**2 / AREA
-    drag_alpha = world.parasite_drag + (CL_0 + CL_ALPHA * alpha) ** 2 / (math.pi * OSWALD * aspect)
+    drag_alpha = air.parasite_drag + (CL_0 + CL_ALPHA * alpha) ** 2 / (math.pi * OSWALD * aspect)
     lift_force = pressure * (lift(alpha) + CL_Q * half_chord * q + CL_ELEVATOR * elevator)
     drag_force = pressure * (drag_alpha + CD_Q * half_chord * q + CD_ELEVATOR * elevator)
     side_force = pressure * (CY_BETA * beta + CY_AILERON * aileron + CY_RUDDER * rudder)
-    thrust, torque, _ = propulsion(airspeed, throttle, world)
+    thrust, torque, _ = propulsion(airspeed, throttle, air)
     sa, ca = math.sin(alpha), math.cos(alpha)
-    force_x = -drag_force * ca + lift_force * sa + thrust - MASS * world.gravity * math.sin(pitch)
-    force_y = side_force + MASS * world.gravity * math.cos(pitch) * math.sin(roll)
-    force_z = -drag_force * sa - lift_force * ca + MASS * world.gravity * math.cos(pitch) * math.cos(roll)
+    force_x = -drag_force * ca + lift_force * sa + thrust - MASS * air.gravity * math.sin(pitch)
+    force_y = side_force + MASS * air.gravity * math.cos(pitch) * math.sin(roll)
+    force_z = -drag_force * sa - lift_force * ca + MASS * air.gravity * math.cos(pitch) * math.cos(roll)
 
     moment_x = pressure * SPAN * (
         ROLL_BETA * beta + half_span * (ROLL_P * p + ROLL_R * r) + ROLL_AILERON * aileron + ROLL_RUDDER * rudder
@@ -119,7 +123,7 @@ def rates(states: Floats, commands: Floats, world: World) -> Floats:
     )
 
 
-def trim(airspeed: float, climb: float, world: World) -> tuple[Floats, Floats]:
+def trim(airspeed: float, climb: float, air: BookAtmosphere) -> tuple[Floats, Floats]:
     """Return states (8,) and commands (4,) of steady straight flight without sideslip.
 
     airspeed: m/s.  climb: rad, flight-path angle.  Raises ValueError where none is found.
@@ -134,7 +138,7 @@ def trim(airspeed: float, climb: float, world: World) -> tuple[Floats, Floats]:
         states, commands = unpack(x)
         # Upward speed over the ground, without sideslip (the book's altitude equation).
         rise = math.cos(x[0]) * math.sin(x[2]) - math.sin(x[0]) * math.cos(x[1]) * math.cos(x[2])
-        return np.append(rates(states, commands, world)[:6], rise - math.sin(climb))
+        return np.append(rates(states, commands, air)[:6], rise - math.sin(climb))
 
     found = root(residual, np.array([0.05, 0.0, 0.05 + climb, -0.1, 0.0, 0.0, 0.75]), tol=1e-13)
     if not found.success and np.abs(found.fun).max() > 1e-9:
@@ -144,7 +148,7 @@ def trim(airspeed: float, climb: float, world: World) -> tuple[Floats, Floats]:
     return unpack(found.x)
 
 
-def linearise(states: Floats, commands: Floats, world: World) -> tuple[Floats, Floats]:
+def linearise(states: Floats, commands: Floats, air: BookAtmosphere) -> tuple[Floats, Floats]:
     """Return A (8, 8) and B (8, 4) of `rates` by central differences."""
     step = 1e-5
 
@@ -152,7 +156,7 @@ def linearise(states: Floats, commands: Floats, world: World) -> tuple[Floats, F
         low, high = (states.copy(), commands.copy()), (states.copy(), commands.copy())
         low[not of_states][index] -= step
         high[not of_states][index] += step
-        difference: Floats = (rates(*high, world) - rates(*low, world)) / (2.0 * step)
+        difference: Floats = (rates(*high, air) - rates(*low, air)) / (2.0 * step)
         return difference
 
     a = np.array([column(i, True) for i in range(8)]).T

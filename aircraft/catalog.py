@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from aircraft.jsbsim_model import OURS, Model, read_model
-from world.scenario_file import names_folder
+from world.scenario_tables import names_folder
 
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
@@ -42,12 +42,18 @@ _FUEL = ("fuel_kg", "fuel_mj_per_kg")
 class Aircraft:
     """One aircraft model: where its JSBSim files are, and what its users need to know.
 
-    folder: holds ``<name>.xml`` (JSBSim) and ``<name>.toml``.  mass: kg.  wing_area: m^2.  wing_span: m.
-    airspeed, airspeed_min, airspeed_max, stall_speed: m/s, true airspeed; cruise, the range guidance may use,
-    and the slowest level trim at sea level.  max_bank: rad, for planned turns.  max_pitch: rad, commanded, either way.
-    max_elevator, max_aileron, max_rudder: rad, either way.  surface_rate: rad/s.  surface_lag, motor_lag: s, first
-    order.  battery_voltage: V, 0 for an aircraft that burns fuel.  battery_energy: J, of the battery, or the heat of
-    the fuel.  model: the properties of the JSBSim model.
+    folder: holds ``<name>.xml`` (JSBSim) and ``<name>.toml``.
+    mass: kg.  wing_area: m^2.  wing_span: m.
+    airspeed: of cruise, m/s; this and the next three are true airspeeds.
+    airspeed_min, airspeed_max: the range that guidance may use, m/s.
+    stall_speed: of the slowest level trim at sea level, m/s.
+    max_bank: rad, for planned turns.
+    max_pitch: rad, commanded, either way.
+    max_elevator, max_aileron, max_rudder: rad, either way.
+    surface_rate: rad/s.  surface_lag, motor_lag: s, first order.
+    battery_voltage: V, 0 for an aircraft that burns fuel.
+    battery_energy: J, of the battery, or the heat of the fuel.
+    model: the properties of the JSBSim model.
     """
 
     name: str
@@ -100,14 +106,22 @@ def jsbsim_folder() -> Path:
 
 
 def aircraft_names() -> tuple[str, ...]:
-    """Names that `load_aircraft` takes, sorted."""
+    """Names that `load_aircraft` takes, sorted.
+
+    >>> aircraft_names()
+    ('aerosonde', 'c172x')
+    """
     return tuple(sorted(file.stem for file in _ROOT.glob("*/*.toml") if file.stem == file.parent.name))
 
 
 def load_aircraft(name: str) -> Aircraft:
-    """Return the aircraft of this name.
+    """The embedded aircraft of this name.
 
     Raises ValueError, in one line, for an unknown name or a metadata file with a missing, unknown or bad entry.
+
+    >>> aircraft = load_aircraft("aerosonde")
+    >>> aircraft.mass, aircraft.airspeed
+    (11.0, 25.0)
     """
     known = aircraft_names()
     if name not in known:
@@ -116,15 +130,18 @@ def load_aircraft(name: str) -> Aircraft:
 
 
 def find_aircraft(name: str) -> Aircraft:
-    """Return the aircraft of this name, or the one in this folder if the name has a slash.
+    """The embedded aircraft of this name, or the one in this folder if the name has a slash.
 
     Raises ValueError as `load_aircraft` does.
+
+    >>> find_aircraft("c172x").airspeed
+    50.0
     """
     return read_aircraft(Path(name)) if names_folder(name) else load_aircraft(name)
 
 
 def read_aircraft(folder: Path) -> Aircraft:
-    """Return the aircraft described by ``<folder>/<folder's name>.toml``.
+    """The aircraft described by ``<folder>/<folder's name>.toml``.
 
     Raises ValueError as `load_aircraft` does.
     """
@@ -175,6 +192,9 @@ def model_hash(aircraft: Aircraft) -> str:
 
     Any change of the model changes it, so a cached envelope or an old log can say which model it belongs to.
     Other files in the folder, such as guidance gains, do not count.  Raises ValueError for a file that cannot be read.
+
+    >>> len(model_hash(load_aircraft("aerosonde")))
+    64
     """
     folders = {aircraft.model_file.parent, *(() if aircraft.model.shipped else aircraft.model_folders)}
     models = sorted({file.resolve() for folder in folders if folder.is_dir() for file in folder.glob("*.xml")})

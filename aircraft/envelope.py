@@ -20,12 +20,16 @@ POWERS = ("power_idle", "power_level", "power_full")
 class Envelope:
     """Steady-flight limits from trims, in still air relative to the air mass.
 
-    airspeed: (v,) m/s, amsl: (h,) m, both increasing.  climb, descent: (v, h) flight-path angles in rad,
-    positive in the direction of their name (a negative climb means the aircraft cannot hold height there);
-    NaN where no trim exists at all.  level_speed_min, level_speed_max: (h,) m/s.
-    max_bank: rad, the aircraft's own limit.  motor_braking: whether descent may drive the motor.
+    aircraft, model_hash: of which model.
+    motor_braking: whether descent may drive the motor.
+    airspeed: (v,) m/s, amsl: (h,) m, both increasing.
+    climb, descent: (v, h) flight-path angles in rad, positive in the direction of their name (a negative climb means
+    that the aircraft cannot hold height there); NaN where no trim exists at all.
+    level_speed_min, level_speed_max: (h,) m/s.
+    max_bank: rad, the aircraft's own limit.
     power_idle, power_level, power_full: (v, h) W from the battery, or of the fuel's heat, at the steepest descent, in
-    level flight and at the steepest climb; (0, 0) where it is not known.  volts: of the battery, 0 without one.
+    level flight and at the steepest climb; (0, 0) where it is not known.
+    volts: of the battery, 0 without one.
     """
 
     aircraft: str

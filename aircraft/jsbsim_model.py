@@ -1,4 +1,4 @@
-"""How a JSBSim model is spoken to: the properties behind our four commands and what we read back."""
+"""The JSBSim properties of a model: those behind the four commands, and those that are read back."""
 
 import math
 from dataclasses import dataclass
@@ -32,8 +32,9 @@ class Reading:
 class Model:
     """The properties of a JSBSim model, and what kind of model it is.
 
-    shipped: it stands in JSBSim's own aircraft folder.  settles: it has an engine with a speed of its own, which runs
-    from the start and settles before anything is measured.  commands: elevator, aileron, rudder, throttle.
+    shipped: its file stands in JSBSim's own aircraft folder.
+    settles: its engine has a speed of its own, runs from the start and settles before anything is measured.
+    commands: elevator, aileron, rudder, throttle.
     readings: the same four, then battery current (A) and power (W).
     """
 
@@ -74,17 +75,17 @@ def read_model(table: object) -> Model:
             continue
         prop, above, below = _entry(commands[name], f"model.command.{name}", 2)
         made.append(CommandProperty(prop, above, below))
-    seen = []
+    read = []
     for name, mine in zip(_READINGS, OURS.readings, strict=True):
         if name not in readings:
-            seen.append(mine)
+            read.append(mine)
         elif readings[name] == []:
-            seen.append(Reading("", 0.0))
+            read.append(Reading("", 0.0))
         else:
             prop, factor = _entry(readings[name], f"model.reading.{name}", 1)
-            seen.append(Reading(prop, factor))
+            read.append(Reading(prop, factor))
     shipped, settles = (_truth(table, name) for name in ("shipped_by_jsbsim", "engine_settles"))
-    return Model(shipped, settles, tuple(made), tuple(seen))
+    return Model(shipped, settles, tuple(made), tuple(read))
 
 
 def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """What a path may ask of the aircraft: the tighter of the scenario's numbers and the envelope's.
 
-The compiled functions judge a planner's candidate, a certificate and a route with one definition.
+The compiled functions are the one definition for a planner's candidate, for a certificate and for a route.
 """
 
 import math
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from world.geometry import wrap
 from world.kernels import compiled, compiled_views, inlined
-from world.wind import W20, Wind
+from world.wind import W20, Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
 
@@ -54,7 +54,11 @@ class Limits:
     """Limits on turns, slopes and clearance.
 
     max_turn, max_climb, max_dive: rad, or None where the scenario leaves them to the aircraft.
-    min_clearance: m above ground.  airspeed: m/s.  max_bank: rad, the tighter of scenario and aircraft.
+    min_clearance: m above ground.
+    envelope: what the aircraft can do in still air.
+    airspeed: m/s.
+    max_bank: rad, the tighter of scenario and aircraft.
+    wind: over the whole area.
     """
 
     max_turn: float | None
@@ -67,9 +71,9 @@ class Limits:
     wind: Wind
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
-        """Steepest climb and dive over the ground that the aircraft can, rad, both positive, on this course.
+        """Steepest climb and dive over the ground on a course (rad) at a height (m), rad, both positive.
 
-        Both are 0 where the wind leaves no way along the course.
+        airspeed: m/s; the limits' own where none is given.  Both are 0 where the wind leaves no way along the course.
         """
         climb, dive = aircraft_slopes(self.performance(airspeed), course, amsl)
         return float(climb), float(dive)
@@ -89,7 +93,7 @@ class Limits:
             airspeed=float(speed),
             tan_max_bank=math.tan(self.max_bank),
             wind_speed=float(wind.speed),
-            wind_to=wind.from_course + math.pi,
+            wind_to=wind.to_course,
             wind_gradient=float(wind.gradient),
             wind_reference_amsl=float(wind.reference_amsl),
             # sigma_w of MIL-F-8785C, which sigma_u meets at 300 m.
@@ -101,7 +105,13 @@ class Limits:
 
 
 def derated(table: PerformanceTable, share: float) -> PerformanceTable:
-    """Give the same aircraft only this share of its climb and descent; an angle below 0, a loss of height, stays."""
+    """The same aircraft with only a share (0..1) of its climb and descent; an angle below 0, a loss of height, stays.
+
+    >>> nothing = np.zeros(2)
+    >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, np.array([0.2, -0.1]), nothing)
+    >>> derated(table, 0.5).climb.tolist()
+    [0.1, -0.1]
+    """
     climb, descent = (
         _locked(np.where(angles > 0.0, share * angles, angles)) for angles in (table.climb, table.descent)
     )
@@ -109,7 +119,7 @@ def derated(table: PerformanceTable, share: float) -> PerformanceTable:
 
 
 def _locked(values: Floats) -> Floats:
-    # Of one type for numba, whoever makes the table: contiguous and read-only.
+    # Contiguous and read-only, as every table: another layout would compile the kernels anew.
     out = np.array(values, dtype=np.float64)
     out.setflags(write=False)
     return out
@@ -118,8 +128,7 @@ def _locked(values: Floats) -> Floats:
 @inlined
 def wind_speed_at(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
     """Mean wind speed at a height, m/s."""
-    speed: float = max(0.0, table.wind_speed + table.wind_gradient * (amsl - table.wind_reference_amsl))
-    return speed
+    return mean_wind_speed(table.wind_speed, table.wind_gradient, table.wind_reference_amsl, amsl)
 
 
 @inlined
@@ -267,7 +276,7 @@ def turn_tangents(table: PerformanceTable, waypoints: Floats) -> Floats:  # prag
 
 
 @compiled
-def reversal_room(
+def roll_reversal_length(
     table: PerformanceTable,
     ux: float,
     uy: float,
@@ -287,5 +296,5 @@ def reversal_room(
         return 0.0
     pull = speed * speed / GRAVITY
     roll = math.atan(pull / radius_in) + math.atan(pull / radius_out) - math.atan(table.tan_max_bank)
-    room: float = speed * ROLL_TIME * max(0.0, roll)
-    return room
+    length: float = speed * ROLL_TIME * max(0.0, roll)
+    return length

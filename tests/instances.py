@@ -205,6 +205,13 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
         'aircraft = "aerosonde"',
         "airspeed_mps = 25",
     ]
+    lines += _threat_lines(instance)
+    return "\n".join(lines) + "\n"
+
+
+def _threat_lines(instance: Instance) -> list[str]:
+    """[[threats]] of an instance; detection reaches 1.5 times as far as the missile, and a scale is half a radius."""
+    lines = []
     for number, (place, radius) in enumerate(zip(instance.positions, instance.radii, strict=True), 1):
         lines += [
             "",
@@ -217,7 +224,7 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
             f"detection_radius_m = {1.5 * radius:.0f}",
             f"detection_scale_m = {0.75 * radius:.0f}",
         ]
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def random_scenario(seed: int, threats: int = 60) -> str:

@@ -1,6 +1,5 @@
 """Missions by hand: a line an item, placed in metres about one origin; a plan of any waypoints."""
 
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -13,8 +12,9 @@ from flight.mission.items import Mission
 from flight.mission.route import Route
 from flight.mission.routing import make_route
 from flight.mission_files.formats import parse_mission
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.flight_setup import FlightSetup
 from planner.plan import Certificate, Plan
+from tests.setups import route_along, setup_along, spec_around
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo
 from world.scenario import from_spec, load_scenario
@@ -55,24 +55,17 @@ def refusal(*lines: str, home: str = "36.5 -84.2 300", terrain: Terrain | None =
 def setup_of(*lines: str, home: str = "36.5 -84.2 300", **tables: Any) -> FlightSetup:
     """A mission over flat ground at 100 m, ready to fly."""
     read = mission(*lines, home=home)
-    end = {"east_m": 0.0, "north_m": 0.0, "amsl_m": 400.0}
-    spec: dict[str, Any] = {
-        "name": "loiters",
+    ends = [[0.0, 0.0, 400.0], [500.0, 0.0, 400.0]]
+    made = {
         "origin": {"lat_deg": ORIGIN.lat_deg, "lon_deg": ORIGIN.lon_deg},
         "terrain": {"kind": "flat", "amsl_m": 100.0},
         "area": {"east_m": [-6000, 6000], "north_m": [-6000, 6000], "ceiling_amsl_m": 3000.0},
-        "start": end,
-        "destination": end | {"east_m": 500.0},
     }
-    scenario = from_spec(spec | tables, "loiters", external=True)
-    aircraft = load_aircraft("aerosonde")
-    bank = math.radians(30.0)
-    blank = Route(
-        np.array([[0.0, 0, 400], [500, 0, 400]]), np.array([25.0]), np.zeros(2), np.zeros(2, bool), np.arange(2), ""
-    )
-    limits = make_limits(scenario, load_envelope(aircraft), 25.0, bank)
-    setup = FlightSetup(scenario, read, "", blank, limits, "aerosonde", 888.0, 1)
-    return replace(setup, route=make_route(read, ORIGIN, scenario.terrain, 25.0, False, setup.limits))
+    spec = spec_around(ends, name="loiters", buffer=0.0, ceiling=3000.0, **made)
+    scenario, envelope = from_spec(spec | tables, "loiters", external=True), load_envelope(load_aircraft("aerosonde"))
+    setup = setup_along(scenario, route_along(ends, 25.0), envelope, airspeed=25.0, battery=888.0)
+    flown = make_route(read, ORIGIN, scenario.terrain, 25.0, False, setup.limits)
+    return replace(setup, mission=read, route=flown)
 
 
 def a_plan(points: list[tuple[float, float, float]]) -> Plan:

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope
-from flight.mission.items import Mission
-from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
+from tests.setups import route_along, setup_along, spec_around
 from world.geometry import leg_courses, leg_runs, signed_turns
 from world.scenario import Scenario, from_spec
 from world.terrain import Terrain
@@ -60,24 +59,18 @@ def make_scenario(
     battery_wh: float | None = None,
 ) -> Scenario:
     """A scenario around some waypoints: flat ground at sea level unless ``terrain`` or ``ground`` says otherwise."""
-    points = np.asarray(waypoints, dtype=np.float64)
-    low, high = points.min(axis=0), points.max(axis=0)
-    spec = {
-        "name": "synthetic",
-        "origin": {"lat_deg": 46.0, "lon_deg": 8.0},
-        "terrain": terrain or {"kind": "flat", "amsl_m": 0.0},
-        "area": {
-            "east_m": [low[0] - area_margin, high[0] + area_margin],
-            "north_m": [low[1] - area_margin, high[1] + area_margin],
-            "ceiling_amsl_m": 5000.0,
-        },
-        "start": {"east_m": points[0, 0], "north_m": points[0, 1], "amsl_m": points[0, 2]},
-        "destination": {"east_m": points[-1, 0], "north_m": points[-1, 1], "amsl_m": points[-1, 2]},
-        "threats": list(threats),
-        "limits": limits or {},
-        "flight": {} if battery_wh is None else {"battery_wh": battery_wh},
-        "wind": wind or {},
-    }
+    spec = spec_around(
+        waypoints,
+        name="synthetic",
+        buffer=area_margin,
+        ceiling=5000.0,
+        origin={"lat_deg": 46.0, "lon_deg": 8.0},
+        terrain=terrain or {"kind": "flat", "amsl_m": 0.0},
+        threats=list(threats),
+        limits=limits or {},
+        flight={} if battery_wh is None else {"battery_wh": battery_wh},
+        wind=wind or {},
+    )
     return from_spec(spec, "synthetic", ground=ground)
 
 
@@ -93,28 +86,10 @@ def make_setup(
     **world: Any,
 ) -> FlightSetup:
     """A setup that flies these waypoints (w, 3); further arguments as of `make_scenario`."""
-    points = np.asarray(waypoints, dtype=np.float64)
-    over = np.zeros(len(points), dtype=bool)
-    over[list(fly_over)] = True
-    route = Route(
-        waypoints=points,
-        airspeed=np.full(len(points) - 1, airspeed) if speeds is None else np.asarray(speeds, dtype=np.float64),
-        acceptance=np.zeros(len(points)),
-        fly_over=over,
-        items=np.arange(len(points)),
-        started="trimmed at the first waypoint, on course to the second",
-    )
-    scenario = scenario or make_scenario(points, **world)
-    return FlightSetup(
-        scenario=scenario,
-        mission=Mission(None, ()),
-        mission_text="",
-        route=route,
-        limits=make_limits(scenario, table or envelope(), airspeed, math.radians(bank_deg)),
-        aircraft="aerosonde",
-        battery=100.0,
-        seed=1,
-    )
+    started = "trimmed at the first waypoint, on course to the second"
+    route = route_along(waypoints, airspeed if speeds is None else speeds, fly_over=fly_over, started=started)
+    scenario = scenario or make_scenario(waypoints, **world)
+    return setup_along(scenario, route, table or envelope(), airspeed=airspeed, bank_deg=bank_deg)
 
 
 def bank_radius(speed: float = 25.0, bank_deg: float = 30.0) -> float:
@@ -159,9 +134,7 @@ def fly_path(
         leg = np.clip(np.searchsorted(stations, s, side="right") - 1, 0, setup.route.legs - 1)
         speed = setup.route.airspeed[leg] + (0.0 if airspeed is None else airspeed(s))
     wind = np.array([setup.scenario.wind.at(float(h)) for h in heights])
-    tail = wind[:, 0] * np.sin(course) + wind[:, 1] * np.cos(course)
-    cross = wind[:, 0] * np.cos(course) - wind[:, 1] * np.sin(course)
-    ground = np.sqrt((speed * np.cos(slopes)) ** 2 - cross**2) + tail
+    ground = _ground_speed(speed * np.cos(slopes), course, wind)
     moved = np.hypot(*np.diff(place, axis=0).T)
     time = np.concatenate([[0.0], np.cumsum(moved / (0.5 * (ground[1:] + ground[:-1])))])
     if stop is not None:
@@ -172,33 +145,50 @@ def fly_path(
     def at(column: Floats) -> Floats:
         return np.interp(ticks, time, column[: time.size])
 
-    position = np.stack([at(place[:, 0]), at(place[:, 1]), at(heights)], axis=1)
-    velocity = np.gradient(position, ticks, axis=0)
     # Curvature over about half a second, as a roll that takes its time.
     turning = np.gradient(np.unwrap(course), s) * ground
     bank = np.arctan(np.convolve(np.pad(turning, 20, mode="edge"), np.ones(41) / 41, "valid") * ground / GRAVITY)
+    position = np.stack([at(place[:, 0]), at(place[:, 1]), at(heights)], axis=1)
+    track = _level_track(ticks, position, 0.6 + (0.0 if throttle is None else at(throttle(s))), power)
+    return replace(
+        track,
+        attitude=np.stack([at(bank), at(slopes), at(np.unwrap(course))], axis=1),
+        airspeed=at(speed),
+        wind=np.stack([at(wind[:, 0]), at(wind[:, 1]), np.zeros(ticks.size)], axis=1),
+        speed_command=np.full(ticks.size, setup.airspeed, dtype=np.float32),
+    )
+
+
+def _ground_speed(airspeed: Floats, course: Floats, wind: Floats) -> Floats:
+    """Speed over the ground, m/s, of a course held against the wind (n, 2); airspeed: its horizontal part."""
+    tail = wind[:, 0] * np.sin(course) + wind[:, 1] * np.cos(course)
+    cross = wind[:, 0] * np.cos(course) - wind[:, 1] * np.sin(course)
+    return np.asarray(np.sqrt(airspeed**2 - cross**2) + tail)
+
+
+def _level_track(ticks: Floats, position: Floats, throttle: Floats | float, power: float) -> Track:
+    """A track through these positions (t, 3), far above the ground, in level attitude; power: W, at 44.4 V."""
     count = ticks.size
     controls = np.zeros((count, 4))
-    controls[:, 3] = np.clip(0.6 + (0.0 if throttle is None else at(throttle(s))), 0.0, 1.0)
-    heading = at(np.unwrap(course))
+    controls[:, 3] = np.clip(throttle, 0.0, 1.0)
     return Track(
         time=ticks,
         position=position,
-        velocity=velocity,  # type: ignore[arg-type]  # Track gives each array its own type
-        attitude=np.stack([at(bank), at(slopes), heading], axis=1),
+        velocity=np.gradient(position, ticks, axis=0),  # type: ignore[arg-type]  # Track gives each array its own type
+        attitude=np.zeros((count, 3)),
         rates=np.zeros((count, 3), dtype=np.float32),
-        airspeed=at(speed),  # type: ignore[arg-type]  # Track gives each array its own type
+        airspeed=np.zeros(count, dtype=np.float32),
         flow=np.zeros((count, 2), dtype=np.float32),
         controls=controls,  # type: ignore[arg-type]  # Track gives each array its own type
         commands=controls,  # type: ignore[arg-type]  # Track gives each array its own type
-        wind=np.stack([at(wind[:, 0]), at(wind[:, 1]), np.zeros(count)], axis=1),
+        wind=np.zeros((count, 3)),
         load_factor=np.ones(count, dtype=np.float32),
         current=np.full(count, power / 44.4, dtype=np.float32),
         energy=ticks * power / 3600.0,  # type: ignore[arg-type]  # Track gives each array its own type
         leg=np.zeros(count, dtype=np.int32),
         cross_track=np.zeros(count, dtype=np.float32),
         height_error=np.zeros(count, dtype=np.float32),
-        speed_command=np.full(count, setup.airspeed, dtype=np.float32),
+        speed_command=np.zeros(count, dtype=np.float32),
         clearance=np.full(count, 1000.0, dtype=np.float32),
     )
 

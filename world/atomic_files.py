@@ -6,7 +6,16 @@ from pathlib import Path
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
-    """Write a file under a temporary name beside its target and rename it.  Raises OSError, leaving nothing."""
+    """Write a file under a temporary name beside its target and rename it: whole, or not at all.
+
+    Text is written in UTF-8.  Raises OSError, and leaves what was there.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_whole(Path(folder) / "plan.json", "{}")
+    ...     print((Path(folder) / "plan.json").read_text())
+    {}
+    """
     content = data.encode("utf-8") if isinstance(data, str) else data
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:

@@ -6,9 +6,9 @@ level, kept apart from the map so that Earth curvature never leaks into altitude
 
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,6 +19,25 @@ if TYPE_CHECKING:
     from pyproj import Proj, Transformer
 
 Floats = NDArray[np.float64]
+
+# Terms along each axis of the largest polynomial of a `PolyMap`: of degree 9.
+MOST_TERMS = 10
+# A polynomial map of the plane: with a and b the position from the centre in half-widths of its rectangle, the sums of
+# u[i, j] * a**i * b**j and of v[i, j] * a**i * b**j over i + j < size.
+POLYMAP = np.dtype(
+    [
+        ("centre_x", np.float64),
+        ("centre_y", np.float64),
+        ("half_x", np.float64),
+        ("half_y", np.float64),
+        ("size", np.int64),
+        ("u", np.float64, (MOST_TERMS, MOST_TERMS)),
+        ("v", np.float64, (MOST_TERMS, MOST_TERMS)),
+    ],
+    align=True,
+)
+# One record of that dtype.  Compiled code reads its fields as attributes, which numpy's own type does not know of.
+PolyMapRecord = Any
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,19 +57,29 @@ def _aeqd(origin: GeoOrigin) -> "Proj":
 
 
 def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[Floats, Floats]:
-    """East and north in metres of geodetic positions in degrees; any shape, the same shape back."""
+    """East and north in metres of geodetic positions in degrees; any shape, the same shape back.
+
+    >>> east, north = to_map(GeoOrigin(46.0, 8.0), [46.0, 46.01], [8.01, 8.0])
+    >>> east.round(1).tolist(), north.round(1).tolist()
+    ([774.6, 0.0], [0.0, 1111.5])
+    """
     east, north = _aeqd(origin)(np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64))
     return np.asarray(east), np.asarray(north)
 
 
 def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats, Floats]:
-    """Latitude and longitude in degrees of map positions in metres; any shape, the same shape back."""
+    """Latitude and longitude in degrees of map positions in metres; any shape, the same shape back.
+
+    >>> lat, lon = to_geo(GeoOrigin(46.0, 8.0), 0.0, 10_000.0)
+    >>> float(lat.round(6)), float(lon.round(6))
+    (46.089967, 8.0)
+    """
     lon, lat = _aeqd(origin)(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64), inverse=True)
     return np.asarray(lat), np.asarray(lon)
 
 
 def crs_transformer(crs: str) -> "Transformer":
-    """Make the transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
+    """The transformer from WGS84 (longitude, latitude in degrees) to the horizontal part of a CRS.
 
     Heights are never passed through: without a geoid grid PROJ would return them unchanged, in silence.
     Raises ValueError for a CRS that PROJ does not know.
@@ -85,25 +114,53 @@ def height_unit(crs: str) -> tuple[str, float]:
 class PolyMap:
     """A smooth map of the plane, as a polynomial fitted to it over a rectangle.
 
-    packed: (2 + 2n, n) float64: row 0 starts with the centre, row 1 with the half-widths of the rectangle,
-    then two (n, n) blocks of coefficients, u and v, of the scaled x**i * y**j with i + j < n.
+    record: the polynomial, of dtype `POLYMAP`, in the form that compiled functions take.
     residual: the largest error seen at check points between the nodes, in the unit of the result.
     """
 
-    packed: Floats
+    record: PolyMapRecord = field(repr=False)
     residual: float
 
     def __post_init__(self) -> None:
         """Lock the coefficients."""
-        packed = np.array(self.packed, dtype=np.float64)
-        packed.setflags(write=False)
-        object.__setattr__(self, "packed", packed)
+        locked = np.array([self.record], dtype=POLYMAP)
+        locked.setflags(write=False)
+        object.__setattr__(self, "record", locked[0])
 
     def __call__(self, x: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         """Both components at arrays of positions."""
         xs, ys = np.broadcast_arrays(np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64))
-        out = _polymap_many(self.packed, xs.ravel(), ys.ravel())
+        out = _polymap_many(self.record, xs.ravel(), ys.ravel())
         return out[0].reshape(xs.shape), out[1].reshape(xs.shape)
+
+    def rows(self) -> Floats:
+        """The polynomial as rows of numbers, (2 + 2n, n), as a log holds it; `from_rows` reads them.
+
+        Row 0 starts with the centre, row 1 with the half-widths; then come the coefficients of u and of v.
+        """
+        one, size = self.record, int(self.record["size"])
+        rows = np.zeros((2 + 2 * size, size))
+        rows[0, :2] = one["centre_x"], one["centre_y"]
+        rows[1, :2] = one["half_x"], one["half_y"]
+        rows[2:] = np.concatenate([one["u"][:size, :size], one["v"][:size, :size]])
+        return rows
+
+    @staticmethod
+    def from_rows(rows: Floats, residual: float) -> "PolyMap":
+        """Make a map of the rows that `rows` gave; n is at most `MOST_TERMS`."""
+        size = rows.shape[1]
+        return PolyMap(_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
+
+
+def _record(centre: Floats, half: Floats, u: Floats, v: Floats) -> PolyMapRecord:
+    """A record of `POLYMAP` with these (n, n) coefficients."""
+    size = len(u)
+    record = np.zeros(1, dtype=POLYMAP)[0]
+    record["centre_x"], record["centre_y"] = centre
+    record["half_x"], record["half_y"] = half
+    record["size"] = size
+    record["u"][:size, :size], record["v"][:size, :size] = u, v
+    return record
 
 
 def fit_polymap(
@@ -113,6 +170,11 @@ def fit_polymap(
 
     The degree grows from 1 to 9 until the largest error at points between the fitted nodes is within the
     tolerance; the best one is returned in any case, with its residual.
+
+    >>> copy = fit_polymap(lambda x, y: (x * y, x + y), [[0.0, 2.0], [0.0, 4.0]], 1e-9)
+    >>> u, v = copy(1.0, 3.0)
+    >>> round(float(u), 9), round(float(v), 9), copy.residual < 1e-9
+    (3.0, 4.0, True)
     """
     (x0, x1), (y0, y1) = np.asarray(bounds, dtype=np.float64)
     centre = np.array([(x0 + x1) / 2, (y0 + y1) / 2])
@@ -130,19 +192,19 @@ def fit_polymap(
     check_u, check_v = grid(23)
     wanted, checked = targets(nodes_u, nodes_v), targets(check_u, check_v)
     best: PolyMap | None = None
-    for size in range(2, 11):
+    for size in range(2, MOST_TERMS + 1):
         powers = [(i, j) for i, j in itertools.product(range(size), repeat=2) if i + j < size]
         basis = np.stack([nodes_u**i * nodes_v**j for i, j in powers], axis=1)
-        packed = np.zeros((2 + 2 * size, size))
-        packed[0, :2], packed[1, :2] = centre, half
-        for block, values in enumerate(wanted):
+        blocks = np.zeros((2, size, size))
+        for block, values in zip(blocks, wanted, strict=True):
             solution = _least_squares(basis, np.ascontiguousarray(values, dtype=np.float64))
             for (i, j), coefficient in zip(powers, solution, strict=True):
-                packed[2 + block * size + i, j] = coefficient
-        got = _polymap_many(packed, centre[0] + half[0] * check_u, centre[1] + half[1] * check_v)
+                block[i, j] = coefficient
+        record = _record(centre, half, *blocks)
+        got = _polymap_many(record, centre[0] + half[0] * check_u, centre[1] + half[1] * check_v)
         residual = max(float(np.max(np.abs(got[k] - checked[k]))) for k in range(2))
         if best is None or residual < best.residual:
-            best = PolyMap(packed, residual)
+            best = PolyMap(record, residual)
         if residual <= tolerance:
             break
     if best is None:  # pragma: no cover - the loop always runs
@@ -180,32 +242,44 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
 
 
 @compiled_views
-def polymap(packed: Floats, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Both components of a packed `PolyMap` at one point."""
-    return polymap_within(packed, packed.shape[1], x, y)
+def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Both components of a `PolyMap`'s record at one point, by Horner's scheme."""
+    a = (x - record.centre_x) / record.half_x
+    b = (y - record.centre_y) / record.half_y
+    u = 0.0
+    v = 0.0
+    for i in range(record.size - 1, -1, -1):
+        row_u = 0.0
+        row_v = 0.0
+        for j in range(record.size - 1 - i, -1, -1):
+            row_u = row_u * b + record.u[i, j]
+            row_v = row_v * b + record.v[i, j]
+        u = u * a + row_u
+        v = v * a + row_v
+    return u, v
 
 
 @compiled_views
-def polymap_within(packed: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Do the same with a `PolyMap` of this size in the first columns of a wider table (Horner's scheme)."""
-    a = (x - packed[0, 0]) / packed[1, 0]
-    b = (y - packed[0, 1]) / packed[1, 1]
+def polymap_within(rows: Floats, size: int, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Both components of `PolyMap.rows` of this size at one point, in the first columns of a wider table."""
+    a = (x - rows[0, 0]) / rows[1, 0]
+    b = (y - rows[0, 1]) / rows[1, 1]
     u = 0.0
     v = 0.0
     for i in range(size - 1, -1, -1):
         row_u = 0.0
         row_v = 0.0
         for j in range(size - 1 - i, -1, -1):
-            row_u = row_u * b + packed[2 + i, j]
-            row_v = row_v * b + packed[2 + size + i, j]
+            row_u = row_u * b + rows[2 + i, j]
+            row_v = row_v * b + rows[2 + size + i, j]
         u = u * a + row_u
         v = v * a + row_v
     return u, v
 
 
 @compiled
-def _polymap_many(packed: Floats, x: Floats, y: Floats) -> Floats:  # pragma: no cover - compiled
+def _polymap_many(record: PolyMapRecord, x: Floats, y: Floats) -> Floats:  # pragma: no cover - compiled
     out = np.empty((2, x.size))
     for k in range(x.size):
-        out[0, k], out[1, k] = polymap(packed, x[k], y[k])
+        out[0, k], out[1, k] = polymap(record, x[k], y[k])
     return out

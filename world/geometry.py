@@ -1,4 +1,4 @@
-"""Path geometry that judges plans and flown tracks alike: turning angles, slopes, spheres, exposure.
+"""Path geometry, the same for plans and for flown tracks: turning angles, slopes, fly-by arcs, spheres, exposure.
 
 Scalar kernels are compiled and take bare numbers, so that the planner's evaluation, the certificate and the
 check of a flown track call the same code.
@@ -22,6 +22,9 @@ def turning_angles(waypoints: ArrayLike) -> Floats:
 
     waypoints: (..., w, 3) metres.  Returns (..., w - 2) radians in [0, pi].
     A leg with no horizontal length has no course and counts as straight.
+
+    >>> turning_angles([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
+    [1.5708]
     """
     # atan2, not the paper's arccos: rounding takes arccos' argument past 1 on exact U-turns, and the NaN
     # that follows compares as "within the limit".
@@ -29,7 +32,13 @@ def turning_angles(waypoints: ArrayLike) -> Floats:
 
 
 def signed_turns(waypoints: ArrayLike) -> Floats:
-    """Course change at each inner waypoint, (..., w - 2) rad in (-pi, pi], positive to the right."""
+    """Course change at each inner waypoint, (..., w - 2) rad in (-pi, pi], positive to the right.
+
+    waypoints: (..., w, 3) metres; heights do not count.
+
+    >>> signed_turns([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
+    [-1.5708]
+    """
     legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
     before, after = legs[..., :-1, :], legs[..., 1:, :]
     cross = before[..., 0] * after[..., 1] - before[..., 1] * after[..., 0]
@@ -39,36 +48,64 @@ def signed_turns(waypoints: ArrayLike) -> Floats:
 
 
 def leg_courses(waypoints: ArrayLike) -> Floats:
-    """Course of each leg, (..., w - 1) rad clockwise from north in (-pi, pi]."""
+    """Course of each leg of waypoints (..., w, 3), (..., w - 1) rad clockwise from north in (-pi, pi].
+
+    >>> leg_courses([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
+    [1.5708, 0.0]
+    """
     legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
     return np.asarray(np.arctan2(legs[..., 0], legs[..., 1]))
 
 
 def leg_runs(waypoints: ArrayLike) -> Floats:
-    """Horizontal length of each leg, (..., w - 1) m."""
+    """Horizontal length of each leg of waypoints (..., w, 3), (..., w - 1) m.
+
+    >>> leg_runs([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).tolist()
+    [1000.0, 1000.0]
+    """
     legs = np.diff(np.asarray(waypoints, dtype=np.float64)[..., :2], axis=-2)
     return np.asarray(np.hypot(legs[..., 0], legs[..., 1]))
 
 
 def leg_slopes(waypoints: ArrayLike) -> Floats:
-    """Slope angle of each leg, (..., w - 1) rad, climbing positive (the angle of paper eq. 3's tangent)."""
+    """Slope angle of each leg of waypoints (..., w, 3), (..., w - 1) rad, climbing positive (paper eq. 3).
+
+    >>> leg_slopes([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(4).tolist()
+    [0.0, 0.0997]
+    """
     rise = np.diff(np.asarray(waypoints, dtype=np.float64)[..., 2], axis=-1)
     return np.asarray(np.arctan2(rise, leg_runs(waypoints)))
 
 
 def path_length(waypoints: ArrayLike) -> Floats:
-    """Length in three dimensions, (...,) m."""
+    """Length in three dimensions of paths of waypoints (..., w, 3), (...,) m.
+
+    >>> float(path_length([[0, 0, 100], [1000, 0, 100], [1000, 1000, 200]]).round(2))
+    2004.99
+    """
     legs = np.diff(np.asarray(waypoints, dtype=np.float64), axis=-2)
     return np.asarray(np.sqrt((legs**2).sum(axis=-1)).sum(axis=-1))
 
 
-def arc_reach(turn: float, radius: float) -> float:
-    """Length of leg (m) that a fly-by arc takes on each side of its waypoint, R tan(turn / 2); turn in rad below pi."""
+def tangent_length(turn: float, radius: float) -> float:
+    """Length of leg (m) that a fly-by arc takes on either side of its waypoint: R tan(turn / 2).
+
+    turn: rad, from 0 to below pi.  radius: m.
+
+    >>> round(tangent_length(math.radians(90.0), 100.0), 3)
+    100.0
+    """
     return radius * math.tan(0.5 * turn)
 
 
-def arc_cut(turn: float, radius: float) -> float:
-    """Distance (m) at which a fly-by arc passes its waypoint: R (1 / cos(turn / 2) - 1), turn in rad below pi."""
+def fly_by_offset(turn: float, radius: float) -> float:
+    """Distance (m) at which a fly-by arc passes its waypoint: R (1 / cos(turn / 2) - 1).
+
+    turn: rad, from 0 to below pi.  radius: m.
+
+    >>> round(fly_by_offset(math.radians(90.0), 100.0), 3)
+    41.421
+    """
     return radius * (1.0 / math.cos(0.5 * turn) - 1.0)
 
 

@@ -49,6 +49,9 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     """Open an elevation file or an embedded name.  Relative paths count from ``base``.
 
     Raises TerrainError for anything that is not a single-band .tif, .hgt or .npz elevation file.
+
+    >>> open_raster("jacksboro").shape
+    (344, 403)
     """
     if path in EMBEDDED:
         from matplotlib import cbook
@@ -77,11 +80,16 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     )
 
 
-def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margin: float) -> Terrain:
-    """Read the window of ``raster`` that covers map ``bounds`` [[e0, e1], [n0, n1]] m and a margin, as `Terrain`.
+def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffer: float) -> Terrain:
+    """Read the window of ``raster`` over map bounds [[e0, e1], [n0, n1]] and a buffer about them, m, as `Terrain`.
 
     Raises TerrainError where the bounds reach beyond the tile, where data is missing inside them, or where
-    the window is too large.  The margin is cut at the tile's edge in silence.
+    the window is too large.  The buffer is cut at the tile's edge in silence.
+
+    >>> raster = open_raster("jacksboro")
+    >>> terrain = read_terrain(raster, raster.centre, [[-500.0, 500.0], [-500.0, 500.0]], 100.0)
+    >>> terrain.heights.shape, float(terrain.height(0.0, 0.0).round(1))
+    ((16, 21), 568.0)
     """
     box = np.asarray(bounds, dtype=np.float64)
     rows, cols = raster.shape
@@ -91,7 +99,7 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margi
             f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
             f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}"
         )
-    c0, c1, r0, r1 = _outline_window(raster, origin, box, margin)
+    c0, c1, r0, r1 = _outline_window(raster, origin, box, buffer)
     left, right = max(0, math.floor(c0) - 1), min(cols, math.ceil(c1) + 2)
     top, bottom = max(0, math.floor(r0) - 1), min(rows, math.ceil(r1) + 2)
     if (right - left) * (bottom - top) > MOST_PIXELS:
@@ -100,11 +108,11 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, margi
             f" at most {MOST_PIXELS:,} are read"
         )
     heights = raster.read(top, bottom, left, right)
-    sound = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
-    heights[~sound] = np.nan
+    valid = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
+    heights[~valid] = np.nan
     to_pixel = fit_polymap(
         lambda e, n: _shifted(raster.to_source, origin, e, n, left, top),
-        box + np.array([-margin, margin]),
+        box + np.array([-buffer, buffer]),
         PIXEL_TOLERANCE,
     )
     if to_pixel.residual > 10 * PIXEL_TOLERANCE:
@@ -129,7 +137,7 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
         return
     to_map_metres = np.linalg.inv(per_metre)
     # A height is made of the four pixels around it.
-    reach = np.abs(to_map_metres).sum(axis=1)[:, None]
+    footprint = np.abs(to_map_metres).sum(axis=1)[:, None]
     for first in range(0, rows.size, _HOLES_AT_ONCE):
         part = slice(first, first + _HOLES_AT_ONCE)
         wanted = np.stack([cols[part], rows[part]]).astype(np.float64)
@@ -137,7 +145,7 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
         place = np.repeat(box.mean(axis=1)[:, None], wanted.shape[1], axis=1)
         for _ in range(8):
             place += to_map_metres @ (wanted - np.stack(terrain.to_pixel(place[0], place[1])))
-        inside = ((place > box[:, :1] - reach) & (place < box[:, 1:] + reach)).all(axis=0)
+        inside = ((place > box[:, :1] - footprint) & (place < box[:, 1:] + footprint)).all(axis=0)
         if inside.any():
             east, north = place[:, int(np.argmax(inside))]
             raise TerrainError(
@@ -147,11 +155,11 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
 
 
 def _outline_window(
-    raster: RasterFile, origin: GeoOrigin, box: Floats, margin: float
+    raster: RasterFile, origin: GeoOrigin, box: Floats, buffer: float
 ) -> tuple[float, float, float, float]:
     """Range of cols and rows that the outline of a map box takes: (col0, col1, row0, row1)."""
     ramp = np.linspace(0.0, 1.0, 41)
-    (w, e), (s, n) = box + np.array([-margin, margin])
+    (w, e), (s, n) = box + np.array([-buffer, buffer])
     east = np.concatenate([w + ramp * (e - w), w + ramp * (e - w), np.full(41, w), np.full(41, e)])
     north = np.concatenate([np.full(41, s), np.full(41, n), s + ramp * (n - s), s + ramp * (n - s)])
     col, row = _shifted(raster.to_source, origin, east, north, 0, 0)
@@ -167,9 +175,13 @@ def _shifted(
 
 
 def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
-    """Find the largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
+    """The largest upright map box inside the tile, [[e0, e1], [n0, n1]] m, to half a percent.
 
     Raises TerrainError where there is none.
+
+    >>> raster = open_raster("jacksboro")
+    >>> tile_bounds(raster, raster.centre).round(-2).tolist()
+    [[-14900.0, 14900.0], [-15800.0, 15800.0]]
     """
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
     middle_e, middle_n = (east.min() + east.max()) / 2, (north.min() + north.max()) / 2

@@ -1,55 +1,54 @@
 """A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ValidationError
 
 from world.errors import ScenarioError, TerrainError
-from world.frames import GeoOrigin, to_geo, to_map
+from world.frames import GeoOrigin, to_geo
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
-from world.scenario_file import (
+from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
+from world.scenario_positions import check_inside, make_threats, map_position
+from world.scenario_tables import (
     AreaTable,
     FlightTable,
     LimitsTable,
     OriginTable,
     PlannerTable,
-    PointTable,
     ScenarioFile,
     TerrainTable,
-    ThreatTable,
-    check_scenario,
-    first_error,
     names_folder,
-    parse_scenario,
-    read_scenario_text,
 )
-from world.terrain import Terrain, flat_terrain, peaks_terrain
+from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
 from world.threats import Threats
 from world.wind import Wind
 
 Floats = NDArray[np.float64]
-Table = TypeVar("Table", bound=BaseModel)
 
 # Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
-MARGIN = 1000.0
+GROUND_BUFFER = 1000.0
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
     """One mission's world, in map axes (m) and radians.
 
-    bounds: (2, 2) [[east0, east1], [north0, north1]].  floor, ceiling: m AMSL.  start, destination: (3,).
-    start_course, destination_course: rad or None.  terrain: None where none was given (an external mission).
+    spec: the checked file it came from, with which `from_spec` makes it again.
+    origin: where east = north = 0.
+    bounds: (2, 2) [[east0, east1], [north0, north1]].
+    floor, ceiling: m AMSL.
+    start, destination: (3,).
+    start_course, destination_course: rad or None.
+    terrain: None where none was given (an external mission).
+    limits, planner, flight: the file's tables of these names.
     external: made around a mission file that came without a scenario: its bounds are no limit and its empty
-    threats say nothing.  spec: the checked file it came from, with which `from_spec` makes it again.
+    threats say nothing.
     """
 
     name: str
@@ -78,13 +77,17 @@ class Scenario:
             object.__setattr__(self, name, array)
 
     def to_json(self) -> dict[str, Any]:
-        """Give the scenario as plain JSON data; `from_spec` reads it back."""
+        """The scenario as plain JSON data; `from_spec` reads it back."""
         return self.spec.model_dump(mode="json", exclude_none=True)
 
 
 @cache
 def embedded_scenarios() -> dict[str, ScenarioFile]:
-    """Read the scenarios that ship with planfly, by name, in a fixed order."""
+    """The checked files of the scenarios that ship with planfly, by name, in a fixed order.
+
+    >>> embedded_scenarios()["tight"].limits.min_clearance_m
+    60.0
+    """
     folder = resources.files("world") / "scenarios"
     found = {}
     for entry in sorted(folder.iterdir(), key=lambda item: (item.name != "jacksboro.toml", item.name)):
@@ -96,7 +99,11 @@ def embedded_scenarios() -> dict[str, ScenarioFile]:
 def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     """Read a scenario: an embedded name or a TOML file.  ``terrain`` replaces its terrain by a file.
 
-    Raises ScenarioError or TerrainError.
+    Raises ScenarioError for a file that is missing or has a fault, and TerrainError for its elevation file.
+
+    >>> scenario = load_scenario("tight")
+    >>> scenario.start.tolist(), scenario.destination.tolist(), len(scenario.threats)
+    ([0.0, 0.0, 75.0], [2600.0, 0.0, 75.0], 28)
     """
     known = embedded_names()
     if name_or_path in known:
@@ -114,7 +121,11 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
 
 
 def embedded_names() -> list[str]:
-    """Names of the scenarios that ship with planfly, the default first."""
+    """Names of the scenarios that ship with planfly, the default first.
+
+    >>> embedded_names()[0]
+    'jacksboro'
+    """
     folder = resources.files("world") / "scenarios"
     names = sorted(item.name.removesuffix(".toml") for item in folder.iterdir() if item.name.endswith(".toml"))
     return sorted(names, key=lambda name: name != "jacksboro")
@@ -131,8 +142,16 @@ def from_spec(
 ) -> Scenario:
     """Make a scenario of a checked file, or of what `Scenario.to_json` gave.
 
-    source: names the file in messages.  base: folder that relative paths count from.  terrain: an
-    elevation file that replaces the scenario's own.  ground: terrain already at hand (from a log).
+    source: names the file in messages.
+    base: folder that relative paths count from.
+    terrain: an elevation file that replaces the scenario's own.
+    ground: terrain already at hand (from a log).
+    external: see `Scenario`.
+    Raises ScenarioError and TerrainError as `load_scenario` does.
+
+    >>> again = from_spec(load_scenario("tight").to_json(), "a plan")
+    >>> again.name, again.bounds.tolist()
+    ('tight', [[-300.0, 2900.0], [-150.0, 150.0]])
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
     if terrain is not None:
@@ -153,7 +172,7 @@ def from_spec(
         raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from")
     if ground is None:
         if raster is not None:
-            ground = read_terrain(raster, origin, bounds, MARGIN)
+            ground = read_terrain(raster, origin, bounds, GROUND_BUFFER)
         else:
             ground = _made_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
@@ -168,14 +187,6 @@ def from_spec(
     )
     spec = spec.model_copy(update={"origin": place, "area": area})
     return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
-
-
-def checked_table(make: Callable[[], Table], source: str) -> Table:
-    """Make a table of values that no file was checked for.  Raises ScenarioError."""
-    try:
-        return make()
-    except ValidationError as error:
-        raise ScenarioError(f"{source}: {first_error(error)}") from error
 
 
 def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:
@@ -219,11 +230,11 @@ def _assemble(
     floor = area.floor_amsl_m if area and area.floor_amsl_m is not None else -500.0
     top = float(np.nanmax(ground.heights)) if ground is not None else 3000.0
     ceiling = area.ceiling_amsl_m if area and area.ceiling_amsl_m is not None else top + 1000.0
-    start = _position(spec.start, "start", source, origin, ground)
-    destination = _position(spec.destination, "destination", source, origin, ground)
+    start = map_position(spec.start, "start", source, origin, ground)
+    destination = map_position(spec.destination, "destination", source, origin, ground)
     # Ends that another terrain buries are for the verdict to find.
     for name, point in () if replaced else (("start", start), ("destination", destination)):
-        _check_inside(name, point, source, bounds, floor, ceiling, ground)
+        check_inside(name, point, source, bounds, floor, ceiling, ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start")
     wind = Wind(
@@ -257,65 +268,19 @@ def _assemble(
 
 def _made_terrain(table: TerrainTable, bounds: Floats) -> Terrain | None:
     if table.kind == "flat":
-        return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * MARGIN)
+        return flat_terrain(bounds, float(table.amsl_m or 0.0), 5 * GROUND_BUFFER)
     if table.kind == "peaks":
-        peaks = np.array([[p.east_m, p.north_m, p.height_m, p.sigma_m] for p in table.peak or []]).reshape(-1, 4)
-        return peaks_terrain(bounds, peaks, MARGIN)
+        peaks = [Peak(p.east_m, p.north_m, p.height_m, p.sigma_m) for p in table.peak or []]
+        return peaks_terrain(bounds, peaks, GROUND_BUFFER)
     return None
 
 
-def _position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
-    if table.east_m is not None and table.north_m is not None:
-        east, north = table.east_m, table.north_m
-    else:
-        point = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
-        east, north = float(point[0]), float(point[1])
-    if table.amsl_m is not None:
-        return np.array([east, north, table.amsl_m])
-    under = float(ground.height(east, north)) if ground is not None else math.nan
-    if math.isnan(under):
-        raise ScenarioError(
-            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
-            " no terrain there to count a height from; give amsl_m"
-        )
-    return np.array([east, north, under + (table.height_m or 0.0)])
-
-
-def _check_inside(
-    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
-) -> None:
-    for axis, name in enumerate(("east", "north")):
-        low, high = bounds[axis]
-        if not low <= point[axis] <= high:
-            raise ScenarioError(f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}")
-    if not floor <= point[2] <= ceiling:
-        raise ScenarioError(
-            f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
-        )
-    if ground is not None:
-        under = float(ground.height(point[0], point[1]))
-        if point[2] <= under:
-            raise ScenarioError(
-                f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
-            )
-
-
-def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
-    """Stand threats on the ground, or at their own heights.  Raises ScenarioError."""
-    positions = np.zeros((len(tables), 3))
-    for k, table in enumerate(tables):
-        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
-        positions[k] = _position(on_ground, f"threats[{k}]", source, origin, ground)
-    return Threats(
-        names=tuple(table.name or f"threat {k + 1}" for k, table in enumerate(tables)),
-        position=positions,
-        kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
-        detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),
-        kill_scale=np.array([table.kill_scale_m or 0.0 for table in tables]),
-        detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
-    )
-
-
 def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
-    """Latitude and longitude in degrees of map positions (..., 3)."""
+    """Latitude and longitude in degrees of map positions (..., 3).
+
+    >>> scenario = load_scenario("tight")
+    >>> lat, lon = geographic(scenario, scenario.destination)
+    >>> float(lat.round(5)), float(lon.round(5))
+    (46.0, 8.03356)
+    """
     return to_geo(scenario.origin, points[..., 0], points[..., 1])

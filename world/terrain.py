@@ -5,12 +5,14 @@ The raster stays in its own grid at its source resolution; map positions are tak
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from world.frames import PolyMap, fit_polymap, polymap
+from world.frames import PolyMap, PolyMapRecord, fit_polymap, polymap
 from world.kernels import compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
@@ -29,9 +31,12 @@ TILE = 16
 class Terrain:
     """Measured or made ground heights above mean sea level.
 
-    heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.  to_pixel: map (east, north)
-    to fractional (col, row).  spacing: the finer pixel pitch, m.  source, sha256: where it came from.
-    datum: the vertical datum as stated.  vertical_error: stated error, m, or None where none is stated.
+    heights: (rows, cols) float32 m at pixel centres, NaN where there is no data.
+    to_pixel: map (east, north) to fractional (col, row).
+    spacing: the finer pixel pitch, m.
+    source, sha256: where it came from.
+    datum: the vertical datum as stated.
+    vertical_error: stated error, m, or None where none is stated.
     """
 
     heights: Heights
@@ -53,7 +58,7 @@ class Terrain:
     def height(self, east: ArrayLike, north: ArrayLike) -> Floats:
         """Ground height in m at map positions, any shape; NaN outside the raster or on nodata."""
         es, ns = np.broadcast_arrays(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
-        return _heights_many(self.heights, self.to_pixel.packed, es.ravel(), ns.ravel()).reshape(es.shape)
+        return _heights_many(self.heights, self.to_pixel.record, es.ravel(), ns.ravel()).reshape(es.shape)
 
     def clearance(self, a: ArrayLike, b: ArrayLike) -> tuple[float, float]:
         """Smallest height above ground on the segment a-b, and the fraction of it where that is.
@@ -61,7 +66,7 @@ class Terrain:
         a, b: (3,) m.  Exact for the bilinear surface.  NaN where the segment leaves the raster or its data.
         """
         start, end = np.asarray(a, dtype=np.float64), np.asarray(b, dtype=np.float64)
-        low, at = segment_clearance(self.heights, self.to_pixel.packed, start, end)
+        low, at = segment_clearance(self.heights, self.to_pixel.record, start, end)
         return float(low), float(at)
 
 
@@ -107,34 +112,36 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
 
 
 @compiled_views
-def ground_height(heights: Heights, packed: Floats, east: float, north: float) -> float:  # pragma: no cover - compiled
+def ground_height(
+    heights: Heights, to_pixel: PolyMapRecord, east: float, north: float
+) -> float:  # pragma: no cover - compiled
     """Ground height at one map position; NaN outside the raster."""
-    col, row = polymap(packed, east, north)
+    col, row = polymap(to_pixel, east, north)
     return pixel_height(heights, col, row)
 
 
 @compiled
-def _heights_many(heights: Heights, packed: Floats, east: Floats, north: Floats) -> Floats:  # pragma: no cover
+def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north: Floats) -> Floats:  # pragma: no cover
     out = np.empty(east.size)
     for k in range(east.size):
-        out[k] = ground_height(heights, packed, east[k], north[k])
+        out[k] = ground_height(heights, to_pixel, east[k], north[k])
     return out
 
 
 @compiled_views
 def segment_clearance(
-    heights: Heights, packed: Floats, a: Floats, b: Floats
+    heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Smallest height above the bilinear ground on a-b and its fraction; (NaN, fraction) off the raster."""
     pieces = max(1, math.ceil(math.hypot(b[0] - a[0], b[1] - a[1]) / STRAIGHT_PIECE))
     best = math.inf
     best_at = 0.0
-    col1, row1 = polymap(packed, a[0], a[1])
+    col1, row1 = polymap(to_pixel, a[0], a[1])
     for piece in range(pieces):
         f0 = piece / pieces
         f1 = (piece + 1) / pieces
         col0, row0 = col1, row1
-        col1, row1 = polymap(packed, a[0] + f1 * (b[0] - a[0]), a[1] + f1 * (b[1] - a[1]))
+        col1, row1 = polymap(to_pixel, a[0] + f1 * (b[0] - a[0]), a[1] + f1 * (b[1] - a[1]))
         low, at = _piece_clearance(
             heights, col0, row0, a[2] + f0 * (b[2] - a[2]), col1, row1, a[2] + f1 * (b[2] - a[2])
         )
@@ -160,7 +167,10 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Do the same on a piece that is straight in pixels: within a cell the height difference is a parabola."""
+    """Smallest height above ground on a piece straight in pixels, and its fraction; (NaN, fraction) off the data.
+
+    col, row, up: of its two ends.  Within a cell the height above the bilinear ground is a parabola.
+    """
     dc, dr, du = col1 - col0, row1 - row0, up1 - up0
     t = 0.0
     g0 = up0 - pixel_height(heights, col0, row0)
@@ -202,29 +212,39 @@ def gridded(function_heights: Floats, east: Floats, north: Floats, *, source: st
     return Terrain(function_heights.astype(np.float32), to_pixel, float(min(step_e, step_n)), source, sha256, datum)
 
 
-def flat_terrain(bounds: Floats, amsl: float, margin: float) -> Terrain:
-    """Level ground over bounds [[e0, e1], [n0, n1]] and a margin, m."""
-    east = np.linspace(bounds[0, 0] - margin, bounds[0, 1] + margin, 3)
-    north = np.linspace(bounds[1, 0] - margin, bounds[1, 1] + margin, 3)
+def flat_terrain(bounds: Floats, amsl: float, buffer: float) -> Terrain:
+    """Level ground over bounds [[e0, e1], [n0, n1]] and a buffer about them, m."""
+    east = np.linspace(bounds[0, 0] - buffer, bounds[0, 1] + buffer, 3)
+    north = np.linspace(bounds[1, 0] - buffer, bounds[1, 1] + buffer, 3)
     return gridded(np.full((3, 3), amsl), east, north, source=f"flat at {amsl:g} m", sha256="", datum="mean sea level")
 
 
-def peaks_terrain(bounds: Floats, peaks: Floats, margin: float) -> Terrain:
-    """Sum of Gaussian hills on level ground at sea level.
+class Peak(NamedTuple):
+    """A Gaussian hill: its summit's place and height, and its standard deviation, all m."""
 
-    peaks: (p, 4) east, north, height, sigma in m.  Gridded at a sixteenth of the smallest sigma (at most 1,500
+    east: float
+    north: float
+    height: float
+    sigma: float
+
+
+def peaks_terrain(bounds: Floats, peaks: Sequence[Peak], buffer: float) -> Terrain:
+    """Sum of Gaussian hills on level ground at sea level, over bounds [[e0, e1], [n0, n1]] and a buffer about them, m.
+
+    Gridded at a sixteenth of the smallest sigma (at most 1,500
     pixels a side), which holds each summit to 0.05 % of its height.
     """
-    width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * margin
-    pitch = max(float(peaks[:, 3].min()) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
+    width = max(float(np.ptp(bounds[0])), float(np.ptp(bounds[1]))) + 2 * buffer
+    pitch = max(min(peak.sigma for peak in peaks) / 16.0, width / 1500.0) if len(peaks) else width / 8.0
 
     def axis(low: float, high: float) -> Floats:
-        return np.linspace(low - margin, high + margin, 2 + int((high - low + 2 * margin) / pitch))
+        return np.linspace(low - buffer, high + buffer, 2 + int((high - low + 2 * buffer) / pitch))
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
     heights = np.zeros((north.size, east.size))
-    for pe, pn, height, sigma in peaks:
-        heights += height * np.outer(
-            np.exp(-((north - pn) ** 2) / (2 * sigma**2)), np.exp(-((east - pe) ** 2) / (2 * sigma**2))
+    for peak in peaks:
+        heights += peak.height * np.outer(
+            np.exp(-((north - peak.north) ** 2) / (2 * peak.sigma**2)),
+            np.exp(-((east - peak.east) ** 2) / (2 * peak.sigma**2)),
         )
     return gridded(heights, east, north, source=f"{len(peaks)} Gaussian peaks", sha256="", datum="mean sea level")

@@ -12,8 +12,10 @@ Floats = NDArray[np.float64]
 class Threats:
     """m air-defence units; a radius of 0 means that the unit has no missile, or no radar.
 
-    position: (m, 3) east, north, up in m.  kill_radius, detection_radius: (m,) m, the paper's R_PKmax and
-    R_PRDmax.  kill_scale, detection_scale: (m,) m, the paper's gamma and delta (eq. 9 and 10).
+    names: m of them.
+    position: (m, 3) east, north, up in m.
+    kill_radius, detection_radius: (m,) m, the paper's R_PKmax and R_PRDmax.
+    kill_scale, detection_scale: (m,) m, the paper's gamma and delta (eq. 9 and 10).
     """
 
     names: tuple[str, ...]
@@ -36,6 +38,6 @@ class Threats:
 
 
 def no_threats() -> Threats:
-    """Return an empty set."""
+    """No threats at all."""
     none = np.zeros(0)
     return Threats((), np.zeros((0, 3)), none, none, none, none)

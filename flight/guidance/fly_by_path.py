@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
 from flight.guidance.path_kernels import profile
 from flight.mission.route import Route
-from world.geometry import arc_reach, leg_courses, leg_runs, signed_turns
+from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length
 
 Floats = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Fl
         radius = float(route.arcs[i]) or limits.turn_radius(
             float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed
         )
-        tangents[i] = arc_reach(turn, radius)
+        tangents[i] = tangent_length(turn, radius)
     sharp = np.concatenate([[False], np.abs(turns) > SHARPEST, [False]])
     short = tangents[:-1] + tangents[1:] > runs
     tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0

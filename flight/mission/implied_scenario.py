@@ -13,8 +13,8 @@ from flight.mission.routing import HIGHEST, make_route
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
-from world.scenario import MARGIN, Scenario, from_spec
-from world.scenario_file import MAP_REACH, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
+from world.scenario import GROUND_BUFFER, Scenario, from_spec
+from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -96,12 +96,12 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
 def _boxes(mission: Mission, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> tuple[Floats, Floats]:
     """Area, and smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
     points = np.stack(to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops]))
-    if not (np.abs(points) <= MAP_REACH).all():
+    if not (np.abs(points) <= MAP_EXTENT).all():
         # The error that names the item.
         make_route(mission, origin, None, 1.0, False)
     flown = np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
     around = BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
-    return np.clip(flown + np.array([-around, around]), -MAP_REACH, MAP_REACH), flown
+    return np.clip(flown + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
 
 
 def _ground(
@@ -124,7 +124,7 @@ def _ground(
     file = Path(path)
     found = str(file.resolve()) if file.is_file() else path
     table = TerrainTable(kind="dem", path=found, sha256=raster.sha256)
-    return read_terrain(raster, origin, cut, MARGIN), table, cut
+    return read_terrain(raster, origin, cut, GROUND_BUFFER), table, cut
 
 
 def _end(point: Floats, terrain: Terrain | None) -> EndTable:

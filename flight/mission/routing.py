@@ -13,7 +13,7 @@ from flight.mission.route import Route
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.geometry import leg_courses
-from world.scenario_file import MAP_REACH
+from world.scenario_tables import MAP_EXTENT
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -155,12 +155,12 @@ def _on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) ->
     """East and north of each stop, (n, 2) m."""
     east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
     points = np.stack([east, north], axis=1)
-    far = ~(np.abs(points) <= MAP_REACH).all(axis=1)
+    far = ~(np.abs(points) <= MAP_EXTENT).all(axis=1)
     if far.any():
         stop = stops[int(np.argmax(far))]
         raise MissionError(
             f"{source}: {_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
-            f" {MAP_REACH / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
+            f" {MAP_EXTENT / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
             " (columns swapped, or a sign lost?)"
         )
     return points
@@ -215,7 +215,7 @@ class _Heights:
         under = math.nan
         if self.terrain is not None:
             east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
-            if abs(float(east)) <= MAP_REACH and abs(float(north)) <= MAP_REACH:
+            if abs(float(east)) <= MAP_EXTENT and abs(float(north)) <= MAP_EXTENT:
                 under = float(self.terrain.height(east, north))
         if not math.isnan(home.alt):
             if abs(home.alt - under) > _HOME_ERROR:

@@ -66,7 +66,7 @@ class Chart:
 
     def convergence(self, lat_deg: float, lon_deg: float) -> float:
         """Map course of true north at a place, rad."""
-        middle = float(self.angle.packed[0, 1])
+        middle = float(self.angle.record["centre_y"])
         lon = middle + math.remainder(math.radians(lon_deg) - middle, 2.0 * math.pi)
         return float(self.angle(math.radians(lat_deg), lon)[0])
 
@@ -83,7 +83,7 @@ class Ground:
             # Locked like a terrain's: a compiled function has one type for locked arrays and one for others.
             self.heights.setflags(write=False)
         else:
-            self.heights, self.packed = terrain.heights, terrain.to_pixel.packed
+            self.heights, self.packed = terrain.heights, terrain.to_pixel.rows()
 
     def height(self, east: float, north: float) -> float:
         """Ground height at a map position, m; NaN where it is unknown."""

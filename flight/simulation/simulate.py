@@ -119,7 +119,7 @@ class Flight:
         self._disturb(setup)
         self._step = self._linked(self.fdm.links())
         constants = self.arena.constants
-        constants[K.LONGITUDE] = self.chart.position.packed[0, 1]
+        constants[K.LONGITUDE] = self.chart.position.record["centre_y"]
         constants[K.DT], constants[K.SLOWEST] = self.dt, 0.94 * aircraft.stall_speed
         slow = _slowest_leg(setup, limits)
         self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / self.dt)
@@ -128,8 +128,8 @@ class Flight:
         route = setup.route
         turns = np.concatenate([[0.0], np.abs(signed_turns(route.waypoints)), [0.0]])
         return {
-            Table.POSITION: self.chart.position.packed,
-            Table.ANGLE: self.chart.angle.packed,
+            Table.POSITION: self.chart.position.rows(),
+            Table.ANGLE: self.chart.angle.rows(),
             Table.TO_PIXEL: self.terrain.packed,
             Table.PIECES: self.path.pieces,
             Table.NODES: self.path.nodes,
@@ -140,7 +140,7 @@ class Flight:
     def _disturb(self, setup: FlightSetup) -> None:
         """Set the wind, and start turbulence and navigation's error."""
         wind, arena = setup.scenario.wind, self.arena
-        to = wind.from_course + math.pi
+        to = wind.to_course
         arena.wind[:] = (
             *(wind.speed, math.cos(to), math.sin(to)),
             *(wind.gradient, wind.reference_amsl, W20[wind.turbulence]),

@@ -17,6 +17,7 @@ from world.frames import polymap_within
 from world.geometry import wrap
 from world.kernels import compiled, compiled_views
 from world.terrain import Heights, pixel_height
+from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -159,7 +160,7 @@ def _blow(
 
     wind: speed, the cosine and sine of the map course it blows to, gradient, reference height, w20.
     """
-    speed = max(0.0, wind[0] + wind[3] * (up - wind[4]))
+    speed = mean_wind_speed(wind[0], wind[3], wind[4], up)
     # The angle less the map course of true north.
     cos = wind[1] * turn_cos + wind[2] * turn_sin
     sin = wind[2] * turn_cos - wind[1] * turn_sin

@@ -34,7 +34,8 @@ from logs.recording.terrain_attachment import pack_terrain, unpack_terrain
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
 from world.scenario import Scenario, from_spec
-from world.scenario_file import Guidance, Navigation, first_error
+from world.scenario_file import first_error
+from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
 
 SCHEMA = "planfly.log/1"

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from world.errors import LogError
-from world.frames import PolyMap
+from world.frames import MOST_TERMS, PolyMap
 from world.raster import MOST_PIXELS
 from world.scenario_file import first_error
 from world.terrain import Terrain
@@ -41,7 +41,7 @@ class _File(BaseModel):
     datum: str
     vertical_error_m: float | None
     map_to_pixel: Annotated[
-        list[list[Annotated[float, Field(allow_inf_nan=False)]]], Field(min_length=4, max_length=40)
+        list[list[Annotated[float, Field(allow_inf_nan=False)]]], Field(min_length=4, max_length=2 + 2 * MOST_TERMS)
     ]
     map_residual_pixels: float
     parts: list[str]
@@ -61,7 +61,7 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
         sha256=terrain.sha256,
         datum=terrain.datum,
         vertical_error_m=terrain.vertical_error,
-        map_to_pixel=terrain.to_pixel.packed.tolist(),
+        map_to_pixel=terrain.to_pixel.rows().tolist(),
         map_residual_pixels=terrain.to_pixel.residual,
         parts=list(parts),
     )
@@ -86,10 +86,10 @@ def unpack_terrain(pieces: dict[str, bytes], source: str) -> Terrain:
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
         heights[first:last] = _unpack(pieces[name], last - first, file.cols, f"{source}: {name}")
-    packed = _coefficients(file.map_to_pixel, source)
+    rows = _coefficients(file.map_to_pixel, source)
     return Terrain(
         heights=heights,
-        to_pixel=PolyMap(packed, file.map_residual_pixels),
+        to_pixel=PolyMap.from_rows(rows, file.map_residual_pixels),
         spacing=file.spacing_m,
         source=file.source,
         sha256=file.sha256,

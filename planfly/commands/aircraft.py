@@ -25,7 +25,7 @@ _WIND = 10.0
 def aircraft(args: argparse.Namespace) -> int:
     """``planfly aircraft [NAME]``."""
     from aircraft.catalog import aircraft_names, find_aircraft, load_aircraft, model_hash
-    from world.scenario_file import names_folder
+    from world.scenario_tables import names_folder
 
     if args.name is None:
         for name in aircraft_names():

@@ -17,6 +17,7 @@ from planner.evaluation.missile_index import Missiles, kill_density
 from planner.evaluation.paper_scores import POINTS
 from planner.evaluation.problem_arrays import CORNER_SLACK, Rules, Steep
 from planner.evaluation.terrain_clearance import DEPTH, GROUND_A, GROUND_B, LINE, pixels, sound, terrain_excess
+from world.frames import PolyMapRecord
 from world.kernels import compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
@@ -171,7 +172,7 @@ def _measure_bends(
 
 @compiled_views
 def _corner_depth(
-    heights: Heights, steep: Steep, to_pixel: Floats, clear: Floats, arc: Floats
+    heights: Heights, steep: Steep, to_pixel: PolyMapRecord, clear: Floats, arc: Floats
 ) -> float:  # pragma: no cover - compiled
     """Depth below the required clearance along a flown corner (k, 3), m x km."""
     total = 0.0

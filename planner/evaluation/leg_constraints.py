@@ -12,7 +12,7 @@ from aircraft.path_limits import (
     corner_tangent,
     downwind,
     fly_over_run,
-    reversal_room,
+    roll_reversal_length,
     slopes_along,
     wind_speed_at,
 )
@@ -274,7 +274,7 @@ def roll_need(
     into, onward = legs[i - 1, 0] * uy - legs[i - 1, 1] * ux, ux * legs[i + 1, 1] - uy * legs[i + 1, 0]
     if into * onward >= 0.0 or math.isinf(corners[i, 0] + corners[i + 1, 0]):
         return 0.0
-    room: float = reversal_room(table, ux, uy, amsl, corners[i, 1], corners[i + 1, 1], wx, wy)
+    room: float = roll_reversal_length(table, ux, uy, amsl, corners[i, 1], corners[i + 1, 1], wx, wy)
     return room
 
 

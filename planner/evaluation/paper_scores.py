@@ -18,6 +18,7 @@ from planner.evaluation.clearance_reserve import required_clearance
 from planner.evaluation.leg_constraints import Gauge, constraints, make_gauge, measure_corners, measure_legs
 from planner.evaluation.problem_arrays import SPHERE, Rules
 from planner.evaluation.threat_grid import Cells, Short
+from world.frames import PolyMapRecord
 from world.geometry import CLOSEST
 from world.kernels import compiled, compiled_views
 from world.terrain import EDGE
@@ -49,26 +50,26 @@ AT, FIRST, NUMBER, ASKED = (k * BLOCK for k in range(4))
 
 
 @compiled_views
-def _load(packed: Floats, paths: Floats, begin: int, i: int, size: int, w: Floats) -> None:  # pragma: no cover
+def _load(to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, w: Floats) -> None:  # pragma: no cover
     """Fill in waypoint i of each path, and take it to the raster: `polymap`, for all of them at once."""
     for b in range(size):
         w[THERE + EAST + b] = paths[begin + b, i, 0]
         w[THERE + NORTH + b] = paths[begin + b, i, 1]
         w[THERE + UP + b] = paths[begin + b, i, 2]
-    middle_x, middle_y, half_x, half_y = packed[0, 0], packed[0, 1], packed[1, 0], packed[1, 1]
+    middle_x, middle_y, half_x, half_y = to_pixel.centre_x, to_pixel.centre_y, to_pixel.half_x, to_pixel.half_y
     for b in range(size):
         w[A + b] = (w[THERE + EAST + b] - middle_x) / half_x
         w[B + b] = (w[THERE + NORTH + b] - middle_y) / half_y
-    degrees = packed.shape[1]
     for component in range(2):
         out = THERE + (COL if component == 0 else ROW)
+        coefficients = to_pixel.u if component == 0 else to_pixel.v
         for b in range(size):
             w[out + b] = 0.0
-        for k in range(degrees - 1, -1, -1):
+        for k in range(to_pixel.size - 1, -1, -1):
             for b in range(size):
                 w[C + b] = 0.0
-            for j in range(degrees - 1 - k, -1, -1):
-                coefficient = packed[2 + component * degrees + k, j]
+            for j in range(to_pixel.size - 1 - k, -1, -1):
+                coefficient = coefficients[k, j]
                 for b in range(size):
                     w[C + b] = w[C + b] * w[B + b] + coefficient
             for b in range(size):

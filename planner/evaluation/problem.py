@@ -90,7 +90,7 @@ def _rules(scenario: Scenario, limits: Limits) -> Rules:
 
     return Rules(
         heights=terrain.heights,
-        to_pixel=terrain.to_pixel.packed,
+        to_pixel=terrain.to_pixel.record,
         threats=units,
         spheres=pack_spheres(units),
         aircraft=derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence]),

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from aircraft.path_limits import PerformanceTable
 from planner.evaluation.missile_index import Missiles
 from planner.evaluation.threat_grid import Cells
+from world.frames import PolyMapRecord
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
@@ -44,7 +45,7 @@ class Rules(NamedTuple):
     """
 
     heights: Heights
-    to_pixel: Floats
+    to_pixel: PolyMapRecord
     threats: Floats
     spheres: Floats
     aircraft: PerformanceTable

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from planner.evaluation.clearance_reserve import required_clearance
 from planner.evaluation.problem_arrays import Steep
-from world.frames import polymap
+from world.frames import PolyMapRecord, polymap
 from world.kernels import compiled_views, inlined
 from world.terrain import TILE, pixel_height
 
@@ -96,7 +96,7 @@ def terrain_excess(
 def sound(
     heights: Heights,
     steep: Steep,
-    to_pixel: Floats,
+    to_pixel: PolyMapRecord,
     clear: Floats,
     paths: Floats,
     n: int,
@@ -157,7 +157,9 @@ def sound(
 
 
 @inlined
-def pixels(to_pixel: Floats, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover - compiled
+def pixels(
+    to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float
+) -> Pixels:  # pragma: no cover - compiled
     """Columns and rows of both ends of a segment."""
     col0, row0 = polymap(to_pixel, ax, ay)
     col1, row1 = polymap(to_pixel, bx, by)

@@ -39,7 +39,7 @@ def _near(modes: NDArray[np.complex128], value: complex) -> complex:
 @pytest.mark.parametrize("climb_deg", [-4.0, 0.0, 3.0])
 def test_trim_is_the_reference_trim(airspeed: float, climb_deg: float) -> None:
     climb = math.radians(climb_deg)
-    states, commands = reference.trim(airspeed, climb, reference.World())
+    states, commands = reference.trim(airspeed, climb, reference.BookAtmosphere())
     if not 0.0 < commands[3] < 1.0:
         assert straight(_flat(), airspeed, 100.0, climb) is None
         return
@@ -63,7 +63,7 @@ def test_published_trim_without_parasite_drag() -> None:
 
 @pytest.mark.parametrize("variation", [None, CLEAN])
 def test_modes_are_the_reference_modes(variation: Variation | None) -> None:
-    world = reference.World(parasite_drag=0.043 if variation is None else 0.0)
+    world = reference.BookAtmosphere(parasite_drag=0.043 if variation is None else 0.0)
     fdm = _flat(variation)
     a, b = linearise(fdm, _trim(fdm, 25.0))
     expected_a, expected_b = reference.linearise(*reference.trim(25.0, 0.0, world), world)
@@ -92,7 +92,7 @@ def test_published_transfer_function_constants() -> None:
 def test_rates_in_any_flight_are_the_reference_rates(motor_braking: bool, spread: float, tolerance: float) -> None:
     # Off trim, sideslipping, turning, windmilling; with the wider spread, beyond the stall, where JSBSim reads the
     # lift from a table.
-    fdm, world = _flat(motor_braking=motor_braking), reference.World(motor_braking=motor_braking)
+    fdm, world = _flat(motor_braking=motor_braking), reference.BookAtmosphere(motor_braking=motor_braking)
     fdm.place(100.0)
     rng = np.random.default_rng(3)
     for _ in range(60):
@@ -116,7 +116,7 @@ def _departure(rate_hz: int) -> Floats:
 
     Both fly the surfaces and the motor as JSBSim's actuators move them.
     """
-    fdm, world = Fdm(load_aircraft("aerosonde"), flat_earth=True, rate_hz=rate_hz), reference.World()
+    fdm, world = Fdm(load_aircraft("aerosonde"), flat_earth=True, rate_hz=rate_hz), reference.BookAtmosphere()
     trimmed = fdm.start(0.0, 0.0, 500.0, 0.0, 25.0).commands()
     packed = np.empty(STATE_SIZE)
     fdm.read(packed)
@@ -155,8 +155,8 @@ def test_lift_breaks_at_the_stall() -> None:
 
 @pytest.mark.parametrize("throttle", [0.0, 0.3, 0.55])
 def test_without_braking_a_closed_throttle_draws_nothing(throttle: float) -> None:
-    coasting = reference.propulsion(25.0, throttle, reference.World())
-    braking = reference.propulsion(25.0, throttle, reference.World(motor_braking=True))
+    coasting = reference.propulsion(25.0, throttle, reference.BookAtmosphere())
+    braking = reference.propulsion(25.0, throttle, reference.BookAtmosphere(motor_braking=True))
     assert coasting[2] == 0.0
     assert coasting[1] == pytest.approx(-reference.KQ * reference.NO_LOAD_CURRENT)
     assert braking[2] < 0.0
@@ -164,8 +164,8 @@ def test_without_braking_a_closed_throttle_draws_nothing(throttle: float) -> Non
 
 
 def test_braking_makes_no_difference_while_current_flows() -> None:
-    assert reference.propulsion(25.0, 0.8, reference.World()) == reference.propulsion(
-        25.0, 0.8, reference.World(motor_braking=True)
+    assert reference.propulsion(25.0, 0.8, reference.BookAtmosphere()) == reference.propulsion(
+        25.0, 0.8, reference.BookAtmosphere(motor_braking=True)
     )
 
 
@@ -173,7 +173,7 @@ def test_braking_makes_no_difference_while_current_flows() -> None:
 def test_limits_of_the_envelope_balance_in_the_reference(motor_braking: bool) -> None:
     # On the turning WGS84 earth in the standard atmosphere: 1.16727 kg/m^3 at 500 m (ISO 2533).
     fdm = Fdm(load_aircraft("aerosonde"), motor_braking=motor_braking)
-    world = reference.World(density=1.16727, gravity=9.8046, motor_braking=motor_braking)
+    world = reference.BookAtmosphere(density=1.16727, gravity=9.8046, motor_braking=motor_braking)
     for found in (full_throttle(fdm, 25.0, 500.0), idle(fdm, 25.0, 500.0)):
         assert found is not None
         roll, pitch = attitude(found)
@@ -184,4 +184,4 @@ def test_limits_of_the_envelope_balance_in_the_reference(motor_braking: bool) ->
 
 def test_reference_says_when_it_finds_no_trim() -> None:
     with pytest.raises(ValueError, match="no trim at"):
-        reference.trim(25.0, 0.0, reference.World(density=0.1))
+        reference.trim(25.0, 0.0, reference.BookAtmosphere(density=0.1))

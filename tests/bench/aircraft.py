@@ -22,7 +22,7 @@ PUBLISHED_CONSTANTS = np.array([22.62885, 130.88368, 5.29474, -36.11239])
 def against_the_book() -> dict[str, float]:
     """Worst relative errors, on a flat planet that does not turn: trim, modes, published trim and constants."""
     aerosonde = load_aircraft("aerosonde")
-    world = reference.World()
+    world = reference.BookAtmosphere()
     trims, modes = [], []
     for airspeed in (19.0, 22.0, 25.0, 28.0, 31.0):
         for climb in (-0.05, 0.0, 0.05):

@@ -21,7 +21,7 @@ from flight.simulation import simulate as simulation
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import FDM_HZ, Flight, SimulatedFlight, simulate
 from tests.bench.angles import angles
-from tests.flight.conftest import MakeSetup, setup_maker, standard
+from tests.setups import MakeSetup, setup_maker, standard
 
 Floats = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from planner.evaluation.problem_arrays import Rules
+from world.frames import PolyMapRecord
 from world.geometry import CLOSEST
 from world.terrain import EDGE
 
@@ -20,17 +21,17 @@ Ints = NDArray[np.int64]
 POINTS = 6
 
 
-def pixels_of(packed: Floats, east: Floats, north: Floats) -> tuple[Floats, Floats]:
-    """Pixel coordinates of map positions: the packed polynomial, vectorised."""
-    size = packed.shape[1]
-    a = (east - packed[0, 0]) / packed[1, 0]
-    b = (north - packed[0, 1]) / packed[1, 1]
+def pixels_of(to_pixel: PolyMapRecord, east: Floats, north: Floats) -> tuple[Floats, Floats]:
+    """Pixel coordinates of map positions: the polynomial, vectorised."""
+    size = int(to_pixel["size"])
+    a = (east - to_pixel["centre_x"]) / to_pixel["half_x"]
+    b = (north - to_pixel["centre_y"]) / to_pixel["half_y"]
     u, v = np.zeros_like(a), np.zeros_like(a)
     for i in range(size - 1, -1, -1):
         row_u, row_v = np.zeros_like(a), np.zeros_like(a)
         for j in range(size - 1 - i, -1, -1):
-            row_u = row_u * b + packed[2 + i, j]
-            row_v = row_v * b + packed[2 + size + i, j]
+            row_u = row_u * b + to_pixel["u"][i, j]
+            row_v = row_v * b + to_pixel["v"][i, j]
         u, v = u * a + row_u, v * a + row_v
     return u, v
 

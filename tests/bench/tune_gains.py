@@ -25,7 +25,7 @@ from flight.simulation import simulate as simulation
 from flight.simulation.simulate import SimulatedFlight, simulate
 from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
 from tests.bench.tuning_missions import Case, cases
-from tests.flight.conftest import MakeSetup, setup_maker, standard
+from tests.setups import MakeSetup, setup_maker, standard
 
 # Where every search starts, at an airspeed of 25 m/s: round figures, of the size that earlier searches of the Aerosonde
 # found.  `start` slows them down for an aircraft that is faster: its turns take longer by as much.

@@ -12,7 +12,7 @@ from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.route_demands import route_demands
-from tests.flight.conftest import MakeSetup, standard
+from tests.setups import MakeSetup, standard
 
 Floats = NDArray[np.float64]
 

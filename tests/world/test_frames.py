@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pyproj import Geod
 
-from world.frames import GeoOrigin, crs_transformer, fit_polymap, polymap, to_geo, to_map
+from world.frames import GeoOrigin, PolyMap, crs_transformer, fit_polymap, polymap, to_geo, to_map
 
 WGS84 = Geod(ellps="WGS84")
 # pyproj writes an origin with 15 digits after the point: 1e-9 degrees (0.1 mm) beside zero are lost.
@@ -80,7 +80,7 @@ def test_polynomial_copy_of_a_frame_change(lat_deg: float, half: float, u: float
     got = copy(u * half, v * half)
     assert got[0] == pytest.approx(float(wanted[0]), abs=2e-3)
     assert got[1] == pytest.approx(float(wanted[1]), abs=2e-3)
-    assert polymap(copy.packed, u * half, v * half) == (float(got[0]), float(got[1]))
+    assert polymap(copy.record, u * half, v * half) == (float(got[0]), float(got[1]))
 
 
 def test_polynomial_says_how_wrong_it_is() -> None:
@@ -93,4 +93,15 @@ def test_polynomial_says_how_wrong_it_is() -> None:
     assert copy.residual > 0.1
     assert worst > 0.1
     with pytest.raises(ValueError, match="read-only"):
-        copy.packed[0, 0] = 1.0
+        copy.record["u"][0, 0] = 1.0
+
+
+def test_polynomial_goes_through_the_rows_of_a_log_bit_for_bit() -> None:
+    copy = fit_polymap(lambda x, y: (np.sin(x / 900.0) * y, x - y), [[-500.0, 1500.0], [0.0, 800.0]], 1e-9)
+    rows = copy.rows()
+    size = rows.shape[1]
+    assert rows.shape == (2 + 2 * size, size)
+    again = PolyMap.from_rows(rows, copy.residual)
+    assert np.array_equal(again.rows(), rows)
+    x, y = np.random.default_rng(8).uniform(0.0, 800.0, (2, 50))
+    assert np.array_equal(np.stack(again(x, y)), np.stack(copy(x, y)))

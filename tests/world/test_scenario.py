@@ -8,47 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.world.made_scenario import made_spec, same_scenario
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo
-from world.scenario import Scenario, embedded_names, embedded_scenarios, from_spec, load_scenario
-from world.scenario_variants import with_wind
-
-
-def _spec(**changes: Any) -> dict[str, Any]:
-    spec: dict[str, Any] = {
-        "name": "made",
-        "terrain": {
-            "kind": "peaks",
-            "peak": [{"east_m": 0.0, "north_m": 0.0, "height_m": 500.0, "sigma_m": 600.0}],
-        },
-        "area": {"east_m": [-3000, 3000], "north_m": [-2000, 2000]},
-        "start": {"east_m": -2500, "north_m": 100, "height_m": 120, "course_deg": 90},
-        "destination": {"lat_deg": 46.005, "lon_deg": 8.02, "amsl_m": 300},
-        "threats": [
-            {"east_m": 200, "north_m": 0, "kill_radius_m": 400, "kill_scale_m": 100},
-            {"name": "b", "east_m": 0, "north_m": 0, "height_m": 9, "detection_radius_m": 1, "detection_scale_m": 2},
-            {"east_m": 0, "north_m": 0, "amsl_m": 77, "kill_radius_m": 1, "kill_scale_m": 2},
-        ],
-        "wind": {"speed_mps": 6, "from_deg": 270, "gradient": 0.01, "turbulence": "light"},
-    }
-    return spec | changes
-
-
-def _equal(a: Scenario, b: Scenario) -> bool:
-    same = (a.name, a.spec, a.origin, a.floor, a.ceiling, a.start_course, a.limits, a.planner, a.flight, a.wind) == (
-        b.name, b.spec, b.origin, b.floor, b.ceiling, b.start_course, b.limits, b.planner, b.flight, b.wind,
-    )  # fmt: skip
-    arrays = [(getattr(a, name), getattr(b, name)) for name in ("bounds", "start", "destination")]
-    arrays += [
-        (getattr(a.threats, name), getattr(b.threats, name)) for name in ("position", "kill_radius", "kill_scale")
-    ]
-    if a.terrain is not None and b.terrain is not None:
-        arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.packed, b.terrain.to_pixel.packed)]
-    return same and all(np.array_equal(x, y) for x, y in arrays)
+from world.scenario import embedded_names, embedded_scenarios, from_spec, load_scenario
 
 
 def test_positions_and_heights() -> None:
-    scenario = from_spec(_spec(), "made")
+    scenario = from_spec(made_spec(), "made")
 
     def hill(east: float, north: float) -> float:
         return 500.0 * math.exp(-(east**2 + north**2) / (2 * 600.0**2))
@@ -71,10 +38,10 @@ def test_positions_and_heights() -> None:
 
 @pytest.mark.parametrize("name", ["jacksboro", "made"])
 def test_to_json_and_back_is_the_same_scenario(name: str) -> None:
-    scenario = load_scenario(name) if name == "jacksboro" else from_spec(_spec(), "made")
+    scenario = load_scenario(name) if name == "jacksboro" else from_spec(made_spec(), "made")
     text = json.dumps(scenario.to_json(), allow_nan=False)
     again = from_spec(json.loads(text), "again")
-    assert _equal(scenario, again)
+    assert same_scenario(scenario, again)
     assert json.dumps(again.to_json()) == text
     # With the ground at hand, as from a log, no file is opened.
     data = json.loads(text)
@@ -122,7 +89,7 @@ def _dem(folder: Path, **changes: Any) -> dict[str, Any]:
         "start": {"east_m": -1500, "north_m": 0, "height_m": 100},
         "destination": {"east_m": 1500, "north_m": 0, "height_m": 100},
     }
-    return _spec(terrain={"kind": "dem", "path": "tile.npz"}, threats=[], **ends) | changes
+    return made_spec(terrain={"kind": "dem", "path": "tile.npz"}, threats=[], **ends) | changes
 
 
 def test_origin_and_area_come_from_the_tile(tmp_path: Path) -> None:
@@ -140,7 +107,7 @@ def test_origin_and_area_come_from_the_tile(tmp_path: Path) -> None:
     data = scenario.to_json()
     assert data["origin"] == {"lat_deg": scenario.origin.lat_deg, "lon_deg": scenario.origin.lon_deg}
     assert data["terrain"]["path"] == str(tmp_path / "tile.npz")
-    assert _equal(from_spec(data, "again"), scenario)
+    assert same_scenario(from_spec(data, "again"), scenario)
 
 
 def test_a_tile_that_changed_is_noticed(tmp_path: Path) -> None:
@@ -197,22 +164,3 @@ def test_tiles_that_no_map_can_hold(tmp_path: Path) -> None:
         spec = {"name": name, "terrain": {"kind": "dem", "path": f"{name}.npz"}, **ends}
         with pytest.raises((ScenarioError, TerrainError), match=match):
             from_spec(spec, "x", base=tmp_path)
-
-
-def test_another_wind() -> None:
-    scenario = from_spec(_spec(), "made")
-    windy = with_wind(scenario, 11.0, math.radians(30.0), "moderate")
-    assert (windy.wind.speed, windy.wind.turbulence, windy.wind.gradient) == (11.0, "moderate", 0.01)
-    assert windy.wind.from_course == pytest.approx(math.radians(30.0))
-    assert _equal(from_spec(windy.to_json(), "again"), windy)
-    assert _equal(with_wind(scenario, None, None, None), scenario)
-    assert with_wind(scenario, None, None, "none").wind.speed == 6.0
-    # What a file may not say, an option may not either: the log could not be read back.
-    for speed, course, turbulence, match in (
-        (99.0, 0.0, None, "wind: speed_mps: 99.0: allowed 0..40"),
-        (math.nan, 0.0, None, "wind: speed_mps: nan: allowed 0..40"),
-        (5.0, 99.0, None, "wind: from_deg: .*: allowed -360..360"),
-        (None, None, "severe", 'wind: turbulence: "severe"'),
-    ):
-        with pytest.raises(ScenarioError, match=match):
-            with_wind(scenario, speed, course, turbulence)

@@ -10,7 +10,8 @@ import pytest
 
 from world.errors import PlanflyError, ScenarioError
 from world.scenario import load_scenario
-from world.scenario_file import ScenarioFile, check_scenario, parse_scenario
+from world.scenario_file import check_scenario, parse_scenario
+from world.scenario_tables import ScenarioFile
 
 SMALL = """
 name = "small"

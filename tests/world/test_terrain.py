@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import RegularGridInterpolator
 
 from world.scenario import load_scenario
-from world.terrain import Terrain, flat_terrain, gridded, peaks_terrain
+from world.terrain import Peak, Terrain, flat_terrain, gridded, peaks_terrain
 
 EAST = np.linspace(-1000.0, 1400.0, 25)
 NORTH = np.linspace(-800.0, 700.0, 16)
@@ -109,7 +109,7 @@ def test_flat_and_peaks() -> None:
     low, _ = flat.clearance(np.array([0.0, 0.0, 200.0]), np.array([900.0, 0.0, 150.0]))
     assert low == pytest.approx(27.0)
     hills = np.array([[0.0, 0.0, 400.0, 300.0], [700.0, -200.0, 250.0, 160.0]])
-    peaks = peaks_terrain(BOUNDS, hills, 1000.0)
+    peaks = peaks_terrain(BOUNDS, [Peak(*hill) for hill in hills.tolist()], 1000.0)
     east, north = np.random.default_rng(1).uniform([[-1900.0], [-1700.0]], [[2300.0], [1600.0]], (2, 500))
     wanted = sum(h * np.exp(-((east - e) ** 2 + (north - n) ** 2) / (2 * s * s)) for e, n, h, s in hills)
     assert peaks.height(east, north) == pytest.approx(wanted, abs=0.002 * 400)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.tolerances import FARTHEST, TOUCH
+from world.frames import PolyMapRecord
 from world.geometry import sphere_window
 from world.kernels import compiled
 from world.terrain import Heights, Terrain, segment_clearance
@@ -33,7 +34,7 @@ def segment_clearances(terrain: Terrain, position: Floats) -> tuple[Floats, Floa
 
     position: (t, 3).  Returns (t - 1,) twice; NaN where the segment leaves the terrain's data or is not a number.
     """
-    return _clearances(terrain.heights, terrain.to_pixel.packed, np.ascontiguousarray(position))
+    return _clearances(terrain.heights, terrain.to_pixel.record, np.ascontiguousarray(position))
 
 
 def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> list[Passage]:
@@ -67,13 +68,15 @@ def _far(position: Floats, centre: Floats, radius: float) -> bool:
 
 
 @compiled
-def _clearances(heights: Heights, packed: Floats, position: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
+def _clearances(
+    heights: Heights, to_pixel: PolyMapRecord, position: Floats
+) -> tuple[Floats, Floats]:  # pragma: no cover
     count = max(0, position.shape[0] - 1)
     low = np.full(count, math.nan)
     at = np.zeros(count)
     for k in range(count):
         if np.abs(position[k : k + 2]).max() <= FARTHEST:
-            low[k], at[k] = segment_clearance(heights, packed, position[k], position[k + 1])
+            low[k], at[k] = segment_clearance(heights, to_pixel, position[k], position[k + 1])
     return low, at
 
 

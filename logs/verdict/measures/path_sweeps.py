@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
 from world.kernels import compiled
 from world.terrain import segment_clearance
@@ -27,7 +28,7 @@ _FAR = 30.0
 
 @compiled
 def path_clearance(
-    heights: Heights, packed: Floats, points: Floats
+    heights: Heights, to_pixel: PolyMapRecord, points: Floats
 ) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
     """Smallest height above ground on each segment and the fraction of it where that is, (n - 1,) each.
 
@@ -36,7 +37,7 @@ def path_clearance(
     count = max(0, points.shape[0] - 1)
     low, at = np.empty(count), np.empty(count)
     for k in range(count):
-        low[k], at[k] = segment_clearance(heights, packed, points[k], points[k + 1])
+        low[k], at[k] = segment_clearance(heights, to_pixel, points[k], points[k + 1])
     return low, at
 
 

@@ -218,9 +218,8 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) ->
 def _speed_in_mean_wind(demands: RouteDemands, aligned: AlignedTrack, rows: slice) -> Floats:
     """Speed that the air would see without gusts, m/s."""
     wind, track = demands.setup.scenario.wind, aligned.track
-    speed = np.maximum(0.0, wind.speed + wind.gradient * (track.position[rows, 2] - wind.reference_amsl))
-    east = track.velocity[rows, 0] + speed * math.sin(wind.from_course)
-    north = track.velocity[rows, 1] + speed * math.cos(wind.from_course)
+    mean = np.array([wind.at(float(up)) for up in track.position[rows, 2]]).reshape(-1, 2)
+    east, north = track.velocity[rows, 0] - mean[:, 0], track.velocity[rows, 1] - mean[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 
 

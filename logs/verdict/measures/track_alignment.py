@@ -93,7 +93,7 @@ def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     ground = demands.setup.scenario.terrain
     low, low_at = np.full(last, math.nan), np.zeros(last)
     if ground is not None:
-        low, low_at = path_clearance(ground.heights, ground.to_pixel.packed, clean.position)
+        low, low_at = path_clearance(ground.heights, ground.to_pixel.record, clean.position)
     return AlignedTrack(
         track=clean,
         bad_rows=int(good.size - good.sum()),

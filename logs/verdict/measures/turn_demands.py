@@ -6,10 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import Limits, PerformanceTable, downwind, fly_over_run, reversal_room, turn_radius_between
+from aircraft.path_limits import (
+    Limits,
+    PerformanceTable,
+    downwind,
+    fly_over_run,
+    roll_reversal_length,
+    turn_radius_between,
+)
 from flight.mission.route import Route
 from logs.verdict.tolerances import U_TURN
-from world.geometry import arc_reach, leg_courses, leg_runs, signed_turns
+from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length
 
 Floats = NDArray[np.float64]
 
@@ -66,7 +73,7 @@ def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, flo
         return 0.0, radius * fly_over_run(turn)
     if turn > U_TURN:
         return math.inf, math.inf
-    tangent = arc_reach(turn, radius)
+    tangent = tangent_length(turn, radius)
     return tangent, tangent
 
 
@@ -81,7 +88,7 @@ def _reversals(
             table = tables[float(route.airspeed[leg])]
             ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
             lower = float(min(up[leg], up[leg + 1]))
-            out[leg] = reversal_room(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
+            out[leg] = roll_reversal_length(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
     return out
 
 

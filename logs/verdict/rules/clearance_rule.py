@@ -22,7 +22,7 @@ def clearance_findings(
         reason = "no terrain was given, so heights above ground are not known"
         return [make_finding("clearance", FLIGHT, ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
     legs = demands.path.legs
-    low, _ = path_clearance(ground.heights, ground.to_pixel.packed, demands.path.points)
+    low, _ = path_clearance(ground.heights, ground.to_pixel.record, demands.path.points)
     planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(demands.legs)]
     out = []
     for leg in range(demands.legs):

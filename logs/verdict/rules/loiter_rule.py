@@ -17,7 +17,7 @@ from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.tolerances import RADIUS_TOLERANCE
 from logs.verdict.wording import place_text
-from world.geometry import arc_reach
+from world.geometry import tangent_length
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def _middle(demands: RouteDemands, i: int) -> Floats:
         return np.array(demands.points[i, :2])
     ux, uy = demands.leg_unit(i - 1)
     side = math.copysign(1.0, demands.turns[i])
-    tangent = arc_reach(abs(float(demands.turns[i])), float(demands.radius[i]))
+    tangent = tangent_length(abs(float(demands.turns[i])), float(demands.radius[i]))
     return np.array(
         demands.points[i, :2] - tangent * np.array([ux, uy]) + side * demands.radius[i] * np.array([uy, -ux])
     )

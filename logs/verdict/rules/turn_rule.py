@@ -20,7 +20,7 @@ from logs.verdict.tolerances import (
     PLAN_TOLERANCE,
     SETTLED,
 )
-from world.geometry import arc_cut
+from world.geometry import fly_by_offset
 
 
 def turn_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
@@ -146,7 +146,7 @@ def _too_tight(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[Mess
     """
     turn, setup = abs(float(demands.turns[i])), demands.setup
     tightest = float(demands.tightest[i])
-    least = arc_cut(turn, tightest) if turn < SHARPEST else math.inf
+    least = fly_by_offset(turn, tightest) if turn < SHARPEST else math.inf
     if measure.passed is None or not math.isfinite(least) or setup.route.fly_over[i] or setup.guidance != "path":
         return []
     tolerance = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence]

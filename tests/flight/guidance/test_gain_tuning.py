@@ -13,7 +13,7 @@ from aircraft.catalog import Aircraft, load_aircraft
 from flight.guidance.gains import Gains, load_gains
 from tests.bench.tune_gains import DIGITS, REPORTED, SEARCHED, TRAINED, model_gains, rounded, search, start, write
 from tests.bench.tuning_missions import Case, cases
-from tests.flight.conftest import setup_maker, standard
+from tests.setups import setup_maker, standard
 
 NAMES = sorted(TRAINED)
 

@@ -23,7 +23,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
-from world.scenario_file import MAP_REACH
+from world.scenario_tables import MAP_EXTENT
 
 TURN = 2.0 * math.pi
 
@@ -133,7 +133,7 @@ def test_circles_too_wide_or_too_long_are_refused() -> None:
     assert "turns to loiter" in refusal(wp(0, 0), wp(0, 2000, command=19, p="3e38 0 100 0"))
     many = [wp(0, 2000, command=18, p="900 0 100 0"), wp(0, 4000), wp(0, 2000, command=18, p="900 0 100 0")]
     assert "more than 10,000 places" in refusal(wp(0, 0), *many)
-    assert MAP_REACH > 30_000.0
+    assert MAP_EXTENT > 30_000.0
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ from scipy.signal import welch
 from aircraft.catalog import Aircraft
 from flight.simulation.dryden import GUST_STATES, dryden_scales, start_gusts, step_gusts
 from flight.simulation.simulate import Flight, as_track
-from tests.flight.conftest import MakeSetup
+from tests.setups import MakeSetup
 
 Floats = NDArray[np.float64]
 SPEED, DT = 25.0, 1.0 / 60.0

@@ -19,7 +19,7 @@ from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import COLUMNS
-from tests.flight.conftest import MakeSetup, standard
+from tests.setups import MakeSetup, standard
 
 
 def fly(setup: FlightSetup) -> str:

@@ -21,7 +21,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Chart
 from flight.simulation.simulate import BANK_RESERVE, Flight, as_track, simulate
 from flight.simulation.track import COLUMNS, Track, join_tracks
-from tests.flight.conftest import standard
+from tests.setups import standard
 from world.errors import FlightError
 from world.frames import GeoOrigin, to_map
 

@@ -31,7 +31,7 @@ from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.recording.setup_attachments import pack_setup, unpack_setup
 from logs.recording.state_channel import state_class
-from tests.logs.conftest import make_setup, record
+from tests.logs.made_flight import make_setup, record
 from world import scenario as scenario_module
 from world.errors import LogError
 from world.scenario import from_spec, load_scenario

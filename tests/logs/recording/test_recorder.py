@@ -19,7 +19,7 @@ from logs.recording.foxglove_scene import body_rotation
 from logs.recording.reader import read_log
 from logs.recording.recorder import CHUNK_SIZE, Recorder
 from logs.recording.state_channel import EPOCH_NS, SECOND_NS
-from tests.logs.conftest import make_setup, make_track, record
+from tests.logs.made_flight import make_setup, make_track, record
 from world.frames import to_geo
 
 

@@ -11,7 +11,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.replay.instruments import LEAST_WIDTH, make_instruments
-from tests.logs.conftest import record
+from tests.logs.made_flight import record
 
 TIMES = np.arange(0.0, 8.0, 0.37)
 

@@ -15,7 +15,7 @@ from logs.replay.instruments import make_instruments
 from logs.replay.timeline import TimelineEntry, entry_lines, timeline
 from logs.verdict.measures.along_track import passages, segment_clearances
 from logs.verdict.measures.leg_numbers import with_legs
-from tests.logs.conftest import make_setup, make_track
+from tests.logs.made_flight import make_setup, make_track
 from world.terrain import flat_terrain
 
 

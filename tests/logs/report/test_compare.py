@@ -21,7 +21,7 @@ from logs.recording.state_channel import FIELDS, STATE_TOPIC
 from logs.report.compare import Comparison, compare_logs, difference_lines
 from logs.report.compare_page import write_comparison
 from tests.clients import need
-from tests.logs.conftest import make_setup, record
+from tests.logs.made_flight import make_setup, record
 
 
 def compared(first: FlightLog, second: FlightLog) -> tuple[Comparison, dict[str, Any]]:

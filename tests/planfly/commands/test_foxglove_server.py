@@ -18,7 +18,7 @@ from flight.simulation.track import Track
 from logs.recording.state_channel import EPOCH_NS, state_class
 from planfly.cli import main
 from tests.clients import need
-from tests.logs.conftest import make_setup, make_track, record
+from tests.logs.made_flight import make_setup, make_track, record
 
 pytestmark = pytest.mark.client
 

@@ -15,7 +15,7 @@ import rasterio
 import zstandard
 from rasterio.transform import Affine
 
-from tests.logs.conftest import make_setup, make_track, record
+from tests.logs.made_flight import make_setup, make_track, record
 
 ROOT = Path(__file__).parents[3]
 MAGIC = b"\x89MCAP0\r\n"

@@ -14,7 +14,7 @@ from PIL import Image
 from logs.figures.movie_frames import RATE, Film
 from logs.recording.reader import FlightLog, read_log
 from planfly.cli import main
-from tests.logs.conftest import make_setup, make_track, record
+from tests.logs.made_flight import make_setup, make_track, record
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from planfly.cli import main
 from planfly.commands.paper import PaperRun, exposure_probability, problem_name, run_section, table
 from planfly.commands.paper_files import file_names, table_text
 from planfly.terminal.targets import prepare_folder
-from tests.planner.conftest import small_scenario
+from tests.setups import small_scenario
 from world.scenario import load_scenario
 
 STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")

@@ -50,6 +50,6 @@ def test_blocks_of_segments_add_up_to_the_segments() -> None:
 def test_heights_above_flat_ground() -> None:
     ground = make_scenario(STRAIGHT, terrain={"kind": "flat", "amsl_m": 120.0}).terrain
     assert ground is not None
-    low, _ = path_clearance(ground.heights, ground.to_pixel.packed, STRAIGHT)
+    low, _ = path_clearance(ground.heights, ground.to_pixel.record, STRAIGHT)
     assert low.shape == (1000,)
     np.testing.assert_allclose(low, 180.0, atol=1e-4)

@@ -1,0 +1,42 @@
+"""A scenario with every kind of position and threat, and whether two scenarios are the same."""
+
+from typing import Any
+
+import numpy as np
+
+from world.scenario import Scenario
+
+
+def made_spec(**changes: Any) -> dict[str, Any]:
+    """JSON data of a scenario with every kind of position and threat; tables may be replaced."""
+    spec: dict[str, Any] = {
+        "name": "made",
+        "terrain": {
+            "kind": "peaks",
+            "peak": [{"east_m": 0.0, "north_m": 0.0, "height_m": 500.0, "sigma_m": 600.0}],
+        },
+        "area": {"east_m": [-3000, 3000], "north_m": [-2000, 2000]},
+        "start": {"east_m": -2500, "north_m": 100, "height_m": 120, "course_deg": 90},
+        "destination": {"lat_deg": 46.005, "lon_deg": 8.02, "amsl_m": 300},
+        "threats": [
+            {"east_m": 200, "north_m": 0, "kill_radius_m": 400, "kill_scale_m": 100},
+            {"name": "b", "east_m": 0, "north_m": 0, "height_m": 9, "detection_radius_m": 1, "detection_scale_m": 2},
+            {"east_m": 0, "north_m": 0, "amsl_m": 77, "kill_radius_m": 1, "kill_scale_m": 2},
+        ],
+        "wind": {"speed_mps": 6, "from_deg": 270, "gradient": 0.01, "turbulence": "light"},
+    }
+    return spec | changes
+
+
+def same_scenario(a: Scenario, b: Scenario) -> bool:
+    """Whether two scenarios agree in their data and, bit for bit, in their arrays."""
+    same = (a.name, a.spec, a.origin, a.floor, a.ceiling, a.start_course, a.limits, a.planner, a.flight, a.wind) == (
+        b.name, b.spec, b.origin, b.floor, b.ceiling, b.start_course, b.limits, b.planner, b.flight, b.wind,
+    )  # fmt: skip
+    arrays = [(getattr(a, name), getattr(b, name)) for name in ("bounds", "start", "destination")]
+    arrays += [
+        (getattr(a.threats, name), getattr(b.threats, name)) for name in ("position", "kill_radius", "kill_scale")
+    ]
+    if a.terrain is not None and b.terrain is not None:
+        arrays += [(a.terrain.heights, b.terrain.heights), (a.terrain.to_pixel.rows(), b.terrain.to_pixel.rows())]
+    return same and all(np.array_equal(x, y) for x, y in arrays)

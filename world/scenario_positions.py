@@ -1,0 +1,74 @@
+"""Positions of a scenario file on the map: its ends, and its threats on their ground."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.errors import ScenarioError
+from world.frames import GeoOrigin, to_map
+from world.scenario_tables import PointTable, ThreatTable
+from world.terrain import Terrain
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+
+
+def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
+    """East, north, up (3,) m of a position; a height above ground is counted from the terrain.
+
+    key, source: of the table and its file, for messages.  Raises ScenarioError where there is no terrain to count from.
+    """
+    if table.east_m is not None and table.north_m is not None:
+        east, north = table.east_m, table.north_m
+    else:
+        point = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
+        east, north = float(point[0]), float(point[1])
+    if table.amsl_m is not None:
+        return np.array([east, north, table.amsl_m])
+    under = float(ground.height(east, north)) if ground is not None else math.nan
+    if math.isnan(under):
+        raise ScenarioError(
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
+            " no terrain there to count a height from; give amsl_m"
+        )
+    return np.array([east, north, under + (table.height_m or 0.0)])
+
+
+def check_inside(
+    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
+) -> None:
+    """Raise ScenarioError for an end (3,) outside the area (2, 2), floor and ceiling (m AMSL), or in the ground."""
+    for axis, name in enumerate(("east", "north")):
+        low, high = bounds[axis]
+        if not low <= point[axis] <= high:
+            raise ScenarioError(f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}")
+    if not floor <= point[2] <= ceiling:
+        raise ScenarioError(
+            f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+        )
+    if ground is not None:
+        under = float(ground.height(point[0], point[1]))
+        if point[2] <= under:
+            raise ScenarioError(
+                f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+            )
+
+
+def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
+    """Place the threats of a scenario file on the map, each on the ground unless it gives a height.
+
+    Raises ScenarioError for one that stands where there is no terrain, and gives no height above mean sea level.
+    """
+    positions = np.zeros((len(tables), 3))
+    for k, table in enumerate(tables):
+        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
+        positions[k] = map_position(on_ground, f"threats[{k}]", source, origin, ground)
+    return Threats(
+        names=tuple(table.name or f"threat {k + 1}" for k, table in enumerate(tables)),
+        position=positions,
+        kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
+        detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),
+        kill_scale=np.array([table.kill_scale_m or 0.0 for table in tables]),
+        detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
+    )

@@ -1,0 +1,268 @@
+"""The tables of a scenario file as pydantic models: unknown keys, NaN and out-of-range values are refused.
+
+The models mirror the TOML key for key.  `world.scenario_file` reads a file into them, and `world.scenario` turns them
+into a `Scenario`.
+"""
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+
+# Positions lie within this distance of the map's origin, east or west and north or south, m.
+MAP_EXTENT = 500_000.0
+
+
+def _no_line_break(text: str) -> str:
+    if not text.isprintable():
+        raise ValueError("control characters are not allowed")
+    return text
+
+
+def _within(low: float, high: float, *, above: bool = False, below: bool = False, also: str = "") -> AfterValidator:
+    """Allow ``low``..``high``, without ``low`` if ``above`` and without ``high`` if ``below``; the error says so.
+
+    also: what else the field takes, for the message.
+    """
+
+    def check(value: float) -> float:
+        # Written so that NaN fails.
+        if (low < value if above else low <= value) and (value < high if below else value <= high):
+            return value
+        first, last = ("above " if above else ""), ("below " if below else "")
+        least, most = (x if isinstance(x, int) else f"{x:.12g}" for x in (low, high))
+        raise ValueError(f"allowed {first}{least}..{last}{most}{also}")
+
+    return AfterValidator(check)
+
+
+Metres = Annotated[float, _within(-MAP_EXTENT, MAP_EXTENT)]
+Amsl = Annotated[float, _within(-500.0, 9000.0)]
+Height = Annotated[float, _within(0.0, 9000.0)]
+Latitude = Annotated[float, _within(-89.0, 89.0)]
+Longitude = Annotated[float, _within(-180.0, 180.0)]
+Course = Annotated[float, _within(-360.0, 360.0)]
+Radius = Annotated[float, _within(0.0, 200_000.0, above=True)]
+Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_no_line_break)]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(_no_line_break)]
+Guidance = Literal["path", "l1", "vector-field"]
+Navigation = Literal["perfect", "rtk", "gnss"]
+Seed = Annotated[int, _within(0, 2**63 - 1)]
+Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
+
+
+class _Table(BaseModel):
+    # Strict: pydantic would otherwise take true, "5" and "yes" for numbers and truths.  Each number states its own
+    # range, which NaN and the infinities are outside of.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+class OriginTable(_Table):
+    """[origin]: the point where east_m = north_m = 0."""
+
+    lat_deg: Latitude
+    lon_deg: Longitude
+
+
+class PeakTable(_Table):
+    """[[terrain.peak]]: a Gaussian hill."""
+
+    east_m: Metres
+    north_m: Metres
+    height_m: Annotated[float, _within(0.0, 9000.0, above=True)]
+    sigma_m: Annotated[float, _within(10.0, 100_000.0)]
+
+
+class TerrainTable(_Table):
+    """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file.
+
+    vertical_error_m: of the heights, as their source states it; none where it is not stated, for no file says.
+    """
+
+    kind: Literal["dem", "peaks", "flat", "none"]
+    path: FilePath | None = None
+    peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
+    amsl_m: Amsl | None = None
+    vertical_error_m: Annotated[float, _within(0.0, 1000.0)] | None = None
+    sha256: str | None = None
+
+    @model_validator(mode="after")
+    def _kind_has_its_keys(self) -> "TerrainTable":
+        needs = {"dem": "path", "peaks": "peak", "flat": "amsl_m", "none": ""}[self.kind]
+        for key in ("path", "peak", "amsl_m"):
+            given = getattr(self, key) is not None
+            if key == needs and not given:
+                raise ValueError(f'{key}: missing; kind = "{self.kind}" needs it')
+            if key != needs and given:
+                raise ValueError(f'{key}: not a key of kind = "{self.kind}"')
+        return self
+
+
+class AreaTable(_Table):
+    """[area]: the map box and its ceiling."""
+
+    east_m: Span
+    north_m: Span
+    ceiling_amsl_m: Amsl | None = None
+    floor_amsl_m: Amsl | None = None
+
+    @model_validator(mode="after")
+    def _in_order(self) -> "AreaTable":
+        for key in ("east_m", "north_m"):
+            low, high = getattr(self, key)
+            if not high - low >= 100.0:
+                raise ValueError(f"{key}: [{low:g}, {high:g}]: the second must exceed the first by at least 100")
+        if (
+            self.ceiling_amsl_m is not None
+            and self.floor_amsl_m is not None
+            and self.ceiling_amsl_m <= self.floor_amsl_m
+        ):
+            raise ValueError(
+                f"ceiling_amsl_m: {self.ceiling_amsl_m:g}: must be above floor_amsl_m {self.floor_amsl_m:g}"
+            )
+        return self
+
+
+class PointTable(_Table):
+    """A position: east_m, north_m or lat_deg, lon_deg; amsl_m or height_m above ground."""
+
+    east_m: Metres | None = None
+    north_m: Metres | None = None
+    lat_deg: Latitude | None = None
+    lon_deg: Longitude | None = None
+    amsl_m: Amsl | None = None
+    height_m: Height | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> "PointTable":
+        metres = (self.east_m is not None, self.north_m is not None)
+        degrees = (self.lat_deg is not None, self.lon_deg is not None)
+        if not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
+            raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+        if self.amsl_m is not None and self.height_m is not None:
+            raise ValueError("height_m: give amsl_m or height_m, not both")
+        return self
+
+
+class EndTable(PointTable):
+    """[start] and [destination]."""
+
+    course_deg: Course | None = None
+
+    @model_validator(mode="after")
+    def _has_height(self) -> "EndTable":
+        if self.amsl_m is None and self.height_m is None:
+            raise ValueError("amsl_m: missing; give amsl_m or height_m")
+        return self
+
+
+class ThreatTable(PointTable):
+    """[[threats]]: missile only, radar only, or both; on the ground unless a height is given."""
+
+    name: Name | None = None
+    kill_radius_m: Radius | None = None
+    kill_scale_m: Radius | None = None
+    detection_radius_m: Radius | None = None
+    detection_scale_m: Radius | None = None
+
+    @model_validator(mode="after")
+    def _pairs(self) -> "ThreatTable":
+        for kind in ("kill", "detection"):
+            radius, scale = getattr(self, f"{kind}_radius_m"), getattr(self, f"{kind}_scale_m")
+            if (radius is None) != (scale is None):
+                raise ValueError(f"{kind}_radius_m and {kind}_scale_m: give both or neither")
+        if self.kill_radius_m is None and self.detection_radius_m is None:
+            raise ValueError("kill_radius_m: missing; a threat has a missile, a radar, or both")
+        return self
+
+
+Angle = Annotated[float, _within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
+
+
+class LimitsTable(_Table):
+    """[limits]: a number, or "aircraft" for what the envelope allows."""
+
+    max_turn_deg: Annotated[float, _within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
+        "aircraft"
+    )
+    max_climb_deg: Angle = "aircraft"
+    max_dive_deg: Angle = "aircraft"
+    min_clearance_m: Annotated[float, _within(0.0, 5000.0)] = 30.0
+
+
+class GoalsTable(_Table):
+    """[planner] goals of the second level of preference."""
+
+    length_ratio: Annotated[float, _within(1.0, 100.0)] | None = None
+    kill_exposure: Annotated[float, _within(0.0, 1e9)] | None = None
+
+
+class PlannerTable(_Table):
+    """[planner]."""
+
+    algorithm: Name | None = None
+    waypoints: Annotated[int, _within(3, 500)] = 12
+    population: Annotated[int, _within(4, 100_000)] = 200
+    generations: Annotated[int, _within(0, 100_000)] = 100
+    across_m: Annotated[float, _within(0.0, MAP_EXTENT, above=True)] | None = None
+    goals: GoalsTable = GoalsTable()
+    budget: Annotated[int, _within(4, 10**10)] | None = None
+    seed: Seed | None = None
+
+
+def names_folder(aircraft: str) -> bool:
+    """Whether an aircraft's name is that of a folder, not of an embedded aircraft: it has a slash.
+
+    >>> names_folder("aerosonde"), names_folder("models/mine")
+    (False, True)
+    """
+    return "/" in aircraft or "\\" in aircraft
+
+
+class FlightTable(_Table):
+    """[flight].
+
+    guidance: the law that steers.  nav: how well guidance knows where it is, see `flight.guidance.navigation_error`.
+    """
+
+    aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
+    airspeed_mps: Annotated[float, _within(15.0, 60.0)] | None = None
+    max_bank_deg: Annotated[float, _within(5.0, 60.0)] = 30.0
+    guidance: Guidance = "path"
+    guidance_hz: Literal[30, 60] = 60
+    nav: Navigation = "perfect"
+    fly_over: bool = False
+    motor_braking: bool = False
+    battery_wh: Annotated[float, _within(0.0, 100_000.0, above=True)] | None = None
+
+
+class WindTable(_Table):
+    """[wind]: gradient in m/s per metre of height above the start."""
+
+    speed_mps: Annotated[float, _within(0.0, 40.0)] = 0.0
+    from_deg: Course = 0.0
+    gradient: Annotated[float, _within(-0.05, 0.05)] = 0.0
+    turbulence: Literal["none", "light", "moderate"] = "none"
+    seed: Seed | None = None
+
+
+class ScenarioFile(_Table):
+    """A whole scenario file."""
+
+    name: Name
+    description: Annotated[str, Field(max_length=500), AfterValidator(_no_line_break)] = ""
+    origin: OriginTable | None = None
+    terrain: TerrainTable
+    area: AreaTable | None = None
+    start: EndTable
+    destination: EndTable
+    threats: Annotated[list[ThreatTable], Field(max_length=20_000)] = []
+    limits: LimitsTable = LimitsTable()
+    planner: PlannerTable = PlannerTable()
+    flight: FlightTable = FlightTable()
+    wind: WindTable = WindTable()
+
+    @model_validator(mode="after")
+    def _area_where_there_is_no_tile(self) -> "ScenarioFile":
+        if self.area is None and self.terrain.kind != "dem":
+            raise ValueError(f'area: missing; terrain kind "{self.terrain.kind}" has no tile to take it from')
+        return self
