@@ -1,4 +1,4 @@
-"""The command line: what there is to say, and what an exit code means.  Heavy imports wait for the command."""
+"""The command line: arguments in, one line for an error, an exit code out.  Heavy imports wait for the command."""
 
 import argparse
 import sys
@@ -9,7 +9,10 @@ from planfly.terminal.parser import build_parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Carry one command out, and return its exit code.
+
+    argv: without the program's name; None takes the process's.
+    """
     args = build_parser().parse_args(argv)
     try:
         return _command(args)
@@ -21,13 +24,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
-    from planfly.commands.dispatch import COMMANDS
-    from planfly.terminal.output import patient_output
+    from planfly.commands.registry import find_command
+    from planfly.terminal.output import tolerate_closed_output
     from world.errors import PlanflyError
 
     try:
-        with patient_output():
-            return COMMANDS[args.command](args)
+        with tolerate_closed_output():
+            return find_command(args.command)(args)
     except PlanflyError as error:
         return _fail(BAD_INPUT, error)
 

@@ -6,13 +6,18 @@ from pathlib import Path
 
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
+from flight.mission.items import Mission
 from flight.mission_files.formats import read_mission
 from flight.simulation.flight_setup import FlightSetup
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.pipeline import make_setup
-from planner.plan import read_plan
-from world.errors import MissionError
+from planner.plan import Plan, read_plan
+from world.errors import MissionError, PlanflyError
 from world.scenario import Scenario, load_scenario
+
+MCAP_MAGIC = b"\x89MCAP"
+
+ScenarioChange = Callable[[Scenario], Scenario]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +29,46 @@ class OpenedMission:
     name: str
 
 
+@dataclass(frozen=True, slots=True)
+class OpenedPlan:
+    """A plan file, and the mission that it comes to.
+
+    plan: as read.
+    scenario: the plan's, with the changes asked for.
+    airframe: of that scenario.
+    mission: the plan's waypoints as items, without fences.
+    """
+
+    plan: Plan
+    scenario: Scenario
+    airframe: Airframe
+    mission: Mission
+
+
+def _unchanged(scenario: Scenario) -> Scenario:
+    return scenario
+
+
+def is_log(path: Path) -> bool:
+    """Whether a file is a flight log, by its first bytes or, failing those, its name.
+
+    Raises PlanflyError for a file that cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(len(MCAP_MAGIC))
+    except OSError as error:
+        raise PlanflyError(f"{path}: cannot be read: {error.strerror}") from error
+    return head == MCAP_MAGIC or path.suffix.lower() == ".mcap"
+
+
 def open_mission(
     path: Path,
     scenario_name: str | None,
     terrain: str | None,
     *,
     seed: int | None = None,
-    change: Callable[[Scenario], Scenario] = lambda scenario: scenario,
+    change: ScenarioChange = _unchanged,
 ) -> OpenedMission:
     """Read a plan.json, .waypoints or .plan, in its own, a named or a made scenario.
 
@@ -41,29 +79,39 @@ def open_mission(
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected")
     if path.suffix.lower() == ".json":
-        return _open_plan(path, scenario_name, terrain, seed, change)
+        return _open_planned(path, scenario_name, terrain, seed, change)
     mission = read_mission(path)
     if scenario_name is not None:
-        scenario = load_scenario(scenario_name, terrain)
+        scenario = change(load_scenario(scenario_name, terrain))
     else:
-        scenario = implied_scenario(mission, terrain, vertical_legs=True)
-    scenario = change(scenario)
+        scenario = change(implied_scenario(mission, terrain, vertical_legs=True))
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
     return OpenedMission(make_setup(scenario, airframe, mission, number, vertical_legs=True), airframe, path.stem)
 
 
-def _open_plan(
-    path: Path, scenario_name: str | None, terrain: str | None, seed: int | None, change: Callable[[Scenario], Scenario]
+def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _unchanged) -> OpenedPlan:
+    """Read a plan.json, and make its mission with the aircraft of its own scenario.
+
+    terrain, change: as of `open_mission`.  Raises MissionError, ScenarioError or TerrainError.
+    """
+    plan = read_plan(path, terrain=terrain)
+    scenario = change(plan.scenario)
+    airframe = load_airframe(scenario)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=str(path))
+    return OpenedPlan(plan, scenario, airframe, mission)
+
+
+def _open_planned(
+    path: Path, scenario_name: str | None, terrain: str | None, seed: int | None, change: ScenarioChange
 ) -> OpenedMission:
-    made = read_plan(path, terrain=terrain)
-    # The plan's waypoints are in the map of the scenario it was made for; another scenario judges its mission.
-    own = change(made.scenario)
-    airframe = load_airframe(own)
-    mission = plan_mission(made, airframe.airspeed, airframe.max_bank, source=str(path))
-    number = seed if seed is not None else made.seed
+    """A plan in the scenario it was made for, or its mission in another."""
+    opened = open_plan(path, terrain, change)
+    number = seed if seed is not None else opened.plan.seed
     if scenario_name is not None:
+        # The plan's waypoints are in the map of its own scenario: another judges the mission, as a file.
         other = change(load_scenario(scenario_name, terrain))
         airframe = load_airframe(other)
-        return OpenedMission(make_setup(other, airframe, mission, number), airframe, path.stem)
-    return OpenedMission(make_setup(own, airframe, mission, number, plan=made), airframe, own.name)
+        return OpenedMission(make_setup(other, airframe, opened.mission, number), airframe, path.stem)
+    setup = make_setup(opened.scenario, opened.airframe, opened.mission, number, plan=opened.plan)
+    return OpenedMission(setup, opened.airframe, opened.scenario.name)

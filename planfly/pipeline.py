@@ -21,7 +21,7 @@ from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, load_scenario
 
-# How far a stage is: done, whole, a remark.
+# Takes how far a stage is: done, whole, a remark.
 Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
@@ -30,12 +30,38 @@ BATCH = 60
 
 @dataclass(frozen=True, slots=True)
 class PlanThenFly:
-    """What `plan_then_fly` returns; track is None where there was no feasible plan to fly."""
+    """What `plan_then_fly` returns.
+
+    plan: the path, with its certificate.
+    mission: the plan as mission items.
+    track: the flight, a row a guidance tick; None where there was no feasible plan to fly.
+    verdict: whether it flies, with a finding for every rule and place.
+
+    >>> result = plan_then_fly("paper-07", seed=1)
+    >>> len(result.plan.waypoints), len(result.mission.items), round(float(result.track.time[-1]))
+    (10, 11, 530)
+    """
 
     plan: Plan
     mission: Mission
     track: Track | None
     verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """A flight from its first tick to its verdict.
+
+    track: the rows that are recorded, all of them where there is no log.
+    ended: how it ended, "completed" or the reason why not.
+    verdict: on these rows.
+    events: what the log holds beside them.
+    """
+
+    track: Track
+    ended: str
+    verdict: Verdict
+    events: tuple[LogEvent, ...]
 
 
 def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
@@ -44,6 +70,10 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     scenario: an embedded name, a TOML file's path, or a `Scenario`.  seed: of planner and turbulence; None takes
     the scenario's, or 1.  log: where to write the flight as MCAP, replaced if it exists; None writes none.
     Raises a `world.errors.PlanflyError` for bad input.  A plan that cannot be flown is a verdict, not an error.
+
+    >>> result = plan_then_fly("tight", seed=1)
+    >>> result.plan.safe, result.verdict.flyable
+    (True, False)
     """
     world = load_scenario(scenario) if isinstance(scenario, str) else scenario
     number = choose_seed(world, seed)
@@ -53,8 +83,8 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
     setup = make_setup(world, airframe, mission, number, plan=plan)
-    track, _, verdict = fly(setup, airframe, None if log is None else Path(log))
-    return PlanThenFly(plan, mission, track, verdict)
+    flown = fly(setup, airframe, None if log is None else Path(log))
+    return PlanThenFly(plan, mission, flown.track, flown.verdict)
 
 
 def make_plan(
@@ -99,32 +129,31 @@ def make_setup(
     )
 
 
-def flight_events(track: Track, ended: str) -> list[LogEvent]:
-    """What a log tells of a flight beside its rows."""
-    end = float(track.time[-1]) if len(track) else 0.0
-    return [LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")]
-
-
 def fly(
     setup: FlightSetup, airframe: Airframe, log: Path | None, advance: Advance | None = None, *, every: int = 1
-) -> tuple[Track, str, Verdict]:
-    """Fly a setup, record it if a log is named, and judge it: track, how it ended, verdict.
+) -> JudgedFlight:
+    """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     """
 
-    def tell(done: float, whole: float) -> None:
+    def report(done: float, whole: float) -> None:
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
 
     if log is None:
-        flown = simulate(setup, airframe.aircraft, progress=tell)
-        return flown.track, flown.ended, judge_flight(setup, flown.track, flown.ended)
+        flown = simulate(setup, airframe.aircraft, progress=report)
+        return _judged(setup, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=tell)
-        track = thin_track(flown.track, every)
-        verdict = judge_flight(setup, track, flown.ended)
-        for event in flight_events(track, flown.ended):
+        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=report)
+        judged = _judged(setup, thin_track(flown.track, every), flown.ended)
+        for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(flown.ended, verdict)
-    return track, flown.ended, verdict
+        recorder.finish(judged.ended, judged.verdict)
+    return judged
+
+
+def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:
+    end = float(track.time[-1]) if len(track) else 0.0
+    event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
+    return JudgedFlight(track, ended, judge_flight(setup, track, ended), (event,))

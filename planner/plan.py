@@ -1,4 +1,4 @@
-"""A plan: waypoints, how they were judged, and the scenario they were made for."""
+"""A plan: waypoints, how they were evaluated, and the scenario they were made for."""
 
 import json
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ SCHEMA = "planfly.plan/1"
 
 
 class Violation(IntEnum):
-    """Columns of a path's violation counts (paper eq. 1-7)."""
+    """Columns of a path's violation counts (eq. 1-7 of Yang, Tang and Lozano, CEC 2014)."""
 
     TURN = 0
     SLOPE = 1
@@ -33,7 +33,7 @@ class Violation(IntEnum):
 
 
 class Objective(IntEnum):
-    """Columns of a path's objectives (paper eq. 8-11)."""
+    """Columns of a path's objectives (eq. 8-11 of Yang, Tang and Lozano, CEC 2014)."""
 
     LENGTH_RATIO = 0
     KILL_EXPOSURE = 1
@@ -45,15 +45,18 @@ class Objective(IntEnum):
 class Certificate:
     """What the continuous check found along the whole path, not at six points a leg.
 
-    margin fields are the smallest limit minus value, negative where the path fails: turn, slope in rad
-    (``turn_room``: m of leg left between its two turns, inf where the flat turn limit alone counts), clearance
-    in m above ground less the required clearance, bounds in m.  kill_distance: m between the path and the
-    nearest missile sphere's surface, negative inside, inf without missiles.
+    Margins are the smallest limit minus value, negative where the path fails.
+
+    turn, slope: margins, rad.
+    available_length: least length of a leg between its two turns, m; inf where the flat turn limit alone counts.
+    clearance: least height above ground less the required clearance, m.
+    bounds: margin to map, floor and ceiling, m.
+    kill_distance: between the path and the nearest missile sphere's surface, m; negative inside, inf without missiles.
     problems: one line each of what failed, empty if the path is certified.
     """
 
     turn: float
-    turn_room: float
+    available_length: float
     slope: float
     clearance: float
     bounds: float
@@ -70,13 +73,16 @@ class Certificate:
 class Plan:
     """A planned path.
 
-    waypoints: (w, 3) world m.  violations: (4,) counts by `Violation`; objectives: (4,) by `Objective`; both
-    on the paper's six points a leg, whatever the search looked at.  feasible: no violations and a clean certificate.
-    safe: feasible, and outside every missile sphere.
+    scenario: what it was planned for.
+    waypoints: (w, 3) world m.
+    violations, objectives: (4,) by `Violation` and (4,) by `Objective`, on the paper's six points a leg, whatever the
+    search looked at.
+    certificate: of the whole path, or of what follows the flown legs.
+    seed, algorithm, evaluations: how it was found.
     history: (g, 3) after each generation, of the best path yet: length ratio, kill exposure and violations (the
-    graded algorithms count kinds of violations).  ended: "completed", or why the search ended before: "budget",
-    "interrupted".  flown_legs: legs at the beginning that an earlier plan had and that are flown; the certificate is
-    of what follows them.
+    graded algorithms count kinds of violations).
+    ended: "completed", or why the search ended before: "budget", "interrupted".
+    flown_legs: legs at the beginning that an earlier plan had and that are flown.
     """
 
     scenario: Scenario
@@ -110,7 +116,7 @@ class Plan:
 
     @property
     def safe(self) -> bool:
-        """Feasible, and no missile reaches the path."""
+        """Feasible, and outside every missile sphere."""
         return self.feasible and self.certificate.kill_distance > 0.0
 
 
@@ -155,7 +161,18 @@ def _or_none(value: float) -> float | None:
 
 
 def plan_json(plan: Plan) -> str:
-    """The plan as the text of a ``plan.json``; the same plan always gives the same bytes."""
+    """The plan as the text of a ``plan.json``; the same plan always gives the same bytes.
+
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> path = np.stack([scenario.start, scenario.destination])
+    >>> certificate = Certificate(0.1, np.inf, 0.1, 9.0, 10.0, 50.0, ())
+    >>> plan = Plan(scenario, path, np.zeros(4), np.array([1, 0, 0, 0]), certificate, 7, "umda", 60, np.zeros((0, 3)))
+    >>> [line.strip() for line in plan_json(plan).splitlines()[1:4]]
+    ['"schema": "planfly.plan/1",', '"algorithm": "umda",', '"seed": 7,']
+    >>> parse_plan(plan_json(plan), "plan.json").certificate == certificate
+    True
+    """
     certificate = plan.certificate
     data = {
         "schema": SCHEMA,
@@ -171,7 +188,7 @@ def plan_json(plan: Plan) -> str:
         "objectives": {item.name.lower(): float(plan.objectives[item]) for item in Objective},
         "certificate": {
             "turn_margin_rad": certificate.turn,
-            "turn_room_m": _or_none(certificate.turn_room),
+            "turn_room_m": _or_none(certificate.available_length),
             "slope_margin_rad": certificate.slope,
             "clearance_margin_m": _or_none(certificate.clearance),
             "bounds_margin_m": certificate.bounds,
@@ -187,9 +204,17 @@ def plan_json(plan: Plan) -> str:
 def parse_plan(
     text: str, source: str, *, base: Path | None = None, terrain: str | None = None, ground: Terrain | None = None
 ) -> Plan:
-    """Read the text of a ``plan.json``; ``terrain`` replaces its scenario's terrain by a file.
+    """The plan of the text of a ``plan.json``.
 
+    source: where the text is from, as an error's first words.
+    base: folder that its scenario's paths are relative to.
+    terrain: file that replaces its scenario's terrain.
     ground: terrain already at hand (from a log); then no elevation file is opened.
+
+    >>> parse_plan('{"schema": "planfly.plan/2"}', "plan.json")
+    Traceback (most recent call last):
+    world.errors.MissionError: plan.json: schema: "planfly.plan/2": Input should be 'planfly.plan/1' (and 11 more)
+
     Raises MissionError (or the scenario's own errors) with one line: file, field, value, what is allowed.
     """
     try:
@@ -209,7 +234,7 @@ def parse_plan(
     saved = file.certificate
     certificate = Certificate(
         turn=saved.turn_margin_rad,
-        turn_room=_or_inf(saved.turn_room_m),
+        available_length=_or_inf(saved.turn_room_m),
         slope=saved.slope_margin_rad,
         clearance=np.nan if saved.clearance_margin_m is None else saved.clearance_margin_m,
         bounds=saved.bounds_margin_m,
@@ -233,7 +258,14 @@ def parse_plan(
 
 
 def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
-    """Read a ``plan.json`` file.  Raises MissionError or the scenario's errors."""
+    """The plan of a ``plan.json`` file; terrain: file that replaces its scenario's terrain.
+
+    >>> read_plan(Path("missing.json"))
+    Traceback (most recent call last):
+    world.errors.MissionError: missing.json: cannot be read: No such file or directory
+
+    Raises MissionError or the scenario's errors.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:

@@ -170,15 +170,7 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
         'kind = "peaks"',
         "",
     ]
-    for pe, pn, height, sigma in PEAKS:
-        lines += [
-            "[[terrain.peak]]",
-            f"east_m = {pe}",
-            f"north_m = {pn}",
-            f"height_m = {height}",
-            f"sigma_m = {sigma}",
-            "",
-        ]
+    lines += _peak_lines()
     lines += [
         "[area]",
         "east_m = [0, 10000]",
@@ -205,12 +197,24 @@ def scenario_text(name: str, instance: Instance, description: str) -> str:
         'aircraft = "aerosonde"',
         "airspeed_mps = 25",
     ]
-    lines += _threat_lines(instance)
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines + _threat_lines(instance)) + "\n"
+
+
+def _peak_lines() -> list[str]:
+    lines = []
+    for pe, pn, height, sigma in PEAKS:
+        lines += [
+            "[[terrain.peak]]",
+            f"east_m = {pe}",
+            f"north_m = {pn}",
+            f"height_m = {height}",
+            f"sigma_m = {sigma}",
+            "",
+        ]
+    return lines
 
 
 def _threat_lines(instance: Instance) -> list[str]:
-    """[[threats]] of an instance; detection reaches 1.5 times as far as the missile, and a scale is half a radius."""
     lines = []
     for number, (place, radius) in enumerate(zip(instance.positions, instance.radii, strict=True), 1):
         lines += [

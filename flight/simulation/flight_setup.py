@@ -21,7 +21,7 @@ class FlightSetup:
     mission: its items, as read or exported.
     mission_text: the same as a .waypoints file, as flown.
     route: the waypoints that the mission comes to.
-    limits: of scenario and aircraft together; made once, with the setup.
+    limits: of scenario and aircraft together, made where the aircraft is loaded.
     aircraft: its name in the catalog, or its folder.
     battery: energy carried, Wh.
     seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.

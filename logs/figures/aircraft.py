@@ -1,4 +1,4 @@
-"""Pictures of an aircraft: its envelope, its trims and modes over speed, and its answers to the controls."""
+"""Pictures of an aircraft: its envelope, its trims and modes over speed, and its responses to the controls."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 _BANKS_DEG = (15, 20, 30, 40)
 _WINDS = (-10.0, -5.0, 0.0, 5.0, 10.0)
-# From dark to light, low to high, slow to fast; dashes tell the same a second time.
+# From dark to light, low to high, slow to fast; dashes show the same a second time.
 _SHADES = ("#000000", style.BLUE, style.RADAR, style.LIMIT, style.FAIL)
 _DASHES: tuple[Any, ...] = ("-", (0, (7, 2)), (0, (4, 2)), (0, (2, 2)), (0, (1, 1.5)))
 _MARKS = {"short period": "o", "phugoid": "s", "Dutch roll": "D", "roll-spiral": "P", "roll": "^", "spiral": "v"}
@@ -45,7 +45,15 @@ _ROWS = {
 
 
 def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
-    """Four panels: slopes over airspeed by height, level speeds over height, slopes over the ground in wind, turns."""
+    """Four panels: slopes over airspeed by height, level speeds over height, slopes over the ground in wind, turns.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from logs.recording.example_log import example_log
+    >>> figure = draw_envelope(load_aircraft("aerosonde"), example_log().setup.envelope)
+    >>> [axes.get_title(loc="left") for axes in figure.axes]
+    ['steepest climb and descent to the air', 'level flight', 'steepest climb and dive over the ground, at 500 m',
+     'turn radius']
+    """
     with style.clean_style():
         figure = style.new_figure(8.0)
         axes = figure.subplots(2, 2)
@@ -54,8 +62,8 @@ def draw_envelope(aircraft: Aircraft, envelope: Envelope) -> Figure:
             idle = "throttle closed"
         else:
             idle = "the motor brakes" if envelope.motor_braking else "without current (the motor does not brake)"
-        told = f"JSBSim trims; climbs at full throttle, descents: {idle}; shaded: the speeds that guidance uses"
-        _title(figure, f"{aircraft.title}: what it can do in steady flight", told)
+        subtitle = f"JSBSim trims; climbs at full throttle, descents: {idle}; shaded: the speeds that guidance uses"
+        _title(figure, f"{aircraft.title}: what it can do in steady flight", subtitle)
         _slopes(axes[0, 0], aircraft, envelope)
         _level_speeds(axes[0, 1], aircraft, envelope)
         _in_wind(axes[1, 0], aircraft, envelope)
@@ -70,7 +78,7 @@ def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
         axes.plot(envelope.airspeed, np.degrees(envelope.climb[:, j]), label=f"{envelope.amsl[j]:.0f} m", **look)
         axes.plot(envelope.airspeed, -np.degrees(envelope.descent[:, j]), **look)
     axes.axhline(0.0, color="#555555", linewidth=0.8)
-    _used(axes, aircraft)
+    _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "steepest climb and descent to the air", "airspeed (m/s)", "flight path (°)")
     _headroom(axes)
     axes.legend(title="height AMSL", loc="upper right", ncols=3)
@@ -81,7 +89,7 @@ def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     axes.fill_betweenx(envelope.amsl, low, high, color=style.PLAN, alpha=0.2, linewidth=0)
     axes.plot(low, envelope.amsl, color=style.MISSILE, linestyle="--", linewidth=1.3, label="slowest: elevator full up")
     axes.plot(high, envelope.amsl, color=style.BLUE, linewidth=1.3, label="fastest: full throttle")
-    _used(axes, aircraft)
+    _shade_guidance_speeds(axes, aircraft)
     span = float(np.nanmax(high) - np.nanmin(low))
     axes.set_xlim(float(np.nanmin(low)) - 0.08 * span, float(np.nanmax(high)) + 0.08 * span)
     _frame(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
@@ -91,11 +99,11 @@ def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
 def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
     for k, wind in enumerate(_WINDS):
-        pairs = np.degrees([envelope.slope_limits(float(v), AMSL, wind) for v in speeds])
+        climb, dive = np.degrees([envelope.slope_limits(float(v), AMSL, wind) for v in speeds]).T
         name = "calm" if wind == 0.0 else f"{abs(wind):.0f} m/s {'tail' if wind > 0.0 else 'head'}wind"
         look = {"color": _SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
-        axes.plot(speeds, pairs[:, 0], label=name, **look)
-        axes.plot(speeds, -pairs[:, 1], **look)
+        axes.plot(speeds, climb, label=name, **look)
+        axes.plot(speeds, -dive, **look)
     axes.axhline(0.0, color="#555555", linewidth=0.8)
     _frame(axes, f"steepest climb and dive over the ground, at {AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
     _headroom(axes)
@@ -107,14 +115,24 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
     for k, bank in enumerate(_BANKS_DEG):
         radii = [turn_radius(float(v), math.radians(bank)) for v in speeds]
         axes.plot(speeds, radii, color=_SHADES[k], linestyle=_DASHES[k], linewidth=1.3, label=f"{bank}° of bank")
-    _used(axes, aircraft)
+    _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "turn radius", "ground speed (m/s)", "radius (m)")
     axes.set_ylim(0.0, None)
     axes.legend(loc="upper left")
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
-    """Four panels: angle of attack and controls, throttle and power over airspeed; the modes' roots by airspeed."""
+    """Four panels: angle of attack and controls, throttle and power over airspeed; the modes' roots by airspeed.
+
+    trims: in order of airspeed.  modes: by airspeed, m/s.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.characteristics import modes_at, trim_table
+    >>> aircraft = load_aircraft("aerosonde")
+    >>> figure = draw_trims(aircraft, trim_table(aircraft, 3), {25.0: modes_at(aircraft, 25.0)})
+    >>> figure.axes[0].get_xlabel(), figure.axes[1].get_ylabel()
+    ('airspeed (m/s)', 'throttle (%)')
+    """
     with style.clean_style():
         figure = style.new_figure(8.0)
         axes = figure.subplots(2, 2)
@@ -155,7 +173,7 @@ def _power(axes: Any, aircraft: Aircraft, speeds: Floats, trims: Sequence[TrimRo
 def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> None:
     """The upper half of the plane of roots; the slow ones near the origin on their own if not the whole."""
     slow = {"phugoid", "spiral", "roll-spiral"}
-    seen: set[str] = set()
+    labelled: set[str] = set()
     for speed, found in modes.items():
         fastest = speed == max(modes)
         for mode in found:
@@ -165,9 +183,9 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> 
             axes.plot(
                 mode.root.real, mode.root.imag, _MARKS[mode.name], color=_MODE_COLORS[mode.name], markersize=5,
                 markerfacecolor=_MODE_COLORS[mode.name] if fastest else "white",
-                label=None if mode.name in seen else mode.name,
+                label=None if mode.name in labelled else mode.name,
             )  # fmt: skip
-            seen.add(mode.name)
+            labelled.add(mode.name)
     axes.axvline(0.0, color="#555555", linewidth=0.8)
     slow_or_fast = f"from {min(modes):g} m/s (hollow) to {max(modes):g} m/s (filled)" if modes else ""
     title = f"modes {slow_or_fast}" if whole else "the slow ones, nearer"
@@ -180,14 +198,24 @@ def _roots(axes: Any, modes: Mapping[float, Sequence[Mode]], *, whole: bool) -> 
 
 
 def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
-    """A column for each control; each panel one quantity's change from level flight, over time (s)."""
+    """A column for each control; each panel one quantity's change from level flight, over time (s).
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.characteristics import step_responses
+    >>> aircraft = load_aircraft("aerosonde")
+    >>> figure = draw_steps(aircraft, step_responses(aircraft))
+    >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
+    ['pitch (°)', 'pitch (°)', 'roll (°)', 'roll (°)']
+    """
     deep = max(len(step.rows) for step in steps)
     with style.clean_style():
         figure = style.new_figure(1.3 + 1.7 * deep)
         axes = figure.subplots(deep, len(steps), squeeze=False, sharex="col")
         figure.subplots_adjust(left=0.05, right=0.985, top=0.865, bottom=0.065, wspace=0.24, hspace=0.28)
-        told = f"from level flight at {aircraft.airspeed:g} m/s and {AMSL:.0f} m, one control moved at 1 s, no guidance"
-        _title(figure, f"{aircraft.title}: how it answers", told)
+        subtitle = (
+            f"from level flight at {aircraft.airspeed:g} m/s and {AMSL:.0f} m, one control moved at 1 s, no guidance"
+        )
+        _title(figure, f"{aircraft.title}: how it answers", subtitle)
         for column, step in enumerate(steps):
             for row in range(deep):
                 panel = axes[row, column]
@@ -195,8 +223,8 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
                     panel.axis("off")
                     continue
                 _answer(panel, step, row)
-            place = axes[0, column].get_position()
-            figure.text(place.x0, place.y1 + 0.035, _told(step), fontsize=9.0, fontweight="bold")
+            top = axes[0, column].get_position()
+            figure.text(top.x0, top.y1 + 0.035, _step_title(step), fontsize=9.0, fontweight="bold")
             axes[-1, column].set_xlabel("time (s)")
     return figure
 
@@ -214,7 +242,7 @@ def _answer(axes: Any, step: StepResponse, row: int) -> None:
     axes.set_axisbelow(True)
 
 
-def _told(step: StepResponse) -> str:
+def _step_title(step: StepResponse) -> str:
     name = step.control.name.lower()
     if step.control is C.THROTTLE:
         size = f"{100.0 * step.size:+.0f} %"
@@ -225,12 +253,12 @@ def _told(step: StepResponse) -> str:
 
 
 def _headroom(axes: Any) -> None:
-    """Make room for a legend above the lines."""
+    """Raise the upper limit, so that a legend fits above the lines."""
     low, high = axes.get_ylim()
     axes.set_ylim(low, high + 0.3 * (high - low))
 
 
-def _used(axes: Any, aircraft: Aircraft) -> None:
+def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:
     """Shade the speeds that guidance uses, and mark cruise."""
     axes.axvspan(aircraft.airspeed_min, aircraft.airspeed_max, color="#000000", alpha=0.05, linewidth=0)
     axes.axvline(aircraft.airspeed, color=style.QUIET, linewidth=0.8, linestyle=":")
@@ -244,7 +272,7 @@ def _frame(axes: Any, title: str, x: str, y: str) -> None:
     axes.set_axisbelow(True)
 
 
-def _title(figure: Figure, title: str, told: str) -> None:
+def _title(figure: Figure, title: str, subtitle: str) -> None:
     high = figure.get_figheight()
     figure.text(0.06, 1.0 - 0.28 / high, title, fontsize=12, fontweight="bold", va="center")
-    figure.text(0.06, 1.0 - 0.55 / high, told, fontsize=8.5, color=style.QUIET, va="center")
+    figure.text(0.06, 1.0 - 0.55 / high, subtitle, fontsize=8.5, color=style.QUIET, va="center")

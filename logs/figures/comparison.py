@@ -1,4 +1,4 @@
-"""Two flights in one picture: from above, and over the distance flown."""
+"""Two flights in one picture: over the first one's map, and as panels over the distance flown."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
-from logs.figures.elements.panels import Axis, Line, Panel, draw_panels, singles
+from logs.figures.elements.panels import Axis, Panel, Series, doubles, draw_panels
 from logs.figures.map import draw_map
 
 Floats = NDArray[np.float64]
@@ -29,14 +29,14 @@ class NamedFlight:
 
 
 def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
-    """Draw the first flight's map with the second's route and track over it."""
+    """Draw the first flight's map and route with both tracks over it."""
     first, _ = flights
     both = Track(
         *(np.concatenate([getattr(flight.track, name) for flight in flights]) for name in Track.__dataclass_fields__)
     )
     setup = first.setup
     paths: dict[str, Any] = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
-    # The view holds both tracks; the line that joins them is taken out again.
+    # The map holds both tracks; the line that joins them is taken out again.
     figure = draw_map(setup.scenario, **paths, track=both, verdict=None)
     axes = figure.axes[0]
     next(line for line in axes.lines if line.get_label() == "flown track").remove()
@@ -54,33 +54,45 @@ def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
     return figure
 
 
-def draw_overlay(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
+def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
     """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle."""
     flown = [_distance(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
 
-    def lines(values: list[Floats]) -> list[Line]:
+    def series(values: list[Floats]) -> list[Series]:
         looks: tuple[dict[str, Any], dict[str, Any]] = (
             {"color": style.FLOWN, "width": 1.6},
             {"color": _SECOND, "width": 1.1, "dashes": (0, (4, 1.2))},
         )
         return [
-            Line(style.shorten(flight.name, 22), np.interp(along, distance, value, right=np.nan), **look)
+            Series(style.shorten(flight.name, 22), np.interp(along, distance, value, right=np.nan), **look)
             for flight, distance, value, look in zip(flights, flown, values, looks, strict=True)
         ]
 
     tracks = [flight.track for flight in flights]
     panels = [
-        Panel("height\n(m AMSL)", lines([track.position[:, 2] for track in tracks])),
-        Panel("height above\nground (m)", lines([_above(flight) for flight in flights])),
-        Panel("airspeed\n(m/s)", lines([singles(track.airspeed) for track in tracks]), least_span=4.0),
-        Panel("bank, right +\n(°)", lines([np.degrees(singles(track.attitude[:, 0])) for track in tracks])),
-        Panel("cross-track,\nright + (m)", lines([singles(track.cross_track) for track in tracks]), least_span=2.0),
-        Panel("throttle\n(%)", lines([100.0 * singles(track.controls[:, 3]) for track in tracks])),
+        Panel("height\n(m AMSL)", series([track.position[:, 2] for track in tracks])),
+        Panel("height above\nground (m)", series([_above(flight) for flight in flights])),
+        Panel("airspeed\n(m/s)", series([doubles(track.airspeed) for track in tracks]), least_span=4.0),
+        Panel("bank, right +\n(°)", series([np.degrees(doubles(_roll(track))) for track in tracks])),
+        Panel("cross-track,\nright + (m)", series([doubles(track.cross_track) for track in tracks]), least_span=2.0),
+        Panel("throttle\n(%)", series([100.0 * doubles(_throttle(track)) for track in tracks])),
     ]
     return draw_panels(
         "Two flights along their way", panels, Axis("distance flown over the ground (km)", along / 1e3), None
     )
+
+
+def _roll(track: Track) -> NDArray[np.float32]:
+    roll: NDArray[np.float32]
+    roll, _, _ = track.attitude.T
+    return roll
+
+
+def _throttle(track: Track) -> NDArray[np.float32]:
+    throttle: NDArray[np.float32]
+    _, _, _, throttle = track.controls.T
+    return throttle
 
 
 def _distance(track: Track) -> Floats:

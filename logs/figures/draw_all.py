@@ -1,6 +1,6 @@
 """The pictures of a plan and its flight, ready for a file or a page.
 
-`logs.figures.map` and its sisters draw them.  Importing this module imports matplotlib (most of a second): commands
+Each is drawn by a module of `logs.figures`.  Importing this module imports matplotlib (most of a second): commands
 import it when they draw.
 """
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements.style import png_bytes, svg_bytes
-from logs.figures.envelope import draw_envelope
+from logs.figures.envelope import draw_envelope_and_flight
 from logs.figures.exposure import draw_exposure
 from logs.figures.map import draw_map
 from logs.figures.profile import draw_profile
@@ -40,7 +40,7 @@ def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> d
         "profile": draw_profile(setup.scenario, **paths, track=flown, verdict=verdict),
         "scene": draw_scene(setup, flown, verdict),
         "turns": draw_turns(setup.scenario.name, verdict),
-        "envelope": draw_envelope(setup, flown),
+        "envelope": draw_envelope_and_flight(setup, flown),
     }
     if flown is not None:
         found |= {
@@ -65,5 +65,13 @@ def draw_pictures(setup: FlightSetup, track: Track | None, verdict: Verdict, *, 
 
 
 def write_png(figure: Figure, path: Path) -> None:
-    """Write the figure as a PNG, whole or not at all.  Raises OSError."""
+    """Write the figure as a PNG, whole or not at all.  Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.figures.elements.style import new_figure
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     write_png(new_figure(2.0), Path(folder) / "empty.png")
+    ...     (Path(folder) / "empty.png").read_bytes()[1:4]
+    b'PNG'
+    """
     write_whole(path, png_bytes(figure))

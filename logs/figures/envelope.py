@@ -1,4 +1,4 @@
-"""The envelope and what was asked of it: climb and descent over airspeed, and bank over airspeed."""
+"""The aircraft's envelope and a flight in it: climb and descent over airspeed, and bank over airspeed."""
 
 from typing import Any
 
@@ -18,7 +18,7 @@ _HEIGHT, _TOP, _BOTTOM = 4.9, 0.62, 1.2
 _MOST_DOTS = 4000
 
 
-def draw_envelope(setup: FlightSetup, track: Track | None) -> Figure:
+def draw_envelope_and_flight(setup: FlightSetup, track: Track | None) -> Figure:
     """Two panels over true airspeed (m/s): path angle through the air with the trims' limits, and bank with its limit.
 
     Limits at the lowest and highest height of the route.  Dots: the flight, one each fraction of a second; a pull-up
@@ -51,8 +51,8 @@ def draw_envelope(setup: FlightSetup, track: Track | None) -> Figure:
         slope_axes.set_title(
             f"{name}: the {style.shorten(setup.aircraft, 20)}'s envelope and this flight", fontweight="bold"
         )
-        where: dict[str, Any] = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0}
-        slope_axes.legend(bbox_to_anchor=(0.0, -0.17), **where)
+        anchor: dict[str, Any] = {"loc": "upper left", "ncols": 2, "borderaxespad": 0.0}
+        slope_axes.legend(bbox_to_anchor=(0.0, -0.17), **anchor)
         bank_axes.legend(bbox_to_anchor=(0.0, -0.17), loc="upper left", borderaxespad=0.0)
     return figure
 
@@ -62,10 +62,10 @@ def _limits(axes: Any, setup: FlightSetup) -> None:
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
     heights = sorted({round(float(up.min())), round(float(up.max()))})
     for amsl, dashes in zip(heights, ("-", (0, (5, 2))), strict=False):
-        angles = np.degrees([envelope.air_angles(float(speed), float(amsl)) for speed in speeds])
+        climb, descent = np.degrees([envelope.air_angles(float(speed), float(amsl)) for speed in speeds]).T
         axes.plot(
             speeds,
-            angles[:, 0],
+            climb,
             linestyle=dashes,
             color=style.MISSILE,
             linewidth=1.8,
@@ -73,7 +73,7 @@ def _limits(axes: Any, setup: FlightSetup) -> None:
         )
         axes.plot(
             speeds,
-            -angles[:, 1],
+            -descent,
             linestyle=dashes,
             color=style.BLUE,
             linewidth=1.8,
@@ -91,9 +91,11 @@ def _planned(axes: Any, setup: FlightSetup) -> None:
 def _flown(slope_axes: Any, bank_axes: Any, track: Track) -> None:
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_DOTS)).astype(np.intp))
     air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
-    angle = np.degrees(np.arctan2(air[:, 2], np.hypot(air[:, 0], air[:, 1])))
+    east, north, up = air.T
+    angle = np.degrees(np.arctan2(up, np.hypot(east, north)))
     speed = track.airspeed[rows].astype(np.float64)
-    bank = np.degrees(np.abs(track.attitude[rows, 0].astype(np.float64)))
+    roll, _, _ = track.attitude[rows].T
+    bank = np.degrees(np.abs(roll.astype(np.float64)))
     look: dict[str, Any] = {"markersize": 2.2, "alpha": 0.28, "color": style.FLOWN, "markeredgewidth": 0, "zorder": 3}
     good = np.isfinite(speed) & np.isfinite(angle) & np.isfinite(bank)
     slope_axes.plot(speed[good], angle[good], "o", label="flown, moment by moment", **look)

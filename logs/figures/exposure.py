@@ -1,4 +1,4 @@
-"""Exposure along the flown track: how strongly missiles and radars reach it, and what that adds up to."""
+"""Exposure along the flown track: its strength, from missiles and from radars, and its sum over time."""
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, Track
 from logs.figures.elements import style
-from logs.figures.elements.panels import Axis, Line, Panel, draw_panels
+from logs.figures.elements.panels import Axis, Panel, Series, draw_panels
 from world.geometry import segment_exposure
 from world.kernels import compiled
 
@@ -35,12 +35,13 @@ def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> 
     for k in range(count):
         for m in range(centres.shape[0]):
             if radii[m] > 0.0:
-                out[k] += segment_exposure(position[k], position[k + 1], centres[m], radii[m], scales[m])[1]
+                _, rate = segment_exposure(position[k], position[k + 1], centres[m], radii[m], scales[m])
+                out[k] += rate
     return out
 
 
 def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
-    """Strength and sum of kill and of detection along the flown distance (km), where units have such a reach.
+    """Strength and sum of kill and of detection along the flown distance (km), as far as units have such a radius.
 
     None without threats.
     """
@@ -63,9 +64,9 @@ def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
             continue
         rate = exposure_rates(position, threats.position, radii, scales)
         total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(rate) * np.diff(time))])
-        strength = Line("strength", np.append(rate, rate[-1]), color=colour, filled=True)
+        strength = Series("strength", np.append(rate, rate[-1]), color=colour, filled=True)
         panels.append(Panel(f"{name}\nstrength (1)", [strength]))
-        panels.append(Panel(f"{name}\nso far (s)", [Line("sum over time", total, color=colour, width=1.6)]))
+        panels.append(Panel(f"{name}\nso far (s)", [Series("sum over time", total, color=colour, width=1.6)]))
     if not panels:
         return None
     whole = Track(*(getattr(track, item)[rows] for item in COLUMNS))

@@ -24,7 +24,7 @@ from world.threats import Threats
 
 Floats = NDArray[np.float64]
 
-# Inches: the map's own room, and what stands around it.
+# Inches: the map's own width, and what stands around it.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55
 _RIGHT_COLUMN = 8.72
 _LEAST_HEIGHT = 3.6
@@ -35,7 +35,7 @@ _MOST_NAMES, _MOST_NUMBERS, _MOST_DOTS = 80, 40, 80
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class MapExtent:
     """The rectangle that the map shows, m."""
 
     east: tuple[float, float]
@@ -63,8 +63,8 @@ def draw_map(
     """
     route = route_waypoints if route_waypoints is not None else plan_waypoints
     with style.clean_style():
-        view = _view(scenario, route, track)
-        figure, axes, legend_top = _frame(view, scenario, track is not None)
+        extent = _extent(scenario, route, track)
+        figure, axes, legend_top = _frame(extent, scenario, track is not None)
         around = draw_ground(figure, axes, scenario.terrain, _RIGHT_COLUMN, _TOP)
         around += _area(axes, scenario)
         around += draw_threat_circles(axes, scenario.threats, route)
@@ -87,7 +87,7 @@ def draw_map(
     return figure
 
 
-def _view(scenario: Scenario, route: Floats | None, track: Track | None) -> View:
+def _extent(scenario: Scenario, route: Floats | None, track: Track | None) -> MapExtent:
     """Area of the scenario, widened to what lies outside it, with a rim, inside the allowed aspects."""
     points = [scenario.bounds.T, scenario.start[None, :2], scenario.destination[None, :2]]
     if route is not None:
@@ -96,26 +96,26 @@ def _view(scenario: Scenario, route: Floats | None, track: Track | None) -> View
         points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
     together = np.vstack(points)
     low, high = together.min(axis=0), together.max(axis=0)
-    rim = 0.015 * float((high - low).max())
-    low, high = low - rim, high + rim
+    padding = 0.015 * float((high - low).max())
+    low, high = low - padding, high + padding
     width, height = (high - low).tolist()
     grown = np.array([max(width, height / _ASPECTS[1]), max(height, width * _ASPECTS[0])])
     middle = 0.5 * (low + high)
     low, high = middle - 0.5 * grown, middle + 0.5 * grown
-    return View((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
+    return MapExtent((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
 
 
-def _frame(view: View, scenario: Scenario, flown: bool) -> tuple[Figure, Any, float]:
+def _frame(extent: MapExtent, scenario: Scenario, flown: bool) -> tuple[Figure, Any, float]:
     """Figure, axes, and the height (inches) under which the legend stands."""
-    height = _MAP_WIDTH * view.aspect
-    room = max(height, _LEAST_HEIGHT)
-    legend_room = 1.0
-    total = _TOP + room + _BOTTOM + legend_room
+    height = _MAP_WIDTH * extent.aspect
+    tall = max(height, _LEAST_HEIGHT)
+    legend_height = 1.0
+    total = _TOP + tall + _BOTTOM + legend_height
     figure = style.new_figure(total)
-    base = legend_room + _BOTTOM + 0.5 * (room - height)
+    base = legend_height + _BOTTOM + 0.5 * (tall - height)
     axes = figure.add_axes((_LEFT / style.WIDTH, base / total, _MAP_WIDTH / style.WIDTH, height / total))
-    axes.set(xlim=view.east, ylim=view.north, aspect="equal", facecolor="#f4f4f4")
-    step = style.nice_step(max(np.ptp(view.east), np.ptp(view.north)), 14)
+    axes.set(xlim=extent.east, ylim=extent.north, aspect="equal", facecolor="#f4f4f4")
+    step = style.nice_step(max(np.ptp(extent.east), np.ptp(extent.north)), 14)
     kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(MultipleLocator(step))
@@ -126,7 +126,7 @@ def _frame(view: View, scenario: Scenario, flown: bool) -> tuple[Figure, Any, fl
     axes.set_title(
         f"{style.shorten(scenario.name, 60)}: {'plan and flight' if flown else 'plan'} from above", fontweight="bold"
     )
-    return figure, axes, (legend_room - 0.02) / total
+    return figure, axes, (legend_height - 0.02) / total
 
 
 def _area(axes: Any, scenario: Scenario) -> list[Any]:
@@ -250,17 +250,17 @@ def _number_waypoints(scenario: Scenario, route: Floats, failed: Failures, place
 
 
 def _fail_labels(route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    """Say what fails, in words, beside the first dozen of the failing places."""
+    """Name the rules that fail beside the first dozen of the failing legs and waypoints."""
     middles = 0.5 * (route[:-1] + route[1:])
-    places = [(f"leg {k}: {', '.join(rules)}", middles[k]) for k, rules in failed.legs.items()]
-    places += [(f"waypoint {k}: {', '.join(rules)}", route[k]) for k, rules in failed.waypoints.items()]
+    labels = [(f"leg {k}: {', '.join(rules)}", middles[k]) for k, rules in failed.legs.items()]
+    labels += [(f"waypoint {k}: {', '.join(rules)}", route[k]) for k, rules in failed.waypoints.items()]
     frame: dict[str, Any] = {
         "boxstyle": "round,pad=0.2",
         "facecolor": "white",
         "edgecolor": style.FAIL,
         "linewidth": 0.9,
     }
-    for text, point in places[:12]:
+    for text, point in labels[:12]:
         placer.place(text, float(point[0]), float(point[1]), size=7.0, gap=16.0, color=style.FAIL, bbox=frame)
 
 

@@ -1,4 +1,4 @@
-"""A flight as a film: the map, the aircraft on it with its trail, and its numbers, frame by frame.
+"""The frames of a movie of a flight: the map, the aircraft on it with its trail, and its numbers.
 
 The same log and rate give the same frames, whatever the clock.  The map is drawn once; a frame adds what moves.
 """
@@ -31,8 +31,17 @@ _TRAIL = 4000
 
 
 @dataclass(frozen=True, slots=True)
-class Film:
-    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown."""
+class MovieFrames:
+    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> movie = MovieFrames(log.setup, log.track, 0.0, log.end_time, speed=10.0)
+    >>> len(movie), movie.times()[:2]
+    (45, array([0. , 0.83333333]))
+    >>> next(movie.frames()).shape
+    (726, 1000, 3)
+    """
 
     setup: FlightSetup
     track: Track
@@ -61,23 +70,23 @@ class Film:
             axes.set_title(f"{style.shorten(setup.scenario.name, 60)}: the flight", fontweight="bold")
             canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
             ground = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]  # nor here
-            moving = _Moving(figure, axes, setup, track)
+            moving = _MovingParts(figure, axes, setup, track)
             for time in self.times():
                 canvas.restore_region(ground)  # type: ignore[no-untyped-call]  # nor here
                 moving.show(float(time))
-                shown: Pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]  # nor here
-                yield shown[: len(shown) // 2 * 2, : shown.shape[1] // 2 * 2].copy()
+                pixels: Pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]  # nor here
+                yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
 
 
-class _Moving:
-    """What moves over the map: trail, aircraft, numbers."""
+class _MovingParts:
+    """Trail, aircraft and numbers, which move over the map."""
 
     def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
         self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
         look: dict[str, Any] = {"animated": True, "zorder": 9}
         (self._trail,) = axes.plot([], [], color=style.FLOWN, linewidth=1.6, **look)
         (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color="#B0408A", **look)
-        self._words = figure.text(
+        self._text = figure.text(
             0.02, 0.018, "", family="monospace", fontsize=9.5, va="bottom", animated=True,
             bbox={"facecolor": "white", "edgecolor": "#bbbbbb", "pad": 4.0},
         )  # fmt: skip
@@ -94,31 +103,32 @@ class _Moving:
         track = self._track
         k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
         rows = np.append(np.arange(0, k, self._step), k)
-        place = track.position[rows]
-        self._trail.set_data(place[:, 0], place[:, 1])
-        yaw = float(track.attitude[k, 2])
+        trail = track.position[rows]
+        self._trail.set_data(trail[:, 0], trail[:, 1])
+        _, _, yaw = track.attitude[k].tolist()
         turned = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
         self._aircraft.set_marker(MarkerStyle(_PLANE, transform=turned))
         self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
-        self._words.set_text(self._line(k))
+        self._text.set_text(self._line(k))
         for artist in (self._trail, self._aircraft):
             self._axes.draw_artist(artist)
-        self._figure.draw_artist(self._words)
+        self._figure.draw_artist(self._text)
 
     def _line(self, k: int) -> str:
         track = self._track
+        roll, _, _ = track.attitude[k].tolist()
         parts = [
             f"{float(track.time[k]):7.1f} s",
             f"leg {int(track.leg[k])} of {self._setup.route.legs}",
-            f"{_n(float(track.airspeed[k]), 1)} m/s",
-            f"{_n(float(track.position[k, 2]), 0)} m AMSL",
-            f"{_n(float(self._above[k]), 0)} m above ground",
-            f"bank {_n(math.degrees(float(track.attitude[k, 0])), 0)}°",
+            f"{_number(float(track.airspeed[k]), 1)} m/s",
+            f"{_number(float(track.position[k, 2]), 0)} m AMSL",
+            f"{_number(float(self._above[k]), 0)} m above ground",
+            f"bank {_number(math.degrees(roll), 0)}°",
         ]
         return "   ".join(parts)
 
 
-def _n(value: float, digits: int) -> str:
+def _number(value: float, digits: int) -> str:
     return f"{value:.{digits}f}" if math.isfinite(value) else "?"
 
 

@@ -1,4 +1,4 @@
-"""Figures of the paper's experiment: paths of many runs, one path of each encoding, convergence over generations."""
+"""Figures of the paper's experiment: paths of many searches, one of each encoding, convergence over generations."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 # Inches: as the map's.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND = 0.72, 7.72, 0.5, 0.55, 0.85
 _COLUMN = 8.72
-# One look for each algorithm of a figure, told apart without colour too.
+# One look for each algorithm of a figure, distinct without colour too.
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.BLUE, "linestyle": "-"},
     {"color": style.FAIL, "linestyle": (0, (5, 1.5))},
@@ -33,48 +33,65 @@ _MARKERS = ("o", "s", "^")
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """One path: waypoints (w, 3) m, its length ratio, and whether it is safe on the paper's points."""
+class PaperPath:
+    """One path: waypoints (w, 3) m, its length ratio, and whether it is safe at the paper's sample points."""
 
     waypoints: Floats
     length_ratio: float
     safe: bool
 
 
-def draw_paths(scenario: Scenario, algorithm: str, lines: Sequence[Line]) -> Figure:
-    """All runs of one algorithm over contours, missile and radar circles (the paper's Figs. 5-8)."""
-    safe = sum(line.safe for line in lines)
-    title = f"{scenario.name}: {len(lines)} runs of {algorithm}, {safe} safe"
+def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
+    """Paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
+
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> figure = draw_paths(setup.scenario, "umda", [PaperPath(setup.route.waypoints, 1.01, safe=True)])
+    >>> figure.axes[0].get_title(loc="left")
+    'example: 1 runs of umda, 1 safe'
+    """
+    safe = sum(path.safe for path in paths)
+    title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
     with style.clean_style():
         figure, axes, around = _map(scenario, title)
         handles: list[Any] = []
-        for good, look, word in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
-            chosen = [line for line in lines if line.safe == good]
-            for line in chosen:
-                axes.plot(*line.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
-                axes.plot(*line.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
+        for good, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
+            chosen = [path for path in paths if path.safe == good]
+            for path in chosen:
+                axes.plot(*path.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
+                axes.plot(*path.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
             if chosen:
-                ratios = [line.length_ratio for line in chosen]
+                ratios = [path.length_ratio for path in chosen]
                 span = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
-                text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {word}\nPLR {span}"
+                text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {label}\nPLR {span}"
                 handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
-        handles += _ends(axes, scenario, [line.waypoints for line in lines])
+        handles += _ends(axes, scenario, [path.waypoints for path in paths])
         draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
 
-def draw_encodings(scenario: Scenario, chosen: Mapping[str, Line], seed: int) -> Figure:
-    """One path of each encoding over the same map (the paper's Figs. 9-12)."""
+def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: int) -> Figure:
+    """One path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
+
+    chosen: paths by encoding.
+
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> path = PaperPath(setup.route.waypoints, 1.01, safe=True)
+    >>> figure = draw_encodings(setup.scenario, {"rotated": path, "cartesian": path}, seed=1)
+    >>> figure.axes[0].get_title(loc="left")
+    'example: one path of each encoding, seed 1'
+    """
     with style.clean_style():
         figure, axes, around = _map(scenario, f"{scenario.name}: one path of each encoding, seed {seed}")
         handles = []
-        for (name, line), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
+        for (name, path), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
             axes.plot(
-                *line.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **look
+                *path.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **look
             )
-            text = f"{name}\n{'safe' if line.safe else 'not safe'}, PLR {line.length_ratio:.3f}"
+            text = f"{name}\n{'safe' if path.safe else 'not safe'}, PLR {path.length_ratio:.3f}"
             handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
-        handles += _ends(axes, scenario, [line.waypoints for line in chosen.values()])
+        handles += _ends(axes, scenario, [path.waypoints for path in chosen.values()])
         draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
@@ -82,13 +99,13 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, Line], seed: int) ->
 def _map(scenario: Scenario, title: str) -> tuple[Figure, Any, list[Any]]:
     """Ground and threats; returns figure, axes and the legend's entries for them."""
     low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
-    rim = 0.02 * float((high - low).max())
-    tall = _MAP_WIDTH * float((high[1] - low[1] + 2 * rim) / (high[0] - low[0] + 2 * rim))
+    padding = 0.02 * float((high - low).max())
+    tall = _MAP_WIDTH * float((high[1] - low[1] + 2 * padding) / (high[0] - low[0] + 2 * padding))
     total = _TOP + tall + _BOTTOM + _LEGEND
     figure = style.new_figure(total)
     base = (_LEGEND + _BOTTOM) / total
     axes = figure.add_axes((_LEFT / style.WIDTH, base, _MAP_WIDTH / style.WIDTH, tall / total))
-    axes.set(xlim=(low[0] - rim, high[0] + rim), ylim=(low[1] - rim, high[1] + rim), aspect="equal")
+    axes.set(xlim=(low[0] - padding, high[0] + padding), ylim=(low[1] - padding, high[1] + padding), aspect="equal")
     kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
     step = style.nice_step(float((high - low).max()), 12)
     for axis in (axes.xaxis, axes.yaxis):
@@ -123,10 +140,15 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
 
 
 def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
-    """Over generations: how many runs hold a safe path, and the length ratio of the safe ones.
+    """Over generations: how many searches hold a safe path, and the length ratio of the safe ones.
 
-    histories: for each number of threats and each algorithm the runs' (g, 3) length ratio, kill exposure and
+    histories: for each number of threats and each algorithm the searches' (g, 3) length ratio, kill exposure and
     violations of the best path yet.
+
+    >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
+    >>> figure = draw_convergence({30: {"umda": [history]}})
+    >>> figure.axes[0].get_title(loc="left"), figure.axes[1].get_ylabel()
+    ('30 threats', 'length ratio of the safe ones')
     """
     count = len(histories)
     with style.clean_style():
@@ -138,10 +160,10 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
         for column, (threats, groups) in enumerate(histories.items()):
             upper = figure.add_subplot(grid[0, column])
             lower = figure.add_subplot(grid[1, column], sharex=upper)
-            for (name, runs), look in zip(groups.items(), _LOOKS, strict=False):
-                _converge(upper, lower, runs, look)
+            for (name, searches), look in zip(groups.items(), _LOOKS, strict=False):
+                _converge(upper, lower, searches, look)
                 names = names if name in names else [*names, name]
-            most = max(len(runs) for runs in groups.values())
+            most = max(len(searches) for searches in groups.values())
             upper.set(ylim=(-0.04 * most, 1.06 * most), title=f"{threats} threats")
             upper.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
             upper.tick_params(labelbottom=False)
@@ -166,14 +188,17 @@ def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) ->
     return figure
 
 
-def _converge(upper: Any, lower: Any, runs: Sequence[Floats], look: Mapping[str, Any]) -> None:
-    """One algorithm on one problem; a run that ended early keeps its last value."""
-    length = max(len(run) for run in runs)
-    stacked = np.stack([np.vstack([run, np.repeat(run[-1:], length - len(run), axis=0)]) for run in runs])
-    safe = (stacked[..., 2] == 0.0) & (stacked[..., 1] == 0.0)
+def _converge(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
+    """One algorithm on one problem; a search that ended early keeps its last value."""
+    length = max(len(history) for history in histories)
+    stacked = np.stack(
+        [np.vstack([history, np.repeat(history[-1:], length - len(history), axis=0)]) for history in histories]
+    )
+    length_ratio, kill, violations = np.moveaxis(stacked, -1, 0)
+    safe = (violations == 0.0) & (kill == 0.0)
     generation = np.arange(length)
     upper.plot(generation, safe.sum(axis=0), linewidth=1.6, **look)
-    ratios = np.where(safe, stacked[..., 0], np.nan)
+    ratios = np.where(safe, length_ratio, np.nan)
     known = safe.any(axis=0)
     if not known.any():
         return

@@ -71,7 +71,7 @@ def draw_profile(
             _numbers(axes, at, route, failed, placer)
         _name_threats(axes, names, placer)
         _fail_labels(at, route, failed, placer)
-        _words(figure, axes, scenario, straight)
+        _label_axes(figure, axes, scenario, straight)
         draw_legend(figure, lines + handles + threat_handles, _LEFT, (_BOTTOM - 0.58) / _HEIGHT)
     return figure
 
@@ -157,13 +157,22 @@ def _failing(axes: Any, at: Floats, route: Floats, failed: Failures) -> list[Any
         )
         axes.fill_between(ends, low, low + 0.025 * (high - low), color=style.FAIL, linewidth=0, zorder=8)
     for waypoint in failed.waypoints:
-        place = (kilometres[waypoint], route[waypoint, 2])
-        axes.plot(*place, "o", markersize=12, mfc="none", mec=style.FAIL, mew=2.2, zorder=7.5, clip_on=False)
+        axes.plot(
+            kilometres[waypoint],
+            route[waypoint, 2],
+            "o",
+            markersize=12,
+            mfc="none",
+            mec=style.FAIL,
+            mew=2.2,
+            zorder=7.5,
+            clip_on=False,
+        )
     return failing_handles(failed)
 
 
 def _ceiling(axes: Any, scenario: Scenario) -> list[Any]:
-    """Ceiling and floor as lines, or as words in the legend where they lie outside the picture."""
+    """Ceiling and floor as lines, or as text in the legend where they lie outside the picture."""
     handles: list[Any] = []
     if scenario.external:
         return handles
@@ -186,18 +195,18 @@ def _numbers(axes: Any, at: Floats, route: Floats, failed: Failures, placer: Lab
     step = max(1, -(-len(route) // _MOST_NUMBERS))
     for number in range(len(route)):
         if number % step == 0 or number in failed.waypoints or number == len(route) - 1:
-            place = (float(at[number]) / 1000.0, float(route[number, 2]))
-            placer.place(str(number), *place, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
+            point = (float(at[number]) / 1000.0, float(route[number, 2]))
+            placer.place(str(number), *point, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
 
 
 def _name_threats(axes: Any, names: list[tuple[str, float, float]], placer: LabelPlacer) -> None:
     """Write each sphere's name over its summit, or under the upper edge of the picture where it reaches that."""
     low, high = axes.get_ylim()
     top = high - 0.03 * (high - low)
-    for name, where, summit in names[:_MOST_NAMES]:
+    for name, middle, summit in names[:_MOST_NAMES]:
         placer.place(
             style.shorten(name, 20),
-            where,
+            middle,
             min(top, summit + 0.02 * (high - low)),
             size=6.5,
             gap=2.0,
@@ -207,22 +216,22 @@ def _name_threats(axes: Any, names: list[tuple[str, float, float]], placer: Labe
 
 
 def _fail_labels(at: Floats, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    places = [
+    labels = [
         (f"leg {k}: {', '.join(rules)}", 0.5 * (at[k] + at[k + 1]), 0.5 * (route[k, 2] + route[k + 1, 2]))
         for k, rules in failed.legs.items()
     ]
-    places += [(f"waypoint {k}: {', '.join(rules)}", at[k], route[k, 2]) for k, rules in failed.waypoints.items()]
+    labels += [(f"waypoint {k}: {', '.join(rules)}", at[k], route[k, 2]) for k, rules in failed.waypoints.items()]
     frame: dict[str, Any] = {
         "boxstyle": "round,pad=0.2",
         "facecolor": "white",
         "edgecolor": style.FAIL,
         "linewidth": 0.9,
     }
-    for text, where, amsl in places[:12]:
-        placer.place(text, float(where) / 1000.0, float(amsl), size=7.0, gap=18.0, color=style.FAIL, bbox=frame)
+    for text, distance, amsl in labels[:12]:
+        placer.place(text, float(distance) / 1000.0, float(amsl), size=7.0, gap=18.0, color=style.FAIL, bbox=frame)
 
 
-def _words(figure: Figure, axes: Any, scenario: Scenario, straight: bool) -> None:
+def _label_axes(figure: Figure, axes: Any, scenario: Scenario, straight: bool) -> None:
     frame = axes.get_window_extent()
     across = np.ptp(axes.get_xlim()) * 1000.0 / frame.width
     stretch = across / (np.ptp(axes.get_ylim()) / frame.height)

@@ -1,4 +1,4 @@
-"""The 3-D picture: ground, threats, plan and flight seen from aside, for paper and for where no script runs."""
+"""The 3-D picture: ground, threats, plan and flight from aside, for paper and for where no script runs."""
 
 import math
 from dataclasses import dataclass
@@ -31,15 +31,19 @@ _MOST_NUMBERS, _MOST_NAMES = 40, 30
 
 
 @dataclass(frozen=True, slots=True)
-class Eye:
-    """A parallel view: azimuth (rad) of the direction from the middle to the eye, and how heights are stretched."""
+class Projection:
+    """A parallel projection.
+
+    azimuth: rad, from east to north, of the direction from the middle to the viewer.  middle: (3,) m.  stretch: of
+    heights.
+    """
 
     azimuth: float
     middle: Floats
     stretch: float
 
     def project(self, points: Floats) -> Floats:
-        """Picture coordinates (..., 2), m, and depth towards the eye as third: (..., 3) from (..., 3)."""
+        """Picture coordinates in m and, as the third, depth towards the viewer: (..., 3) from (..., 3)."""
         e, n, u = np.moveaxis(points - self.middle, -1, 0)
         out, side = math.cos(self.azimuth), math.sin(self.azimuth)
         across = -side * e + out * n
@@ -50,42 +54,42 @@ class Eye:
 
     @property
     def toward(self) -> Floats:
-        """Step in world axes, 1 m on the ground, that leads to the eye."""
+        """Step in world axes, 1 m on the ground, that leads to the viewer."""
         return np.array([math.cos(self.azimuth), math.sin(self.azimuth), math.tan(_ELEVATION) / self.stretch])
 
 
 def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None) -> Figure:
-    """Draw the scene from across the way from start to destination, heights stretched as the title says.
+    """Draw the scene from aside of the line from start to destination, heights stretched by the factor in the title.
 
-    Dashed and thin: behind a ridge.
+    Lines are dashed and thin behind a ridge.
     """
     bounds = scene_bounds(setup, track)
     terrain = setup.scenario.terrain
     grid = ground_grid(terrain, bounds, _MOST_CELLS)
     route = setup.route.waypoints
-    eye = _eye(route, bounds, exaggeration(setup, bounds, grid))
+    projection = _projection(route, bounds, exaggeration(setup, bounds, grid))
     failed = failures(verdict, len(route))
     with style.clean_style():
-        figure, axes = _frame(setup, eye, bounds, grid)
-        handles = _ground(axes, eye, grid, bounds)
-        handles += _threats(axes, eye, setup)
+        figure, axes = _frame(setup, projection, bounds, grid)
+        handles = _ground(axes, projection, grid, bounds)
+        handles += _threats(axes, projection, setup)
         placer = LabelPlacer(axes)
-        handles += _paths(axes, eye, terrain, route, track, failed, placer)
-        _labels(setup, eye, route, failed, placer)
+        handles += _paths(axes, projection, terrain, route, track, failed, placer)
+        _labels(setup, projection, route, failed, placer)
         name = style.shorten(setup.scenario.name, 60)
-        times = "true to scale" if eye.stretch == 1.0 else f"heights × {eye.stretch:g}"
-        side = _direction(eye.azimuth)
+        times = "true to scale" if projection.stretch == 1.0 else f"heights × {projection.stretch:g}"
+        side = _direction(projection.azimuth)
         axes.set_title(f"{name}: seen from the {side}, {times}", fontweight="bold")
         draw_legend(figure, handles, _LEFT + 0.1, (_BOTTOM - 0.08) / float(figure.get_figheight()))
     return figure
 
 
-def _eye(route: Floats, bounds: Floats, stretch: float) -> Eye:
+def _projection(route: Floats, bounds: Floats, stretch: float) -> Projection:
     step = route[-1] - route[0]
     azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
     if math.sin(azimuth) > 0.0:
         azimuth += math.pi
-    return Eye(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
+    return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
 def _direction(azimuth: float) -> str:
@@ -93,20 +97,20 @@ def _direction(azimuth: float) -> str:
     return names[round(azimuth / (math.pi / 4.0)) % 8]
 
 
-def _frame(setup: FlightSetup, eye: Eye, bounds: Floats, grid: GroundGrid | None) -> tuple[Figure, Any]:
+def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: GroundGrid | None) -> tuple[Figure, Any]:
     low = float(np.nanmin(grid.heights)) if grid is not None else float(setup.route.waypoints[:, 2].min())
     corners = np.array([[e, n, low] for e in bounds[0] for n in bounds[1]])
     threats = setup.scenario.threats
     tops = threats.position + np.maximum(threats.kill_radius, threats.detection_radius)[:, None] * np.array([0, 0, 1.0])
-    seen = [eye.project(corners), eye.project(setup.route.waypoints), eye.project(tops)]
+    drawn = [projection.project(corners), projection.project(setup.route.waypoints), projection.project(tops)]
     if grid is not None:
         e, n = np.meshgrid(grid.east, grid.north)
-        surface = eye.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
-        seen.append(surface[np.isfinite(surface).all(axis=1)])
-    together = np.vstack(seen)[:, :2]
+        surface = projection.project(np.stack([e, n, grid.heights], axis=-1)).reshape(-1, 3)
+        drawn.append(surface[np.isfinite(surface).all(axis=1)])
+    together = np.vstack(drawn)[:, :2]
     least, most = together.min(axis=0), together.max(axis=0)
-    rim = 0.03 * float((most - least).max())
-    least, most = least - rim, most + rim
+    padding = 0.03 * float((most - least).max())
+    least, most = least - padding, most + padding
     wide = style.WIDTH - _LEFT - _RIGHT
     # A flat scene gets air above and below it.
     short = max(0.0, 3.0 / wide * (most[0] - least[0]) - (most[1] - least[1]))
@@ -123,24 +127,24 @@ def _frame(setup: FlightSetup, eye: Eye, bounds: Floats, grid: GroundGrid | None
     return figure, axes
 
 
-def _ground(axes: Any, eye: Eye, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
+def _ground(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
     """Cells from the farthest to the nearest, shaded by light from the north-west."""
     if grid is None:
-        base = float(eye.middle[2])
+        base = float(projection.middle[2])
         corners = np.array(
             [[e, n, base] for e, n in zip(bounds[0][[0, 1, 1, 0]], bounds[1][[0, 0, 1, 1]], strict=True)]
         )
         axes.add_collection(
-            PolyCollection([eye.project(corners)[:, :2]], facecolor="#f4f4f4", edgecolor="#999999", zorder=1)
+            PolyCollection([projection.project(corners)[:, :2]], facecolor="#f4f4f4", edgecolor="#999999", zorder=1)
         )
         return [Patch(facecolor="#f4f4f4", edgecolor="#999999", label="no terrain: level at mid height")]
     e, n = np.meshgrid(grid.east, grid.north)
-    seen = eye.project(np.stack([e, n, grid.heights], axis=-1))
-    cells = np.stack([seen[:-1, :-1], seen[:-1, 1:], seen[1:, 1:], seen[1:, :-1]], axis=2).reshape(-1, 4, 3)
+    corners = projection.project(np.stack([e, n, grid.heights], axis=-1))
+    cells = np.stack([corners[:-1, :-1], corners[:-1, 1:], corners[1:, 1:], corners[1:, :-1]], axis=2).reshape(-1, 4, 3)
     up_north, up_east = np.gradient(
         np.nan_to_num(grid.heights, nan=float(np.nanmin(grid.heights))), grid.north, grid.east
     )
-    slope_e, slope_n = eye.stretch * up_east, eye.stretch * up_north
+    slope_e, slope_n = projection.stretch * up_east, projection.stretch * up_north
     lit = (0.5 * slope_e - 0.5 * slope_n + 0.8) / np.sqrt(1.14 * (1.0 + slope_e**2 + slope_n**2))
     low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
     colours = LinearSegmentedColormap.from_list("ground", style.GROUND)((grid.heights - low) / max(high - low, 1.0))
@@ -162,12 +166,12 @@ def _ground(axes: Any, eye: Eye, grid: GroundGrid | None, bounds: Floats) -> lis
     return []
 
 
-def _threats(axes: Any, eye: Eye, setup: FlightSetup) -> list[Any]:
+def _threats(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
     """Outlines of the spheres' upper halves, on the height of their centres."""
     threats = setup.scenario.threats
     handles: list[Any] = []
     # A stretched dome of radius 1: the far half of its outline, and the near half of its foot.
-    tall = math.hypot(math.sin(_ELEVATION), eye.stretch * math.cos(_ELEVATION))
+    tall = math.hypot(math.sin(_ELEVATION), projection.stretch * math.cos(_ELEVATION))
     round_it = np.linspace(0.0, 2.0 * math.pi, 97)
     high = np.where(round_it < math.pi, tall, math.sin(_ELEVATION)) * np.sin(round_it)
     shape = np.column_stack([np.cos(round_it), high])
@@ -181,27 +185,27 @@ def _threats(axes: Any, eye: Eye, setup: FlightSetup) -> list[Any]:
     ):
         some = np.flatnonzero(radii > 0.0)
         for k in some:
-            dome = eye.project(threats.position[k])[:2] + float(radii[k]) * shape
+            dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
             axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **look))
         if some.size:
             handles.append(Patch(linewidth=1.1, label=label, **look))
     return handles
 
 
-def _hidden(eye: Eye, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
-    """Whether the ground stands between each point (n, 3) and the eye."""
+def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:
+    """Whether the ground stands between each point (n, 3) and the viewer."""
     hidden = np.zeros(len(points), dtype=bool)
     if terrain is None:
         return hidden
     for distance in np.geomspace(2.0 * terrain.spacing, 15_000.0, 70):
-        there = points + distance * eye.toward
+        there = points + distance * projection.toward
         hidden |= terrain.height(there[:, 0], there[:, 1]) > there[:, 2]
     return hidden
 
 
 def _paths(
     axes: Any,
-    eye: Eye,
+    projection: Projection,
     terrain: Terrain | None,
     route: Floats,
     track: Track | None,
@@ -212,18 +216,18 @@ def _paths(
     if terrain is not None:
         under = terrain.height(route[:, 0], route[:, 1])
         feet = np.column_stack([route[:, :2], np.where(np.isfinite(under), under, route[:, 2])])
-        poles = np.stack([eye.project(route)[:, :2], eye.project(feet)[:, :2]], axis=1)
+        poles = np.stack([projection.project(route)[:, :2], projection.project(feet)[:, :2]], axis=1)
         axes.add_collection(LineCollection(list(poles), colors="#555555", linewidths=0.7, zorder=4))
     for leg in failed.legs:
-        ends = eye.project(route[leg : leg + 2])
+        ends = projection.project(route[leg : leg + 2])
         axes.plot(ends[:, 0], ends[:, 1], color=style.FAIL, linewidth=9.0, alpha=0.9, zorder=4.5, solid_capstyle="butt")
-    _line(axes, eye, terrain, samples, style.PLAN, 3.6, 5)
+    _line(axes, projection, terrain, samples, style.PLAN, 3.6, 5)
     handles: list[Any] = [Line2D([], [], color=style.PLAN, linewidth=3.6, label="planned path")]
     if track is not None:
-        _line(axes, eye, terrain, track_rows(track), style.FLOWN, 1.2, 6)
+        _line(axes, projection, terrain, track_rows(track), style.FLOWN, 1.2, 6)
         handles.append(Line2D([], [], color=style.FLOWN, linewidth=1.2, label="flown track"))
-    corners = eye.project(route)
-    placer.avoid(*eye.project(samples)[:, :2].T)
+    corners = projection.project(route)
+    placer.avoid(*projection.project(samples)[:, :2].T)
     axes.plot(corners[:, 0], corners[:, 1], "o", color="white", markeredgecolor=style.BLUE, markersize=3.8, zorder=7)
     for waypoint in failed.waypoints:
         axes.plot(*corners[waypoint, :2], "o", markersize=12, mfc="none", mec=style.FAIL, mew=2.2, zorder=7.5)
@@ -233,21 +237,21 @@ def _paths(
 
 
 def _line(
-    axes: Any, eye: Eye, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
+    axes: Any, projection: Projection, terrain: Terrain | None, points: Floats, colour: str, width: float, order: float
 ) -> None:
     """Draw a path, thin and dashed where the ground hides it."""
-    seen = eye.project(points)
-    hidden = _hidden(eye, terrain, points)
-    open_part = np.where(hidden[:, None], np.nan, seen[:, :2])
+    projected = projection.project(points)
+    hidden = _hidden(projection, terrain, points)
+    open_part = np.where(hidden[:, None], np.nan, projected[:, :2])
     # The hidden rows and their neighbours, so that the two parts meet.
     near = hidden | np.roll(hidden, 1) | np.roll(hidden, -1)
-    shut_part = np.where(near[:, None], seen[:, :2], np.nan)
+    shut_part = np.where(near[:, None], projected[:, :2], np.nan)
     axes.plot(*open_part.T, color=colour, linewidth=width, zorder=order, solid_capstyle="round")
     axes.plot(*shut_part.T, color=colour, linewidth=0.5 * width, alpha=0.6, linestyle=(0, (2, 1.5)), zorder=order)
 
 
-def _labels(setup: FlightSetup, eye: Eye, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    corners = eye.project(route)
+def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
+    corners = projection.project(route)
     last = len(route) - 1
     for k, name in ((0, "start"), (last, "destination")):
         placer.place(name, *corners[k, :2].tolist(), size=8.0, gap=10.0, fontweight="bold")
@@ -257,5 +261,5 @@ def _labels(setup: FlightSetup, eye: Eye, route: Floats, failed: Failures, place
             colour = style.FAIL if k in failed.waypoints else style.BLUE
             placer.place(str(k), *corners[k, :2].tolist(), size=7.5, gap=7.0, color=colour, fontweight="bold")
     threats = setup.scenario.threats
-    for name, place in list(zip(threats.names, eye.project(threats.position), strict=True))[:_MOST_NAMES]:
-        placer.place(style.shorten(name, 20), *place[:2].tolist(), size=6.5, gap=2.0, optional=True)
+    for name, point in list(zip(threats.names, projection.project(threats.position), strict=True))[:_MOST_NAMES]:
+        placer.place(style.shorten(name, 20), *point[:2].tolist(), size=6.5, gap=2.0, optional=True)

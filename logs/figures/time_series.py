@@ -9,7 +9,7 @@ from flight.simulation.control_limits import control_limits, held_at_limit
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
-from logs.figures.elements.panels import Line, Panel, draw_panels, singles, time_axis
+from logs.figures.elements.panels import Panel, Series, doubles, draw_panels, time_axis
 
 _GRAVITY = 9.80665
 # Power is the battery's energy over this long, s: less would show its float32 steps.
@@ -26,43 +26,44 @@ def draw_time_plots(setup: FlightSetup, track: Track) -> Figure:
 
 
 def draw_controls(setup: FlightSetup, track: Track) -> Figure:
-    """Four panels over time: elevator, aileron, rudder and throttle, as asked for and as they stood.
+    """Four panels over time: elevator, aileron, rudder and throttle, as commanded and as they stood.
 
     Shaded where the command is at or beyond the control's limit: the aircraft can give no more.
     """
     commanded: dict[str, Any] = {"color": style.LIMIT, "width": 2.0}
     panels = []
-    for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
+    limits = control_limits(setup.aircraft)
+    for k, ((name, limit), asked, stood) in enumerate(zip(limits, track.commands.T, track.controls.T, strict=True)):
         unit, scale = ("%", 100.0) if name == "throttle" else ("°", 180.0 / np.pi)
-        lines = [
-            Line("commanded", scale * singles(track.commands[:, k]), **commanded),
-            Line("as it stood", scale * singles(track.controls[:, k])),
+        series = [
+            Series("commanded", scale * doubles(asked), **commanded),
+            Series("as it stood", scale * doubles(stood)),
         ]
         low, high = (0.0, 1.0) if name == "throttle" else (-limit, limit)
         known = np.isfinite([low, high]).all()
         edges = [("limits", scale * low), ("", scale * high)] if known else []
-        panels.append(Panel(f"{name}\n({unit})", lines, edges, held=held_at_limit(track, k, low, high)))
+        panels.append(Panel(f"{name}\n({unit})", series, edges, held=held_at_limit(track, k, low, high)))
     return draw_panels(_title(setup, "controls and their limits"), panels, time_axis(track), track)
 
 
 def draw_energy(setup: FlightSetup, track: Track) -> Figure:
     """Four panels over time: battery energy used, power, current, and the aircraft's specific energy as a height."""
     seconds = track.time
-    used = singles(track.energy)
+    used = doubles(track.energy)
     late = np.searchsorted(seconds, seconds - _POWER_WINDOW)
     span = np.maximum(seconds - seconds[late], 1e-9)
     power = np.where(late < np.arange(len(track)), 3600.0 * (used - used[late]) / span, np.nan)
     height = track.position[:, 2]
-    kinetic = singles(track.airspeed) ** 2 / (2.0 * _GRAVITY)
+    kinetic = doubles(track.airspeed) ** 2 / (2.0 * _GRAVITY)
     panels = [
-        Panel("battery energy\nused (Wh)", [Line("used", used, filled=True)]),
-        Panel("power\n(W)", [Line(f"mean of {_POWER_WINDOW:g} s", power)]),
-        Panel("battery\ncurrent (A)", [Line("current", singles(track.current))]),
+        Panel("battery energy\nused (Wh)", [Series("used", used, filled=True)]),
+        Panel("power\n(W)", [Series(f"mean of {_POWER_WINDOW:g} s", power)]),
+        Panel("battery\ncurrent (A)", [Series("current", doubles(track.current))]),
         Panel(
             "energy as\nheight (m)",
             [
-                Line("height and speed", height + kinetic, color=style.BLUE, width=1.6),
-                Line("height alone", height),
+                Series("height and speed", height + kinetic, color=style.BLUE, width=1.6),
+                Series("height alone", height),
             ],
         ),
     ]
@@ -70,28 +71,29 @@ def draw_energy(setup: FlightSetup, track: Track) -> Figure:
     return draw_panels(_title(setup, f"energy, of a battery of {battery}"), panels, time_axis(track), track)
 
 
-def _title(setup: FlightSetup, words: str) -> str:
-    return f"{style.shorten(setup.scenario.name, 60)}: {words}"
+def _title(setup: FlightSetup, subject: str) -> str:
+    return f"{style.shorten(setup.scenario.name, 60)}: {subject}"
 
 
 def _panels(setup: FlightSetup, track: Track) -> list[Panel]:
-    bank = np.degrees(track.attitude[:, 0].astype(np.float64))
+    roll, _, _ = track.attitude.T
+    bank = np.degrees(doubles(roll))
     limit = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
     commanded: dict[str, Any] = {"color": style.LIMIT, "width": 1.8}
     panels = [
         Panel(
             "airspeed\n(m/s)",
-            [Line("commanded", singles(track.speed_command), **commanded), Line("flown", singles(track.airspeed))],
+            [Series("commanded", doubles(track.speed_command), **commanded), Series("flown", doubles(track.airspeed))],
             least_span=4.0,
         ),
-        Panel("bank, right +\n(°)", [Line("flown", bank)], [("limit", limit), ("", -limit)]),
-        Panel("load factor\n(g)", [Line("flown", singles(track.load_factor))], least_span=0.2),
-        Panel("cross-track,\nright + (m)", [Line("as guidance saw it", singles(track.cross_track))], least_span=2.0),
-        Panel("height error,\nhigh + (m)", [Line("as guidance saw it", singles(track.height_error))], least_span=2.0),
+        Panel("bank, right +\n(°)", [Series("flown", bank)], [("limit", limit), ("", -limit)]),
+        Panel("load factor\n(g)", [Series("flown", doubles(track.load_factor))], least_span=0.2),
+        Panel("cross-track,\nright + (m)", [Series("as guidance saw it", doubles(track.cross_track))], least_span=2.0),
+        Panel("height error,\nhigh + (m)", [Series("as guidance saw it", doubles(track.height_error))], least_span=2.0),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:
         ground = terrain.height(track.position[:, 0], track.position[:, 1])
-        above = Line("from track and terrain", track.position[:, 2] - ground)
+        above = Series("from track and terrain", track.position[:, 2] - ground)
         panels.append(Panel("height above\nground (m)", [above], [("required", setup.scenario.limits.min_clearance_m)]))
     return panels

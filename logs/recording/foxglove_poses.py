@@ -1,4 +1,4 @@
-"""What viewers are shown of a flight in progress: where the aircraft is, five times a second, and the track so far."""
+"""The moving part of what viewers show: the pose five times a second, a fix a second, and the track so far."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,15 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from numpy.typing import NDArray
 
 from logs.recording import foxglove_scene as scene
-from logs.recording.chunk_layout import Messages, messages_of, stamped_messages
+from logs.recording.chunk_layout import MessageRecords, single_record, stamped_records
+from logs.recording.protobuf_arrays import (
+    Encoded,
+    as_bytes,
+    fill_doubles,
+    fill_submessage,
+    submessage,
+    tagged_doubles,
+)
 from logs.recording.state_channel import EPOCH_NS, SECOND_NS
 from world.frames import GeoOrigin, to_geo
 
@@ -18,61 +26,53 @@ Ints = NDArray[np.int64]
 TF_TOPIC, FIX_TOPIC, TRACK_TOPIC = "/tf", "/fix", "/scene/track"
 
 _SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
-# The fields behind the timestamp, in protobuf's encoding, with room for each double; through message objects these cost
-# as much as all of the state.
-_TF_TAG, _FIX_TAG = 0x0A, 0x32
-_DOUBLE = bytes(8)
-_TF = (
-    FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True),
-    b"\x22\x1b" + b"".join(bytes([tag]) + _DOUBLE for tag in (0x09, 0x11, 0x19)),
-    b"\x2a\x24" + b"".join(bytes([tag]) + _DOUBLE for tag in (0x09, 0x11, 0x19, 0x21)),
+_XYZ, _XYZW, _GEO = "xyz", "xyzw", ("latitude", "longitude", "altitude")
+# The messages behind their timestamps, in protobuf's encoding.
+_TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
+    deterministic=True
 )
-_FIX = (
-    LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True),
-    b"".join(bytes([tag]) + _DOUBLE for tag in (0x09, 0x11, 0x19)),
+_TRANSFORM = np.dtype(
+    [
+        ("names", np.uint8, (len(_TRANSFORM_NAMES),)),
+        ("translation", submessage(_XYZ)),
+        ("rotation", submessage(_XYZW)),
+    ]
 )
+_FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True)
+_FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)])
 
 
-def _slots(parts: tuple[bytes, ...]) -> tuple[bytes, list[int]]:
-    """The template of these parts, and where its doubles start: behind the names, one after each tag."""
-    template = b"".join(parts)
-    slots, at = [], len(parts[0])
-    for part in parts[1:]:
-        count = len(part) // 9
-        head = len(part) - 9 * count
-        slots += [at + head + 9 * k + 1 for k in range(count)]
-        at += len(part)
-    return template, slots
-
-
-_TF_TEMPLATE, _TF_SLOTS = _slots(_TF)
-_FIX_TEMPLATE, _FIX_SLOTS = _slots(_FIX)
-
-
-def transform_messages(channel: int, stamps: Ints, position: Floats, attitude: Floats) -> Messages:
-    """Where the aircraft is and how it points: a FrameTransform for each of n rows.
+def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
+    """Position and attitude of the aircraft: a FrameTransform for each of n rows.
 
     position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which no viewer shows and which halves
-    their room in the log; the state's own message is exact.
+    their size in the log; the state's own message is exact.
     """
     with np.errstate(over="ignore", invalid="ignore"):
-        places = np.round(position * 1024.0) / 1024.0
-    turns = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
-    return stamped_messages(stamps, channel, _TF_TAG, _TF_TEMPLATE, _TF_SLOTS, np.hstack([places, turns]))
+        translation = np.round(position * 1024.0) / 1024.0
+    rotation = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
+    out: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM)
+    out["names"] = np.frombuffer(_TRANSFORM_NAMES, np.uint8)
+    fill_submessage(out["translation"], FrameTransform.TRANSLATION_FIELD_NUMBER, _XYZ, translation)
+    fill_submessage(out["rotation"], FrameTransform.ROTATION_FIELD_NUMBER, _XYZW, rotation)
+    return stamped_records(log_times, channel, FrameTransform.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
 
 
-def fix_messages(channel: int, stamps: Ints, origin: GeoOrigin, position: Floats) -> Messages:
-    """Where that is on the earth: a LocationFix for each of n rows; altitude is above mean sea level.
+def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Floats) -> MessageRecords:
+    """Latitude, longitude and height above mean sea level: a LocationFix for each of n rows.
 
     position: (n, 3).
     """
-    lat, lon = to_geo(origin, position[:, 0], position[:, 1])
-    values = np.stack([lat, lon, position[:, 2]], axis=1)
-    return stamped_messages(stamps, channel, _FIX_TAG, _FIX_TEMPLATE, _FIX_SLOTS, values)
+    east, north, up = position.T
+    lat, lon = to_geo(origin, east, north)
+    out: Encoded = np.zeros(len(log_times), dtype=_FIX)
+    out["names"] = np.frombuffer(_FIX_NAMES, np.uint8)
+    fill_doubles(out, _GEO, np.stack([lat, lon, up], axis=1))
+    return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
 
 
 class Poses:
-    """Chooses the rows to show, second by second."""
+    """Chooses the rows that viewers get, second by second, and makes their messages."""
 
     def __init__(self, origin: GeoOrigin, channels: dict[str, int]) -> None:
         """channels: the number of each topic."""
@@ -82,43 +82,43 @@ class Poses:
         self._tail = np.zeros((0, 3))  # the newest position
         self._next_track = 10  # s
 
-    def take(self, stamps: Ints, position: Floats, attitude: Floats) -> Iterator[Messages]:
+    def take(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
         """Messages for the first good row in each slot, a fix a second, and now and then the track so far.
 
-        stamps: (n,) ns, of whole seconds.  position, attitude: (n, 3).
+        log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
         """
         good = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
-        slots = stamps[good] // _SLOT_NS
+        slots = log_times[good] // _SLOT_NS
         chosen = good[_changes(slots, self._slot)]
         if good.size:
             self._tail = position[good[-1:]]
         if not chosen.size:
             return
         self._slot = int(slots[-1])
-        when = stamps[chosen]
-        yield transform_messages(self._channels[TF_TOPIC], when, position[chosen], attitude[chosen])
-        seconds = when // SECOND_NS
+        chosen_times = log_times[chosen]
+        yield transform_messages(self._channels[TF_TOPIC], chosen_times, position[chosen], attitude[chosen])
+        seconds = chosen_times // SECOND_NS
         starts = chosen[_changes(seconds, self._second)]
         if not starts.size:
             return
         self._second = int(seconds[-1])
         firsts = position[starts]
-        yield fix_messages(self._channels[FIX_TOPIC], stamps[starts], self._origin, firsts)
+        yield fix_messages(self._channels[FIX_TOPIC], log_times[starts], self._origin, firsts)
         # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
-        for k in np.flatnonzero(stamps[starts] - EPOCH_NS >= self._next_track * SECOND_NS).tolist():
-            stamp = int(stamps[starts[k]])
-            if stamp - EPOCH_NS >= self._next_track * SECOND_NS:
+        for k in np.flatnonzero(log_times[starts] - EPOCH_NS >= self._next_track * SECOND_NS).tolist():
+            log_time = int(log_times[starts[k]])
+            if log_time - EPOCH_NS >= self._next_track * SECOND_NS:
                 self._next_track *= 2
-                yield self._track(stamp, [*self._path, firsts[: k + 1]])
+                yield self._track(log_time, [*self._path, firsts[: k + 1]])
         self._path.append(firsts)
 
-    def whole(self, stamp: int) -> Messages:
-        """The track up to the newest row, at ``stamp`` (ns)."""
-        return self._track(stamp, [*self._path, self._tail])
+    def whole(self, log_time: int) -> MessageRecords:
+        """The track up to the newest row, at ``log_time`` (ns)."""
+        return self._track(log_time, [*self._path, self._tail])
 
-    def _track(self, stamp: int, parts: list[Floats]) -> Messages:
-        path = scene.track_scene(stamp, np.concatenate([np.zeros((0, 3)), *parts]))
-        return messages_of(self._channels[TRACK_TOPIC], stamp, path)
+    def _track(self, log_time: int, parts: list[Floats]) -> MessageRecords:
+        path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
+        return single_record(self._channels[TRACK_TOPIC], log_time, path)
 
 
 def _changes(values: Ints, before: int) -> Ints:

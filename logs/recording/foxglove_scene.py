@@ -1,4 +1,4 @@
-"""What a 3D viewer sees: Foxglove messages of the terrain, the threats, the plan, the track and the aircraft.
+"""Foxglove messages for a 3-D viewer: the terrain, the threats, the plan, the track and the aircraft.
 
 Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is forward, left, up.
 """
@@ -20,6 +20,7 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import ArrayLike, NDArray
 
+from logs.recording.protobuf_arrays import length_delimited, repeated_submessages
 from world.scenario import Scenario
 from world.terrain import Terrain
 from world.threats import Threats
@@ -31,16 +32,7 @@ LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error":
 MOST_VERTICES = 80  # a side of the terrain mesh
 
 
-def _of_doubles(names: str) -> np.dtype[np.void]:
-    """A message of doubles as an element of a repeated field: its tag, its length, and a tag before each."""
-    fields = [("tag", "u1"), ("size", "u1")]
-    for name in names:
-        fields += [(f"tag_{name}", "u1"), (name, "<f8")]
-    return np.dtype(fields)
-
-
-# In protobuf's encoding: ten thousand message objects would take as long as some minutes of flight.
-_POINT, _COLOUR = _of_doubles("xyz"), _of_doubles("rgba")
+_XYZ, _RGBA = "xyz", "rgba"
 # Fields of SceneEntity, LinePrimitive and TriangleListPrimitive.
 _ENTITY_LINES = SceneEntity.LINES_FIELD_NUMBER
 _ENTITY_TRIANGLES = SceneEntity.TRIANGLES_FIELD_NUMBER
@@ -90,7 +82,7 @@ def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
     """Draw the ground of the area as a coloured mesh of at most `MOST_VERTICES` a side."""
     entity = _entity(time_ns, "terrain")
     mesh = b"" if scenario.terrain is None else _mesh(scenario.terrain, scenario.bounds)
-    return _length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
+    return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
 def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
@@ -115,44 +107,25 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=Color(r=0.5, g=0.5, b=0.4, a=1.0))
     mesh.indices.extend(corners[whole].ravel().tolist())
     points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1).reshape(-1, 3)
-    # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the room.
-    shown = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
+    # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the bytes.
+    rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
-    body += _doubles(_POINT, _MESH_POINTS, np.round(points * 16.0) / 16.0) + _doubles(_COLOUR, _MESH_COLOURS, shown)
-    return _length_delimited(_ENTITY_TRIANGLES, body)
-
-
-def _doubles(kind: np.dtype[np.void], number: int, values: Floats) -> bytes:
-    """Rows (n, m) as a repeated field of messages of m doubles each."""
-    out: NDArray[np.void] = np.zeros(len(values), dtype=kind)
-    names = [name for name in kind.names or () if name not in ("tag", "size") and not name.startswith("tag_")]
-    out["tag"], out["size"] = number << 3 | 2, kind.itemsize - 2
-    for k, name in enumerate(names):
-        out[f"tag_{name}"], out[name] = (k + 1) << 3 | 1, values[:, k]
-    return out.tobytes()
-
-
-def _length_delimited(number: int, data: bytes) -> bytes:
-    """A message as a field of another."""
-    size, head = len(data), bytearray([number << 3 | 2])
-    while size > 127:
-        head.append(size & 127 | 128)
-        size >>= 7
-    head.append(size)
-    return bytes(head) + data
+    body += repeated_submessages(_MESH_POINTS, _XYZ, np.round(points * 16.0) / 16.0)
+    body += repeated_submessages(_MESH_COLOURS, _RGBA, rgba)
+    return length_delimited(_ENTITY_TRIANGLES, body)
 
 
 def threats_scene(time_ns: int, threats: Threats) -> bytes:
     """Missile spheres in red, radar spheres in orange, and their names."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
-        place = threats.position[k]
+        centre = threats.position[k]
         for radius, colour in ((threats.kill_radius[k], _KILL), (threats.detection_radius[k], _DETECTION)):
             if radius > 0.0:
                 side = 2.0 * float(radius)
-                entity.spheres.add(pose=_pose(place), size=Vector3(x=side, y=side, z=side), color=_colour(colour))
+                entity.spheres.add(pose=_pose(centre), size=Vector3(x=side, y=side, z=side), color=_colour(colour))
         entity.texts.add(
-            pose=_pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
+            pose=_pose(centre), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
         )
     return _update(entity)
 
@@ -169,9 +142,9 @@ def plan_scene(time_ns: int, waypoints: Floats) -> bytes:
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
     """Draw the flown track so far, (n, 3)."""
-    line = _line(_TRACK).SerializeToString(deterministic=True) + _doubles(_POINT, _LINE_POINTS, positions)
+    line = _line(_TRACK).SerializeToString(deterministic=True) + repeated_submessages(_LINE_POINTS, _XYZ, positions)
     entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
-    return _length_delimited(2, entity + _length_delimited(_ENTITY_LINES, line))
+    return length_delimited(2, entity + length_delimited(_ENTITY_LINES, line))
 
 
 def _update(entity: SceneEntity) -> bytes:
@@ -198,8 +171,8 @@ def _points(points: Floats) -> Iterable[Point3]:
     return (Point3(x=x, y=y, z=z) for x, y, z in points.tolist())
 
 
-def _pose(place: ArrayLike) -> Pose:
-    x, y, z = (float(value) for value in np.asarray(place))
+def _pose(position: ArrayLike) -> Pose:
+    x, y, z = (float(value) for value in np.asarray(position))
     return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
 
 

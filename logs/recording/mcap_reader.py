@@ -28,7 +28,7 @@ PARSE_ERRORS = (McapError, struct.error, ValueError, OverflowError, MemoryError)
 
 
 class _Damage(Exception):
-    """What is wrong with the file, in words."""
+    """The file is damaged; the message says where and how."""
 
 
 @dataclass(slots=True)
@@ -44,7 +44,7 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
-    """Give the records inside each whole chunk as bytes, filling ``found`` on the way.
+    """Give the records inside each whole chunk as bytes, and fill ``found`` on the way.
 
     file: stands behind the magic at the start.  Never raises for damage; `Container.problem` says what it was.
     """

@@ -41,23 +41,33 @@ _COMPRESSION = b"\x04\x00\x00\x00zstd"
 _PAIRS_HEAD = 6  # channel and length, before a message index's pairs
 
 
+class ChannelIndex(NamedTuple):
+    """A channel's message index behind a chunk: where its record starts, and how many messages it lists."""
+
+    channel: int
+    offset: int
+    messages: int
+
+
 @dataclass(frozen=True, slots=True)
 class ChunkContent:
     """Message records one after the other, and the message index records to stand behind them.
 
-    start, end: log time of the oldest and the newest message, ns.  channels: for each with messages here its number,
-    where its record starts in ``index``, and how many messages it has.
+    records: of the messages, and of schemas and channels before them.
+    index: message index records.
+    channels: those with messages here, each with where its record starts in ``index``.
+    start, end: log time of the oldest and the newest message, ns.
     """
 
     records: bytes | memoryview
     index: bytes
-    channels: tuple[tuple[int, int, int], ...]
+    channels: tuple[ChannelIndex, ...]
     start: int
     end: int
 
 
-class _Written(NamedTuple):
-    """A chunk in the file: what its chunk index says; a frozen dataclass takes six times as long to make."""
+class _ChunkIndex(NamedTuple):
+    """What the chunk index says of a chunk in the file; a frozen dataclass takes six times as long to make."""
 
     content_start: int
     content_end: int
@@ -90,7 +100,7 @@ class ContainerWriter:
         self._channels: list[Channel] = []
         self._unwritten: list[McapRecord] = []
         self._attachments: list[AttachmentIndex] = []
-        self._chunks: list[_Written] = []
+        self._chunks: list[_ChunkIndex] = []
         self._counts: Counter[int] = Counter()
         self._put(MAGIC + _bytes(Header(profile=profile, library=profile)))
 
@@ -137,14 +147,14 @@ class ContainerWriter:
             elif opcode == Opcode.MESSAGE:
                 number, _, log_time = _MESSAGE.unpack_from(content)
                 index.setdefault(number, []).append((log_time, at))
-        parts, places, at = [], [], 0
+        parts, channels, at = [], [], 0
         for number, pairs in sorted(index.items()):
             parts.append(_message_index(number, np.array(pairs, dtype=np.uint64)))
-            places.append((number, at, len(pairs)))
+            channels.append(ChannelIndex(number, at, len(pairs)))
             at += len(parts[-1])
         times = [log_time for pairs in index.values() for log_time, _ in pairs]
         start, end = (min(times), max(times)) if times else (0, 0)
-        self.chunk(ChunkContent(data, b"".join(parts), tuple(places), start, end))
+        self.chunk(ChunkContent(data, b"".join(parts), tuple(channels), start, end))
 
     def chunk(self, content: ChunkContent) -> None:
         """Write a chunk."""
@@ -154,11 +164,11 @@ class ContainerWriter:
         head += len(data).to_bytes(8, "little")
         length = FRAME.size + len(head) + len(data)
         behind = self._at + length
-        places = tuple((channel, behind + place) for channel, place, _ in content.channels)
-        for channel, _, count in content.channels:
-            self._counts[channel] += count
+        offsets = tuple((item.channel, behind + item.offset) for item in content.channels)
+        for item in content.channels:
+            self._counts[item.channel] += item.messages
         self._chunks.append(
-            _Written(content.start, content.end, self._at, length, places, len(content.index), len(data), size)
+            _ChunkIndex(content.start, content.end, self._at, length, offsets, len(content.index), len(data), size)
         )
         frame = FRAME.pack(Opcode.CHUNK, length - FRAME.size)
         self._put(b"".join((frame, head, data, content.index)))

@@ -1,4 +1,4 @@
-"""The messages of a log as they were written, for those who show them elsewhere."""
+"""The messages of a log as they were written, for viewers that take them as they are."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -33,7 +33,17 @@ class LogMessage:
 
 
 def log_messages(path: Path) -> Iterator[LogMessage]:
-    """Give the messages of a log in the order of the file, up to its first damage.  Raises OSError."""
+    """Give the messages of a log in the order of the file, up to its first damage.  Raises OSError.
+
+    >>> import tempfile
+    >>> from collections import Counter
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_example_log(Path(folder) / "example.mcap")
+    ...     counts = Counter(message.channel.topic for message in log_messages(path))
+    >>> counts["/state"], counts["/tf"], counts["/fix"]
+    (366, 183, 37)
+    """
     schemas: dict[int, Schema] = {}
     channels: dict[int, LogChannel] = {}
     with path.open("rb") as file:
@@ -46,7 +56,17 @@ def log_messages(path: Path) -> Iterator[LogMessage]:
 
 
 def log_channels(path: Path) -> list[LogChannel]:
-    """List the channels that the first chunk of a log declares: all that a `logs.recording.recorder.Recorder` uses."""
+    """List the channels that the first chunk of a log declares: all that a `logs.recording.recorder.Recorder` uses.
+
+    Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     channels = log_channels(write_example_log(Path(folder) / "example.mcap"))
+    >>> channels[0].topic, channels[0].encoding, channels[0].schema
+    ('/state', 'protobuf', 'planfly.State')
+    """
     channels: dict[int, LogChannel] = {}
     with path.open("rb") as file:
         file.seek(len(MAGIC))

@@ -1,6 +1,6 @@
-"""The reader: a flight log as the data that was recorded, checked and rebuilt from the log alone.
+"""A flight log as the data that was recorded, checked and rebuilt from the log alone.
 
-A recorded verdict is given as what the log says, for comparison; nothing here or after it believes one.
+A recorded verdict is given as it stands in the log, for comparison; nothing here or after it believes one.
 """
 
 import json
@@ -17,10 +17,11 @@ from mcap.records import Channel, Schema
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
+from logs.recording.attachment_names import RECOVERY, RESULT, SETUP, VERDICT
 from logs.recording.foxglove_scene import LEVELS
-from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks, stream
-from logs.recording.recorder import LONGEST, RECOVERY, RESULT, VERDICT
-from logs.recording.setup_attachments import SETUP, unpack_setup
+from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, stream
+from logs.recording.recorder import LONGEST
+from logs.recording.setup_attachments import unpack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
@@ -39,7 +40,6 @@ from logs.recording.state_channel import (
 )
 from world.errors import LogError
 
-_HEAD = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
 _LEVEL_NAMES = {number: name for name, number in LEVELS.items()}
 
@@ -60,9 +60,15 @@ class LogEvent:
 class FlightLog:
     """A flight, as recorded.
 
-    source: the file's name, for messages.  ended: how the flight ended, None where the recording did not get so far.
-    recorded_verdict: the verdict as written then, None if there is none; never to be trusted.  versions: of the
-    packages that flew it.  complete: nothing is missing or damaged; problem says what is.  end_time: s, the last row.
+    source: the file's name, for messages.
+    setup, track, events: what was flown, the rows, and the log's lines in order of time.
+    ended: how the flight ended; None where the recording did not get so far.
+    recorded_verdict: the verdict as it was written, None if there is none; never to be trusted.
+    versions: of the packages that flew it.
+    complete: nothing is missing or damaged.
+    problem: what is, in a line; empty for a complete log.
+    end_time: s, of the last row.
+    lost: what of the flight is lost, in a line; ``problem`` adds to it that a recovered log is one.
     """
 
     source: str
@@ -75,9 +81,10 @@ class FlightLog:
     complete: bool
     problem: str
     end_time: float
+    lost: str = ""
 
 
-class _Messages:
+class _MessageCollector:
     """Collects state rows and events from the bytes of chunks."""
 
     def __init__(self) -> None:
@@ -95,7 +102,7 @@ class _Messages:
         self.chunks += 1
         at = 0
         while at < len(data):
-            opcode, length = _HEAD.unpack_from(data, at)
+            opcode, length = FRAME.unpack_from(data, at)
             start = at + RECORD_HEADER
             end = start + length
             if end > len(data):
@@ -123,13 +130,13 @@ class _Messages:
             self._matcher = RowMatcher(channel.id)
 
     def _message(self, data: bytes, at: int, start: int, end: int) -> int:
-        """Take the message at ``at``, or the run of state rows that begins there; return where to go on."""
+        """Take the message at ``at``, or all state rows that follow each other from there; return where to go on."""
         channel, _, log_time, _ = _MESSAGE.unpack_from(data, start)
         if channel == self._state_channel and self._matcher is not None:
-            run = self._matcher.run(data, at)
-            if len(run):
-                self.parts.append(run)
-                return at + len(run) * RECORD.itemsize
+            matched = self._matcher.match(data, at)
+            if len(matched):
+                self.parts.append(matched)
+                return at + len(matched) * RECORD.itemsize
             self.parts.append(parse_row(data[start + MESSAGE_HEADER : end], self._parser))
         elif self._channels.get(channel) == (EVENT_TOPIC, LOG_NAME):
             message = Log.FromString(data[start + MESSAGE_HEADER : end])
@@ -140,7 +147,7 @@ class _Messages:
 
     def rows(self) -> Rows:
         """All state rows in the order of the file, (t,) of `RECORD`."""
-        return join_rows(self.parts)
+        return join_rows(self.parts, RECORD)
 
 
 def read_log(path: Path) -> FlightLog:
@@ -148,9 +155,16 @@ def read_log(path: Path) -> FlightLog:
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
     holds no whole second of flight.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     log = read_log(write_example_log(Path(folder) / "example.mcap"))
+    >>> log.complete, log.ended, len(log.track), log.setup.aircraft
+    (True, 'completed', 366, 'aerosonde')
     """
     found = Container()
-    messages = _Messages()
+    messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
             raise LogError(f"{path}: not a file: a flight log (.mcap) is expected")
@@ -174,7 +188,9 @@ def read_log(path: Path) -> FlightLog:
         raise LogError(f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}")
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
-    problem = fault or found.problem or _recovery(found.attachments) or wrong or garbled
+    lost = fault or found.problem
+    recovered = not lost and RECOVERY in found.attachments
+    lost = _loss(found.attachments[RECOVERY]) if recovered else lost or wrong or garbled
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
@@ -184,9 +200,10 @@ def read_log(path: Path) -> FlightLog:
         ended=ended,
         recorded_verdict=verdict,
         versions=stored.versions,
-        complete=not problem,
-        problem=problem,
+        complete=not lost,
+        problem=f"recovered: {lost}" if recovered else lost,
         end_time=float(track.time[-1]),
+        lost=lost,
     )
 
 
@@ -198,21 +215,21 @@ def _check_magic(magic: bytes, path: Path) -> None:
 
 
 def _good_rows(rows: Rows, waypoints: int) -> tuple[Rows, str]:
-    """Cut the rows before the first that cannot follow the one before it; and say what is wrong with that one."""
+    """Keep the rows before the first that cannot follow the one before it; and say what is wrong with that one."""
     state = rows["state"]
     time = state["time_s"]
     good = np.isfinite(time) & (time >= 0.0) & (time < LONGEST)
     good[1:] &= time[1:] > time[:-1]
     numbered = state["row"] == np.arange(len(rows), dtype=np.uint32)
     legs = (state["leg_index"] >= 0) & (state["leg_index"] < waypoints)
-    for test, words in (
+    for test, fault in (
         (numbered, "rows are missing"),
         (good, "time does not increase"),
         (legs, "the leg does not exist"),
     ):
         if not test.all():
             first = int(np.argmin(test & numbered & good & legs))
-            return rows[:first], f"{words} at state message {first}"
+            return rows[:first], f"{fault} at state message {first}"
     return rows, ""
 
 
@@ -229,12 +246,10 @@ def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
     return ended, ""
 
 
-def _recovery(attachments: dict[str, bytes]) -> str:
-    """What was lost before the log was made whole again; empty for a log that never was damaged."""
-    if RECOVERY not in attachments:
-        return ""
-    lost = _object(attachments[RECOVERY]).get("lost")
-    return f"recovered: {lost}" if isinstance(lost, str) and lost else "recovered, and it is not said what was lost"
+def _loss(recovery: bytes) -> str:
+    """What was lost before the log was recovered, by its recovery note."""
+    lost = _object(recovery).get("lost")
+    return lost if isinstance(lost, str) and lost else "what was lost is not known"
 
 
 def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:

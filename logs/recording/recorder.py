@@ -21,30 +21,32 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, Track, track_rows
 from logs.recording import foxglove_scene as scene
+from logs.recording.attachment_names import RESULT, VERDICT, media_type
 from logs.recording.chunk_layout import (
-    FIRST_NS,
-    INDEX_START,
-    INDEX_STOP,
-    LAST_NS,
-    START,
-    STOP,
+    CHUNK,
+    NOT_INCREASING,
+    OUT_OF_RANGE,
     Layout,
-    Messages,
-    last_stamp,
+    MessageRecords,
+    last_log_time,
     lay_out,
-    messages_of,
+    single_record,
 )
 from logs.recording.foxglove_poses import FIX_TOPIC, TF_TOPIC, TRACK_TOPIC, Poses
-from logs.recording.mcap_writer import ChunkContent, ContainerWriter
-from logs.recording.setup_attachments import MEDIA_TYPES, pack_setup
+from logs.recording.mcap_writer import ChannelIndex, ChunkContent, ContainerWriter
+from logs.recording.protobuf_arrays import as_bytes
+from logs.recording.setup_attachments import pack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
-    RECORD,
+    FLOWN_ROW,
     SECOND_NS,
     STATE_NAME,
     STATE_TOPIC,
+    Rows,
     encode_rows,
+    join_rows,
+    named_rows,
     schema_of,
     state_schema,
     times_ns,
@@ -52,17 +54,13 @@ from logs.recording.state_channel import (
 from logs.verdict.findings import Verdict, verdict_json
 
 CHUNK_SIZE = 64 * 1024
-RESULT, VERDICT, RECOVERY = "result.json", "verdict.json", "recovery.json"
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
 LONGEST = 1e7  # s
 
 _BUFFER = 2**20
-_ROW = sum(COLUMNS.values())
-_AT = {name: sum(list(COLUMNS.values())[:k]) for k, name in enumerate(COLUMNS)}
-_POSITION = slice(_AT["position"], _AT["position"] + 3)
-_ATTITUDE = slice(_AT["attitude"], _AT["attitude"] + 3)
-_NO_ROWS, _NO_STAMPS = np.empty((0, _ROW)), np.empty(0, dtype=np.int64)
+_NO_ROWS: Rows = np.empty(0, dtype=FLOWN_ROW)
+_NO_TIMES = np.empty(0, dtype=np.int64)
 _CHANNELS: dict[str, Any] = {
     TF_TOPIC: FrameTransform,
     FIX_TOPIC: LocationFix,
@@ -80,6 +78,20 @@ class Recorder:
 
     The setup goes first; after it each whole second of flight is handed to the operating system, so that a killed
     process loses at most the last one.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.recording.reader import read_log
+    >>> flown = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "flight.mcap"
+    ...     with Recorder(path, flown.setup) as recorder:
+    ...         recorder.write(flown.track)
+    ...         recorder.event(12.0, "half way")
+    ...         recorder.finish("completed")
+    ...     log = read_log(path)
+    >>> log.ended, len(log.track), log.events[0].text
+    ('completed', 366, 'half way')
     """
 
     def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
@@ -91,11 +103,11 @@ class Recorder:
         """
         self._batch_ns = batch * SECOND_NS
         self._every = every
-        self._skipped: Floats | None = None  # the newest row, if it was not recorded
-        self._seen = 0  # rows, recorded or not
-        pieces = pack_setup(setup)
-        self._pending: list[Floats] = []  # rows to record
-        self._events: list[Messages] = []
+        self._skipped: Rows | None = None  # the newest row, if it was not recorded
+        self._received = 0  # rows, recorded or not
+        attachments = pack_setup(setup)
+        self._pending: list[Rows] = []  # rows to record
+        self._events: list[MessageRecords] = []
         self._written = 0  # rows
         self._last_ns = EPOCH_NS - 1  # of the rows recorded
         self._newest_ns = EPOCH_NS - 1  # of the rows received
@@ -105,7 +117,7 @@ class Recorder:
         try:
             # A thinned log is taken because it costs little: a quarter more bytes for half the time.
             self._writer = ContainerWriter(self._file, PROFILE, 3 if every == 1 else -1)
-            self._begin(pieces, setup)
+            self._begin(attachments, setup)
         except OSError:
             self._file.close()
             raise
@@ -121,7 +133,7 @@ class Recorder:
         """Close the file, without a result if `finish` was not called."""
         if not self._open:
             return
-        # The first error is the one to be told, not a full disk met again while closing.
+        # The first error is the one to report, not a full disk met again while closing.
         with contextlib.suppress(OSError) if kind is not None else contextlib.nullcontext():
             self._close()
 
@@ -130,32 +142,37 @@ class Recorder:
         self.write_rows(track_rows(block))
 
     def write_rows(self, rows: Floats) -> None:
-        """Record rows (t, columns) in the order of `flight.simulation.track.COLUMNS`, as a flight hands them on."""
+        """Record rows as a flight hands them on: (t, columns) in the order of `flight.simulation.track.COLUMNS`.
+
+        Raises ValueError unless their times increase, from 0 on, across all calls.
+        """
         if not len(rows):
             return
-        newest = last_stamp(np.ascontiguousarray(rows[:, 0]), self._newest_ns, EPOCH_NS, LONGEST)
-        if newest == -1:
-            raise ValueError(f"time {rows[0, 0]}..{rows[-1, 0]} s: 0..{LONGEST:g} is expected")
-        if newest == -2:
-            raise ValueError(f"rows from {rows[0, 0]} s on: times must increase by at least 1 ns a row")
+        flown = named_rows(rows)
+        times = np.ascontiguousarray(flown["time"])
+        newest = last_log_time(times, self._newest_ns, EPOCH_NS, LONGEST)
+        if newest == OUT_OF_RANGE:
+            raise ValueError(f"time {times[0]}..{times[-1]} s: 0..{LONGEST:g} is expected")
+        if newest == NOT_INCREASING:
+            raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
         # One row in `every`, counted from the flight's first.
-        kept = rows[-self._seen % self._every :: self._every]
-        self._seen += len(rows)
-        self._skipped = rows[-1:] if (self._seen - 1) % self._every else None
+        kept = flown[-self._received % self._every :: self._every]
+        self._received += len(flown)
+        self._skipped = flown[-1:] if (self._received - 1) % self._every else None
         if len(kept):
             self._append(kept)
 
-    def _append(self, rows: Floats) -> None:
+    def _append(self, rows: Rows) -> None:
         self._pending.append(rows)
-        before, self._last_ns = self._last_ns, round(rows[-1, 0] * 1e9) + EPOCH_NS
+        before, self._last_ns = self._last_ns, round(rows["time"][-1] * 1e9) + EPOCH_NS
         if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
 
     def flush(self) -> None:
         """Hand every row received to the operating system now, by the caller's clock.
 
-        For a live flight, so that a killed process loses no whole second: chunks then end where the caller says,
+        For a live flight, so that a killed process loses no whole second: chunks then end where the caller flushes,
         and the file's bytes (not its rows) depend on when that was.
         """
         self._emit(self._last_ns + 1)
@@ -166,9 +183,9 @@ class Recorder:
             raise ValueError(f"level {level!r}: {', '.join(scene.LEVELS)} are expected")
         if not 0.0 <= time < LONGEST:
             raise ValueError(f"time {time} s: 0..{LONGEST:g} is expected")
-        stamp = round(time * 1e9) + EPOCH_NS
-        message = scene.log_message(stamp, text, level).SerializeToString(deterministic=True)
-        self._events.append(messages_of(self._channels[EVENT_TOPIC], stamp, message))
+        log_time = round(time * 1e9) + EPOCH_NS
+        message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
+        self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))
 
     def finish(self, ended: str, verdict: Verdict | None = None) -> None:
         """Write how the flight ended and its verdict, and close the file."""
@@ -176,21 +193,21 @@ class Recorder:
             self._append(self._skipped)
             self._skipped = None
         self._emit(None)
-        stamp = max(self._last_ns, EPOCH_NS)
-        self._write([self._poses.whole(stamp)])
+        end = max(self._last_ns, EPOCH_NS)
+        self._write([self._poses.whole(end)])
         if verdict is not None:
-            self._attach(VERDICT, verdict_json(verdict).encode(), stamp)
+            self._attach(VERDICT, verdict_json(verdict).encode(), end)
         result = {
             "schema": RESULT_SCHEMA,
             "ended": ended,
             "rows": self._written,
-            "end_time_s": (stamp - EPOCH_NS) / 1e9,
+            "end_time_s": (end - EPOCH_NS) / 1e9,
         }
-        self._attach(RESULT, (json.dumps(result, indent=1) + "\n").encode(), stamp)
+        self._attach(RESULT, (json.dumps(result, indent=1) + "\n").encode(), end)
         self._close()
 
-    def _begin(self, pieces: dict[str, bytes], setup: FlightSetup) -> None:
-        for name, data in pieces.items():
+    def _begin(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:
+        for name, data in attachments.items():
             self._attach(name, data, EPOCH_NS)
         self._channels[STATE_TOPIC] = self._writer.channel(STATE_TOPIC, STATE_NAME, state_schema())
         for topic, kind in _CHANNELS.items():
@@ -201,7 +218,7 @@ class Recorder:
             "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats),
             "/scene/plan": scene.plan_scene(EPOCH_NS, setup.route.waypoints),
         }
-        self._write([messages_of(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
+        self._write([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 
     def _close(self) -> None:
@@ -213,44 +230,57 @@ class Recorder:
         finally:
             self._file.close()
 
-    def _attach(self, name: str, data: bytes, stamp: int) -> None:
-        self._writer.attach(name, MEDIA_TYPES["." + name.rsplit(".", 1)[1]], data, stamp)
+    def _attach(self, name: str, data: bytes, log_time: int) -> None:
+        self._writer.attach(name, media_type(name), data, log_time)
 
     def _emit(self, until: int | None) -> None:
         """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
-        rows = np.concatenate([np.empty((0, _ROW)), *self._pending])
-        stamps = times_ns(rows[:, 0])
-        stop = len(rows) if until is None else int(np.searchsorted(stamps, until))
+        rows = join_rows(self._pending, FLOWN_ROW)
+        log_times = times_ns(rows["time"])
+        stop = len(rows) if until is None else int(np.searchsorted(log_times, until))
         self._pending = [rows[stop:]] if stop < len(rows) else []
-        events = [item for item in self._events if until is None or item.stamps[0] < until]
-        self._events = [item for item in self._events if until is not None and item.stamps[0] >= until]
-        rows, stamps = rows[:stop], stamps[:stop]
-        self._write([*self._poses.take(stamps, rows[:, _POSITION], rows[:, _ATTITUDE]), *events], rows, stamps)
+        events = [item for item in self._events if until is None or item.log_times[0] < until]
+        self._events = [item for item in self._events if until is not None and item.log_times[0] >= until]
+        rows, log_times = rows[:stop], log_times[:stop]
+        self._write([*self._poses.take(log_times, rows["position"], rows["attitude"]), *events], rows, log_times)
         self._writer.flush()
 
-    def _write(self, others: list[Messages], rows: Floats = _NO_ROWS, stamps: Ints = _NO_STAMPS) -> None:
+    def _write(self, others: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES) -> None:
         """Write rows and other messages in order of time; at one time the row comes last."""
         channel = self._channels[STATE_TOPIC]
         encoded = encode_rows(rows, self._written, channel)
         self._written += len(rows)
-        data = encoded.view(np.uint8).reshape(len(rows), RECORD.itemsize)
-        layout = lay_out(data, stamps, channel, others, self._writer.front(), CHUNK_SIZE)
+        layout = lay_out(as_bytes(encoded), log_times, channel, others, self._writer.front(), CHUNK_SIZE)
         for content in _chunks(layout):
             self._writer.chunk(content)
 
 
 def _chunks(layout: Layout) -> Iterator[ChunkContent]:
     records, index = memoryview(layout.records), layout.index.tobytes()  # type: ignore[arg-type]  # an array is a buffer
-    rows = zip(layout.chunks.tolist(), layout.places.tolist(), layout.counts.tolist(), strict=True)
-    for chunk, places, counts in rows:
-        channels = tuple((k, place, counts[k]) for k, place in enumerate(places) if place >= 0)
-        part = index[chunk[INDEX_START] : chunk[INDEX_STOP]]
-        data = records[chunk[START] : chunk[STOP]]
-        yield ChunkContent(data, part, channels, chunk[FIRST_NS], chunk[LAST_NS])
+    # Lists first: a field of one chunk at a time costs a microsecond.
+    bounds = {name: layout.chunks[name].tolist() for name in CHUNK.names or ()}
+    offsets, messages = layout.channels["offset"].tolist(), layout.channels["messages"].tolist()
+    for k in range(len(layout.chunks)):
+        yield ChunkContent(
+            records=records[bounds["start"][k] : bounds["stop"][k]],
+            index=index[bounds["index_start"][k] : bounds["index_stop"][k]],
+            channels=tuple(
+                ChannelIndex(channel, offset, count)
+                for channel, (offset, count) in enumerate(zip(offsets[k], messages[k], strict=True))
+                if count
+            ),
+            start=bounds["first_ns"][k],
+            end=bounds["last_ns"][k],
+        )
 
 
 def thin_track(track: Track, every: int) -> Track:
-    """The rows of a whole flight that a `Recorder` with this ``every`` keeps."""
+    """Rows of a whole flight that a `Recorder` with this ``every`` records: one in so many, and the last.
+
+    >>> from logs.recording.example_log import example_log
+    >>> thin_track(example_log().track, 100).time
+    array([ 0. , 10. , 20. , 30. , 36.5])
+    """
     if every <= 1 or not len(track):
         return track
     kept = np.union1d(np.arange(0, len(track), every), [len(track) - 1])

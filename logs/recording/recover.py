@@ -1,6 +1,6 @@
-"""Making an unfinished or damaged log whole: what can be read of it, as a file that any MCAP reader opens.
+"""Recovery of an unfinished or damaged log: what can be read of it, as a file that any MCAP reader opens.
 
-The new log says that it is a recovered one and what was lost, so that it reads as incomplete for ever.
+The new log carries a note of what was lost, so that it reads as incomplete for ever.
 """
 
 import io
@@ -8,18 +8,18 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from logs.recording.attachment_names import RECOVERY, RESULT, VERDICT, media_type
 from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.mcap_writer import ContainerWriter
 from logs.recording.reader import FlightLog, read_log
-from logs.recording.recorder import PROFILE, RECOVERY, RESULT, VERDICT
-from logs.recording.setup_attachments import MEDIA_TYPES
+from logs.recording.recorder import PROFILE
 
 RECOVERY_SCHEMA = "planfly.recovery/1"
 
 
 @dataclass(frozen=True, slots=True)
 class Recovered:
-    """A log made whole: its bytes, and the flight that it holds."""
+    """A recovered log: its bytes, and the flight that it holds."""
 
     data: bytes
     log: FlightLog
@@ -29,7 +29,17 @@ def recover_log(path: Path) -> Recovered | None:
     """Rebuild a log up to its first damage; None for one that is complete.
 
     Every chunk and attachment before the damage is kept as it was.  How the flight ended and a verdict are kept out:
-    they would speak of rows that may be gone.  Raises LogError as `read_log` does.
+    they would speak of rows that may be gone.  Raises LogError for a file that holds no flight, as `read_log` does.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_example_log(Path(folder) / "example.mcap")
+    ...     complete = recover_log(path)
+    ...     _ = path.write_bytes(path.read_bytes()[: path.stat().st_size * 3 // 4])
+    ...     recovered = recover_log(path)
+    >>> complete is None, recovered.log.complete, 0 < len(recovered.log.track) < 366
+    (True, False, True)
     """
     log = read_log(path)
     if log.complete:
@@ -47,10 +57,9 @@ def recover_log(path: Path) -> Recovered | None:
         except PARSE_ERRORS:
             # Where the reader stopped, too.
             break
-    lost = log.problem.removeprefix("recovered: ")
-    note = {"schema": RECOVERY_SCHEMA, "lost": lost, "rows": len(log.track), "end_time_s": log.end_time}
+    note = {"schema": RECOVERY_SCHEMA, "lost": log.lost, "rows": len(log.track), "end_time_s": log.end_time}
     text = (json.dumps(note, indent=1) + "\n").encode()
-    writer.attach(RECOVERY, MEDIA_TYPES[".json"], text, writer.last_time)
+    writer.attach(RECOVERY, media_type(RECOVERY), text, writer.last_time)
     writer.finish()
     return Recovered(out.getvalue(), log)
 

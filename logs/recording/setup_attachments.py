@@ -1,7 +1,7 @@
-"""A `FlightSetup` as the named pieces of bytes that a log carries, and back.
+"""A `FlightSetup` as attachments of a log (bytes by name), and back.
 
-`setup.json` lists every other piece with its SHA-256, so that none can be missing or altered unseen.  Numbers are
-written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
+`setup.json` lists every other attachment with its SHA-256, so that none can be missing or altered unnoticed.  Numbers
+are written as Python's repr, which reads back to the same float; NaN and infinity as the strings "nan", "inf", "-inf".
 """
 
 import functools
@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from flight.simulation.flight_setup import FlightSetup, make_limits
+from logs.recording.attachment_names import MISSION, PLAN, SCENARIO, SETUP, TERRAIN
 from logs.recording.setup_schema import (
     EnvelopeFile,
     Finite,
@@ -29,7 +30,6 @@ from logs.recording.setup_schema import (
     read_route,
     route_file,
 )
-from logs.recording.terrain_attachment import NAME as TERRAIN
 from logs.recording.terrain_attachment import pack_terrain, unpack_terrain
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
@@ -39,8 +39,6 @@ from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
 
 SCHEMA = "planfly.log/1"
-SETUP, SCENARIO, PLAN, MISSION = "setup.json", "scenario.json", "plan.json", "mission.waypoints"
-MEDIA_TYPES = {".json": "application/json", ".waypoints": "text/plain", ".heights": "application/octet-stream"}
 _PACKAGES = (
     "planfly",
     "jsbsim",
@@ -65,7 +63,7 @@ class _Setup(SetupModel):
     max_bank_rad: Annotated[float, Field(gt=0.0, lt=math.pi / 2)]
     battery_wh: Finite
     seed: Annotated[int, Field(ge=0)]
-    foreign: bool
+    external: Annotated[bool, Field(alias="foreign")]
     guidance: Guidance
     nav: Navigation
     guidance_hz: Literal[30, 60]
@@ -78,7 +76,7 @@ class _Setup(SetupModel):
 
 @dataclass(frozen=True, slots=True)
 class StoredSetup:
-    """What the pieces gave: the setup, and the versions of the packages that flew it."""
+    """A setup as recorded, and the versions of the packages that flew it."""
 
     setup: FlightSetup
     versions: dict[str, str]
@@ -90,7 +88,12 @@ def _versions() -> tuple[tuple[str, str], ...]:
 
 
 def package_versions() -> dict[str, str]:
-    """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed."""
+    """Versions of Python and of the packages whose arithmetic or formats a log depends on, those installed.
+
+    >>> versions = package_versions()
+    >>> versions["numpy"] == metadata.version("numpy")
+    True
+    """
     return dict(_versions())
 
 
@@ -105,22 +108,25 @@ def _find_versions() -> dict[str, str]:
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
-    """All that a log needs of a setup, by name, `SETUP` first; the same setup always gives the same bytes."""
-    pieces = {
+    """Pack all that a log needs of a setup as attachments, bytes by name, `SETUP` first.
+
+    The same setup and packages give the same bytes.
+    """
+    attachments = {
         SCENARIO: _json(setup.scenario.to_json()),
         MISSION: setup.mission_text.encode(),
     }
     if setup.plan is not None:
-        pieces[PLAN] = plan_json(setup.plan).encode()
+        attachments[PLAN] = plan_json(setup.plan).encode()
     if setup.scenario.terrain is not None:
-        pieces |= pack_terrain(setup.scenario.terrain)
+        attachments |= pack_terrain(setup.scenario.terrain)
     file = _Setup(
         aircraft=setup.aircraft,
         airspeed_mps=setup.airspeed,
         max_bank_rad=setup.max_bank,
         battery_wh=setup.battery,
         seed=setup.seed,
-        foreign=setup.scenario.external,
+        external=setup.scenario.external,
         guidance=setup.guidance,
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
@@ -128,30 +134,31 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         route=route_file(setup.route),
         envelope=envelope_file(setup.envelope),
         versions=package_versions(),
-        sha256={name: hashlib.sha256(data).hexdigest() for name, data in pieces.items()},
+        sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
-    return {SETUP: _json(file.model_dump(by_alias=True)), **pieces}
+    return {SETUP: _json(file.model_dump(by_alias=True)), **attachments}
 
 
-def unpack_setup(pieces: dict[str, bytes], source: str) -> StoredSetup:
-    """Make the setup again; no file other than the log is opened.
+def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
+    """Rebuild the setup from its attachments; no file is opened.
 
-    pieces: the log's attachments by name.  source: names the log in messages.  Raises LogError with one line.
+    attachments: by name.  source: names the log in messages.  Raises LogError, in one line, for one that is missing,
+    altered or does not fit.
     """
-    if SETUP not in pieces:
+    if SETUP not in attachments:
         raise LogError(f"{source}: no {SETUP}: not a planfly flight log, or cut off before its first second")
     try:
-        file = _Setup.model_validate_json(pieces[SETUP])
+        file = _Setup.model_validate_json(attachments[SETUP])
     except ValidationError as error:
         raise LogError(f"{source}: {SETUP}: {first_error(error)}") from error
     for name, digest in file.sha256.items():
-        if name not in pieces:
+        if name not in attachments:
             raise LogError(f"{source}: {name}: missing; {SETUP} lists it")
-        if hashlib.sha256(pieces[name]).hexdigest() != digest:
+        if hashlib.sha256(attachments[name]).hexdigest() != digest:
             raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP}")
-    listed = {name: pieces[name] for name in file.sha256}
+    listed = {name: attachments[name] for name in file.sha256}
     terrain = unpack_terrain(listed, source) if TERRAIN in listed else None
-    scenario = _scenario(listed, source, terrain, file.foreign)
+    scenario = _scenario(listed, source, terrain, file.external)
     envelope = read_envelope(file.envelope, f"{source}: {SETUP}")
     setup = FlightSetup(
         scenario=scenario,
@@ -171,45 +178,45 @@ def unpack_setup(pieces: dict[str, bytes], source: str) -> StoredSetup:
 
 
 def _json(data: Any) -> bytes:
-    return (json.dumps(_spelt(data), indent=1, allow_nan=False) + "\n").encode()
+    return (json.dumps(_finite_or_text(data), indent=1, allow_nan=False) + "\n").encode()
 
 
-def _spelt(data: Any) -> Any:
+def _finite_or_text(data: Any) -> Any:
     """Spell non-finite numbers as strings, which JSON can hold."""
     if isinstance(data, float) and not math.isfinite(data):
         return str(float(data))
     if isinstance(data, dict):
-        return {key: _spelt(value) for key, value in data.items()}
+        return {key: _finite_or_text(value) for key, value in data.items()}
     if isinstance(data, list | tuple):
-        return [_spelt(value) for value in data]
+        return [_finite_or_text(value) for value in data]
     return data
 
 
-def _text(pieces: dict[str, bytes], name: str, source: str) -> str:
+def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
     try:
-        return pieces[name].decode()
+        return attachments[name].decode()
     except KeyError:
         raise LogError(f"{source}: {name}: missing") from None
     except UnicodeDecodeError as error:
         raise LogError(f"{source}: {name}: not a text in UTF-8 (byte {error.start})") from error
 
 
-def _scenario(pieces: dict[str, bytes], source: str, terrain: Terrain | None, foreign: bool) -> Scenario:
+def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
     where = f"{source}: {SCENARIO}"
     try:
-        spec = json.loads(_text(pieces, SCENARIO, source))
+        spec = json.loads(_text(attachments, SCENARIO, source))
     except (ValueError, RecursionError) as error:
         raise LogError(f"{where}: not valid JSON: {error}") from error
     _refuse_outside_terrain(spec, terrain, where)
     try:
-        return from_spec(spec, where, ground=terrain, external=foreign)
+        return from_spec(spec, where, ground=terrain, external=external)
     except PlanflyError as error:
         raise LogError(str(error)) from error
 
 
-def _plan(pieces: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
+def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
     where = f"{source}: {PLAN}"
-    text = _text(pieces, PLAN, source)
+    text = _text(attachments, PLAN, source)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:

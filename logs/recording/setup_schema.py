@@ -1,6 +1,6 @@
-"""The parts of a `FlightSetup` that have no file of their own, as models of `setup.json`: mission, route, envelope.
+"""The parts of a `FlightSetup` that are tables of `setup.json`: mission, route, envelope.
 
-Numbers are written as Python's repr, which reads back to the same float.
+Names carry their units.  Numbers are written as Python's repr, which reads back to the same float.
 """
 
 from typing import Annotated
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Column = list[float]
-Table = list[list[float]]
+Table = list[list[float]]  # by airspeed, then by height
 
 
 class SetupModel(BaseModel):
@@ -45,7 +45,7 @@ class _Home(SetupModel):
 
 
 class MissionFile(SetupModel):
-    """A `Mission`."""
+    """A `Mission` as a table."""
 
     home: _Home | None
     items: list[_Item]
@@ -57,7 +57,7 @@ class MissionFile(SetupModel):
 
 
 class RouteFile(SetupModel):
-    """A `Route`."""
+    """A `Route` as a table: a value a waypoint, and a value a leg for airspeed."""
 
     waypoints_east_north_amsl_m: Annotated[
         list[Annotated[list[Finite], Field(min_length=3, max_length=3)]], Field(min_length=1)
@@ -72,7 +72,7 @@ class RouteFile(SetupModel):
 
 
 class EnvelopeFile(SetupModel):
-    """An `Envelope`."""
+    """An `Envelope` as a table; its power is empty where it is not known."""
 
     aircraft: str
     model_hash: str
@@ -111,7 +111,7 @@ def _item(file: _Item) -> MissionItem:
 
 
 def mission_file(mission: Mission) -> MissionFile:
-    """Return a mission as a table."""
+    """Write a mission as a table."""
     home = mission.home
     return MissionFile(
         home=None if home is None else _Home(lat_deg=home.lat_deg, lon_deg=home.lon_deg, amsl_m=home.alt),
@@ -125,7 +125,7 @@ def mission_file(mission: Mission) -> MissionFile:
 
 
 def read_mission(file: MissionFile) -> Mission:
-    """Return the mission of a table."""
+    """Read the mission of a table."""
     return Mission(
         home=None if file.home is None else Home(file.home.lat_deg, file.home.lon_deg, file.home.amsl_m),
         items=tuple(_item(item) for item in file.items),
@@ -138,7 +138,7 @@ def read_mission(file: MissionFile) -> Mission:
 
 
 def route_file(route: Route) -> RouteFile:
-    """Return a route as a table."""
+    """Write a route as a table."""
     return RouteFile(
         waypoints_east_north_amsl_m=route.waypoints.tolist(),
         airspeed_mps=route.airspeed.tolist(),
@@ -152,7 +152,7 @@ def route_file(route: Route) -> RouteFile:
 
 
 def read_route(file: RouteFile, source: str) -> Route:
-    """Return the route of a table.  Raises LogError for arrays that do not fit each other."""
+    """Read the route of a table.  Raises LogError for arrays that do not fit each other."""
     count = len(file.waypoints_east_north_amsl_m)
     wanted = {"airspeed_mps": count - 1, "acceptance_m": count, "fly_over": count, "items": count}
     if file.arcs_m:
@@ -173,7 +173,7 @@ def read_route(file: RouteFile, source: str) -> Route:
 
 
 def envelope_file(envelope: Envelope) -> EnvelopeFile:
-    """Return an envelope as a table."""
+    """Write an envelope as a table."""
     return EnvelopeFile(
         aircraft=envelope.aircraft,
         model_hash=envelope.model_hash,
@@ -193,7 +193,7 @@ def envelope_file(envelope: Envelope) -> EnvelopeFile:
 
 
 def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
-    """Return the envelope of a table.  Raises LogError for arrays that do not fit each other, or axes out of order."""
+    """Read the envelope of a table.  Raises LogError for arrays that do not fit each other, or axes out of order."""
     speeds, heights = len(file.airspeed_mps), len(file.amsl_m)
 
     def table(name: str, shape: tuple[int, ...]) -> Floats:

@@ -1,11 +1,11 @@
-"""The `/state` channel: its protobuf schema, and numpy's view of its bytes.
+"""The `/state` channel: a row of the track as a protobuf message, its schema, and numpy's view of its bytes.
 
 Every field is a fixed32 or fixed64 and every field is written, zero or not, so that a message has one layout and n
 messages are one structured array.  Any protobuf parser reads them.  The schema is built here, so that no protoc is
 needed.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
@@ -66,17 +66,38 @@ _KINDS = {
 }
 
 
-def _fields() -> list[tuple[str, str, str, int]]:
-    """(name, numpy type, field of Track, column) of each message field after `row`, in order."""
+class StateField(NamedTuple):
+    """A field of the message.
+
+    name: with its unit.
+    kind: its numpy type.
+    source: the field of `Track` that it holds.
+    component: which of that field's columns; None for a field of one.
+    """
+
+    name: str
+    kind: str
+    source: str
+    component: int | None
+
+    def of(self, values: NDArray[Any]) -> NDArray[Any]:
+        """Its column of the values (t,) or (t, n) of the track's field."""
+        return values if self.component is None else values[:, self.component]
+
+
+def _fields() -> tuple[StateField, ...]:
+    """Every field of the message after `row`, in order."""
     found = []
-    for field, names in _NAMES.items():
-        kind = "<f8" if field in _DOUBLES else "<i4" if field == "leg" else "<f4"
-        found += [(name, kind, field, column) for column, name in enumerate(names)]
-    return found
+    for source, names in _NAMES.items():
+        kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
+        found += [StateField(name, kind, source, None if len(names) == 1 else k) for k, name in enumerate(names)]
+    return tuple(found)
 
 
 FIELDS = _fields()
-_MESSAGE_FIELDS = [("row", "<u4"), *((name, kind) for name, kind, _, _ in FIELDS)]
+_MESSAGE_FIELDS = [("row", "<u4"), *((field.name, field.kind) for field in FIELDS)]
+# A row as it is flown, by the names of `Track`, all float64.
+FLOWN_ROW = np.dtype([(name, np.float64, (width,) if width > 1 else ()) for name, width in COLUMNS.items()])
 
 
 def _file() -> descriptor_pb2.FileDescriptorProto:
@@ -164,46 +185,49 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def encode_rows(rows: NDArray[np.float64], first_row: int, channel: int) -> Rows:
-    """Encode flown rows as MCAP message records (t,) of `RECORD`.
+def named_rows(rows: NDArray[np.float64]) -> Rows:
+    """Flown rows (t, columns), in the order of `flight.simulation.track.COLUMNS`, as (t,) of `FLOWN_ROW`."""
+    return np.ascontiguousarray(rows).view(FLOWN_ROW).reshape(len(rows))
 
-    rows: (t, columns) in the order of `flight.simulation.track.COLUMNS`.
+
+def encode_rows(rows: Rows, first_row: int, channel: int) -> Rows:
+    """Encode flown rows, (t,) of `FLOWN_ROW`, as MCAP message records (t,) of `RECORD`.
 
     first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
     """
-    stamps = times_ns(rows[:, 0])
-    records: Rows = np.repeat(_TEMPLATE, len(stamps))
-    numbers = np.arange(first_row, first_row + len(stamps)).astype(np.uint32)
+    log_times = times_ns(rows["time"])
+    records: Rows = np.repeat(_TEMPLATE, len(rows))
+    numbers = np.arange(first_row, first_row + len(rows)).astype(np.uint32)
     records["channel"] = channel
     records["sequence"] = numbers
-    records["log_time"] = stamps
-    records["publish_time"] = stamps
+    records["log_time"] = log_times
+    records["publish_time"] = log_times
     state = records["state"]
     state["row"] = numbers
     with np.errstate(over="ignore", invalid="ignore"):
-        for column, (name, _, _, _) in enumerate(FIELDS):
-            state[name] = rows[:, column]
+        for field in FIELDS:
+            state[field.name] = field.of(rows[field.source])
     return records
 
 
-def join_rows(parts: list[Rows]) -> Rows:
-    """Join arrays of `RECORD`; as bytes, since numpy compares structured types name by name."""
+def join_rows(parts: list[Rows], kind: np.dtype[np.void]) -> Rows:
+    """Join arrays of one structured type; as bytes, since numpy compares structured types name by name."""
     if not parts:
-        return np.zeros(0, dtype=RECORD)
-    return np.concatenate([part.view(np.uint8) for part in parts]).view(RECORD)
+        return np.zeros(0, dtype=kind)
+    return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)
 
 
 def decode_rows(records: Rows) -> Track:
-    """Return the track in an array (t,) of `RECORD`."""
+    """Decode message records, (t,) of `RECORD`, to the track that they hold."""
     rows = records["state"]
     columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in COLUMNS}
-    for name, _, field, _ in FIELDS:
-        columns[field].append(rows[name])
+    for field in FIELDS:
+        columns[field.source].append(rows[field.name])
     return Track(*(parts[0] if len(parts) == 1 else np.stack(parts, axis=1) for parts in columns.values()))  # type: ignore[arg-type]  # one array a field, typed by Track
 
 
 def parse_row(data: bytes, parser: "type[Message]") -> Rows:
-    """One message in any layout that protobuf allows, (1,) of `RECORD`.
+    """Read one message in any layout that protobuf allows, as (1,) of `RECORD`.
 
     Raises google.protobuf.message.DecodeError.
     """
@@ -215,8 +239,8 @@ def parse_row(data: bytes, parser: "type[Message]") -> Rows:
 
 
 @compiled
-def _alike(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
-    """How many of the first rows have just the expected bytes in these columns."""
+def _count_matching(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
+    """Count the first records, rows of bytes, that have the expected bytes in these columns."""
     for row in range(len(raw)):
         for k in range(len(columns)):
             if raw[row, columns[k]] != expected[k]:
@@ -225,7 +249,7 @@ def _alike(raw: Bytes, columns: NDArray[np.int64], expected: Bytes) -> int:
 
 
 class RowMatcher:
-    """Finds runs of state messages of the known layout in a chunk's bytes."""
+    """Finds state messages of the known layout, one after the other, in a chunk's bytes."""
 
     def __init__(self, channel: int) -> None:
         """channel: the MCAP channel of the state messages in this file."""
@@ -238,9 +262,9 @@ class RowMatcher:
         self._columns = np.flatnonzero(fixed.view(np.uint8))
         self._expected = sample.view(np.uint8)[self._columns]
 
-    def run(self, data: bytes, offset: int) -> Rows:
-        """Return the records from ``offset`` on that have the layout and follow each other, (n,) of `RECORD`."""
+    def match(self, data: bytes, offset: int) -> Rows:
+        """Give the records that follow each other from ``offset`` on and have the layout, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)
-        found = _alike(raw, self._columns, self._expected)
+        found = _count_matching(raw, self._columns, self._expected)
         return raw[:found].reshape(-1).view(RECORD)

@@ -1,4 +1,4 @@
-"""The piece of terrain inside a log: exact heights, packed without loss.
+"""The terrain inside a log: exact heights, packed without loss, and how they lie on the map.
 
 A height is stored as the difference of its float32 bits from those of its western neighbour, the four bytes of all
 differences in planes, compressed with zstd.
@@ -13,6 +13,7 @@ import zstandard
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from logs.recording.attachment_names import TERRAIN, heights_name
 from world.errors import LogError
 from world.frames import MOST_TERMS, PolyMap
 from world.raster import MOST_PIXELS
@@ -20,7 +21,6 @@ from world.scenario_file import first_error
 from world.terrain import Terrain
 
 SCHEMA = "planfly.terrain/1"
-NAME = "terrain.json"
 _ENCODING = "float32 bits, difference to the west modulo 2^32, byte planes (low first), zstd"
 _PART_PIXELS = 4 * 2**20
 
@@ -48,11 +48,11 @@ class _File(BaseModel):
 
 
 def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
-    """Pack the terrain as named pieces of bytes, `NAME` among them."""
+    """Pack the terrain as attachments, bytes by name: `TERRAIN`, and the heights in parts."""
     rows, cols = terrain.heights.shape
     parts = {}
     for k, (first, last) in enumerate(_row_blocks(rows, cols)):
-        parts[f"terrain-{k:03d}.heights"] = _pack(terrain.heights[first:last])
+        parts[heights_name(k)] = _pack(terrain.heights[first:last])
     file = _File(
         rows=rows,
         cols=cols,
@@ -66,26 +66,27 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
         parts=list(parts),
     )
     text = json.dumps(file.model_dump(by_alias=True), indent=1)
-    return {NAME: text.encode(), **parts}
+    return {TERRAIN: text.encode(), **parts}
 
 
-def unpack_terrain(pieces: dict[str, bytes], source: str) -> Terrain:
-    """Make the same terrain again, bit for bit.
+def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
+    """Rebuild the packed terrain, bit for bit.
 
-    pieces: what `pack_terrain` gave, among others.  source: names the log in messages.  Raises LogError.
+    attachments: what `pack_terrain` gave, among others.  source: names the log in messages.  Raises LogError for
+    heights that are missing, damaged or of another size, and for a map that is none.
     """
     try:
-        file = _File.model_validate_json(pieces[NAME])
+        file = _File.model_validate_json(attachments[TERRAIN])
     except ValidationError as error:
-        raise LogError(f"{source}: {NAME}: {first_error(error)}") from error
+        raise LogError(f"{source}: {TERRAIN}: {first_error(error)}") from error
     if file.rows * file.cols > MOST_PIXELS:
-        raise LogError(f"{source}: {NAME}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read")
+        raise LogError(f"{source}: {TERRAIN}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read")
     blocks = _row_blocks(file.rows, file.cols)
-    if len(blocks) != len(file.parts) or any(name not in pieces for name in file.parts):
-        raise LogError(f"{source}: {NAME}: parts: {len(blocks)} are expected, each in the log")
+    if len(blocks) != len(file.parts) or any(name not in attachments for name in file.parts):
+        raise LogError(f"{source}: {TERRAIN}: parts: {len(blocks)} are expected, each in the log")
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
-        heights[first:last] = _unpack(pieces[name], last - first, file.cols, f"{source}: {name}")
+        heights[first:last] = _unpack(attachments[name], last - first, file.cols, f"{source}: {name}")
     rows = _coefficients(file.map_to_pixel, source)
     return Terrain(
         heights=heights,
@@ -126,7 +127,7 @@ def _unpack(data: bytes, rows: int, cols: int, where: str) -> NDArray[Any]:
 def _coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
-        raise LogError(f"{source}: {NAME}: map_to_pixel: {len(rows)} rows of {size}: 2 + 2n rows of n are expected")
+        raise LogError(f"{source}: {TERRAIN}: map_to_pixel: {len(rows)} rows of {size}: 2 + 2n rows of n are expected")
     if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
-        raise LogError(f"{source}: {NAME}: map_to_pixel: half-widths {rows[1][:2]}: not above 0")
+        raise LogError(f"{source}: {TERRAIN}: map_to_pixel: half-widths {rows[1][:2]}: not above 0")
     return np.array(rows)

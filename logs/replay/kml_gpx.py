@@ -25,7 +25,13 @@ EVERY = 0.5
 
 @dataclass(frozen=True, slots=True)
 class MapLine:
-    """A line on the map: (n,) degrees, and metres above mean sea level; marks: a name for each point, or none."""
+    """A line on the map.
+
+    name: of the line.
+    lat_deg, lon_deg: (n,).
+    amsl: (n,) m above mean sea level.
+    marks: a name for each point, or none.
+    """
 
     name: str
     lat_deg: Floats
@@ -35,7 +41,13 @@ class MapLine:
 
 
 def plan_line(setup: FlightSetup) -> MapLine:
-    """Route of a setup, its waypoints named as in a verdict."""
+    """Route of a setup, its waypoints named by number and mission item as in a verdict.
+
+    >>> from logs.recording.example_log import example_log
+    >>> line = plan_line(example_log().setup)
+    >>> line.name, line.marks
+    ('example plan', ('0 (item 1)', '1 (item 2)', '2 (item 3)'))
+    """
     points, items = setup.route.waypoints, setup.route.items
     lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
     marks = tuple(f"{k} (item {item})" if item >= 0 else str(k) for k, item in enumerate(items))
@@ -43,7 +55,14 @@ def plan_line(setup: FlightSetup) -> MapLine:
 
 
 def track_line(setup: FlightSetup, track: Track) -> MapLine:
-    """Flown track, thinned to a point each `EVERY` seconds and the last, rows without a position left out."""
+    """Flown track, thinned to a point each `EVERY` seconds and the last, rows without a position left out.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> line = track_line(log.setup, log.track)
+    >>> line.name, line.amsl.size, float(line.amsl[0])
+    ('example flown', 74, 200.0)
+    """
     good = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
     slots = np.floor(track.time[good] / EVERY + 1e-9)
     keep = np.concatenate([[True], np.diff(slots) > 0.0])[: good.size]
@@ -54,41 +73,52 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
 
 
 def kml_text(title: str, lines: list[MapLine]) -> str:
-    """KML document: a line each, heights absolute, and a placemark for each named point."""
+    """KML document: a folder for each line, heights absolute, and a placemark for each named point.
+
+    >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
+    >>> text = kml_text("one leg", [line])
+    >>> "<coordinates>8.00000000,46.00000000,500.000 8.00000000,46.01000000,520.000</coordinates>" in text
+    True
+    """
     ElementTree.register_namespace("", KML)
     root = ElementTree.Element(f"{{{KML}}}kml")
-    document = _under(root, "Document")
-    _under(document, "name", title)
+    document = _add(root, "Document")
+    _add(document, "name", title)
     for line in lines:
-        folder = _under(document, "Folder")
-        _under(folder, "name", line.name)
-        mark = _under(folder, "Placemark")
-        _under(mark, "name", line.name)
-        string = _under(mark, "LineString")
-        _under(string, "altitudeMode", "absolute")
-        _under(string, "coordinates", " ".join(_place(line, k) for k in range(len(line.lat_deg))))
+        folder = _add(document, "Folder")
+        _add(folder, "name", line.name)
+        mark = _add(folder, "Placemark")
+        _add(mark, "name", line.name)
+        string = _add(mark, "LineString")
+        _add(string, "altitudeMode", "absolute")
+        _add(string, "coordinates", " ".join(_coordinates(line, k) for k in range(len(line.lat_deg))))
         for k, name in enumerate(line.marks):
-            mark = _under(folder, "Placemark")
-            _under(mark, "name", name)
-            point = _under(mark, "Point")
-            _under(point, "altitudeMode", "absolute")
-            _under(point, "coordinates", _place(line, k))
+            mark = _add(folder, "Placemark")
+            _add(mark, "name", name)
+            point = _add(mark, "Point")
+            _add(point, "altitudeMode", "absolute")
+            _add(point, "coordinates", _coordinates(line, k))
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _under(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
+def _add(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
     element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
     element.text = "".join(ch for ch in text if ch.isprintable() or ch == " ") if text else None
     return element
 
 
-def _place(line: MapLine, k: int) -> str:
+def _coordinates(line: MapLine, k: int) -> str:
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 
 
 def gpx_text(title: str, lines: list[MapLine]) -> str:
-    """GPX document: a line with named points is a route, any other a track."""
+    """GPX document: a line with named points is a route, any other a track.
+
+    >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
+    >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])
+    True
+    """
     gpx = gpxpy.gpx.GPX()
     gpx.creator = "planfly"
     gpx.name = "".join(ch for ch in title if ch.isprintable())

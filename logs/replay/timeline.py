@@ -1,4 +1,4 @@
-"""The replay: a flight told again from its log alone, as a timeline of legs, turns, clearances and events.
+"""The timeline of a recorded flight, from its log alone: legs, turns, clearances, threats and events in order of time.
 
 Everything is recomputed from the track, the route, the terrain and the threats in the log; a recorded leg, clearance or
 verdict is not read.  Nothing is printed here.
@@ -23,16 +23,16 @@ from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 Floats = NDArray[np.float64]
 
 WIDTH = 100
-# The throttle counts as at a limit within this of 0 or 1, and is worth a line after this many seconds.
+# The throttle counts as at a limit within this of 0 or 1, and gets an entry after this many seconds.
 _THROTTLE_EDGE = 1e-3
 _THROTTLE_TIME = 2.0
-# Entries at one time stand in this order.
+# Kinds of entries; those at one time stand in this order.
 _ORDER = ("start", "turn", "leg", "ground", "threat", "throttle", "event", "end", "log")
 
 
 @dataclass(frozen=True, slots=True)
 class TimelineEntry:
-    """One thing that happened: time in s since the start, one of `_ORDER`, and a line of printable text."""
+    """One thing that happened: time in s since the start, a kind ("leg", "turn", "threat", ...), and printable text."""
 
     time: float
     kind: str
@@ -40,7 +40,7 @@ class TimelineEntry:
 
 
 @dataclass(frozen=True, slots=True)
-class _Stretch:
+class _LegRows:
     """Rows first..last (both included) that were flown on one leg."""
 
     leg: int
@@ -49,13 +49,21 @@ class _Stretch:
 
 
 def timeline(log: FlightLog) -> list[TimelineEntry]:
-    """Tell the flight as entries in order of time; the same log always gives the same ones."""
+    """List what happened in a flight, in order of time; the same log always gives the same entries.
+
+    >>> from logs.recording.example_log import example_log
+    >>> for entry in timeline(example_log())[3:6]:
+    ...     print(entry.time, entry.kind, "-", entry.text)
+    14.7... threat - inside the missile range of Alfa (300 m)
+    20.0 turn - turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°
+    20.0 leg - leg 1 to waypoint 2 (item 3): course 076°, 412 m, slope +2.8°, 25.0 m/s
+    """
     log = replace(log, track=with_legs(log.setup, log.track))
-    stretches = _stretches(log.track, log.setup.route)
+    parts = _leg_rows(log.track, log.setup.route)
     entries = [_start(log)]
-    entries += _legs(log, stretches)
-    entries += _turns(log, stretches)
-    entries += _clearances(log, stretches)
+    entries += _legs(log, parts)
+    entries += _turns(log, parts)
+    entries += _clearances(log, parts)
     entries += _threats(log)
     entries += _throttle(log.track)
     entries += [
@@ -68,7 +76,11 @@ def timeline(log: FlightLog) -> list[TimelineEntry]:
 
 
 def entry_lines(entry: TimelineEntry) -> list[str]:
-    """Set an entry in lines of at most `WIDTH` columns: time in seconds, kind, text."""
+    """Set an entry in lines of at most `WIDTH` columns: time in seconds, kind, text.
+
+    >>> entry_lines(TimelineEntry(20.0, "turn", "turn left 14.0° at waypoint 1"))
+    ['    20.00 s  turn     turn left 14.0° at waypoint 1']
+    """
     head = f"{entry.time:9.2f} s  {entry.kind:<9}"
     return textwrap.wrap(
         head + entry.text, WIDTH, subsequent_indent=" " * len(head), drop_whitespace=True, break_on_hyphens=False
@@ -80,23 +92,23 @@ def _printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-def _stretches(track: Track, route: Route) -> list[_Stretch]:
-    """Cut the track where the leg changes."""
+def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
+    """Cut the track where the leg changes, and leave out rows on no leg of the route."""
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]
-    cut = [_Stretch(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
-    return [stretch for stretch in cut if 0 <= stretch.leg < route.legs]
+    cut = [_LegRows(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
+    return [part for part in cut if 0 <= part.leg < route.legs]
 
 
-def _grouped(stretches: list[_Stretch], route: Route) -> list[list[_Stretch]]:
-    """Stretches, those around one circle together."""
+def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:
+    """Parts in order, those around one circle together."""
     first: list[int] = []
     for leg in range(route.legs):
         around = min(route.arcs[leg : leg + 2]) > 0.0 and route.items[leg] == route.items[leg + 1]
         goes_on = around and leg and route.arcs[leg - 1] > 0.0 and route.items[leg - 1] == route.items[leg]
         first.append(first[-1] if goes_on else leg)
-    return [list(group) for _, group in itertools.groupby(stretches, key=lambda stretch: first[stretch.leg])]
+    return [list(group) for _, group in itertools.groupby(parts, key=lambda part: first[part.leg])]
 
 
 def waypoint_name(route: Route, index: int) -> str:
@@ -117,69 +129,70 @@ def _start(log: FlightLog) -> TimelineEntry:
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 
-def _legs(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
+def _legs(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     route = log.setup.route
     courses, runs, slopes = leg_courses(route.waypoints), leg_runs(route.waypoints), leg_slopes(route.waypoints)
     entries = []
-    for group in _grouped(stretches, route):
-        stretch = group[0]
-        leg = stretch.leg
+    for group in _by_circle(parts, route):
+        part = group[0]
+        leg = part.leg
         if len(group) > 1:
             item, radius = int(route.items[leg]), route.arcs[leg]
             text = f"loiter of item {item}: legs {leg} to {group[-1].leg} around its circle, radius {radius:.0f} m"
-            entries.append(TimelineEntry(float(log.track.time[stretch.first]), "leg", text))
+            entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
             continue
         course = round(math.degrees(courses[leg])) % 360
         text = (
             f"leg {leg} to {waypoint_name(route, leg + 1)}: course {course:03d}°, {runs[leg]:.0f} m, "
             f"slope {math.degrees(slopes[leg]):+.1f}°, {route.airspeed[leg]:.1f} m/s"
         )
-        entries.append(TimelineEntry(float(log.track.time[stretch.first]), "leg", text))
+        entries.append(TimelineEntry(float(log.track.time[part.first]), "leg", text))
     return entries
 
 
-def _turns(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
+def _turns(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     """At each change to the next leg: the route's turn, and the peak bank from mid-leg to mid-leg."""
     route, track = log.setup.route, log.track
     turns = signed_turns(route.waypoints)
-    bank = np.abs(track.attitude[:, 0].astype(np.float64))
+    roll, _, _ = track.attitude.T
+    bank = np.abs(roll.astype(np.float64))
     entries = []
-    for before, after in itertools.pairwise(stretches):
-        # The corners of a circle are told as its loiter; a loiter that is left at once has one.
+    for before, after in itertools.pairwise(parts):
+        # The corners of a circle have one entry, their loiter's; a loiter that is left at once has a turn.
         same = route.items[max(0, after.leg - 1) : after.leg + 2] == route.items[after.leg]
         if after.leg != before.leg + 1 or (route.arcs[after.leg] > 0.0 and same.sum() > 1):
             continue
         angle = math.degrees(turns[before.leg])
-        way = "right" if angle > 0.0 else "left"
+        side = "right" if angle > 0.0 else "left"
         window = bank[(before.first + before.last) // 2 : (after.first + after.last) // 2 + 1]
         peak = math.degrees(float(np.nanmax(window))) if np.isfinite(window).any() else math.nan
-        text = f"turn {way} {abs(angle):.1f}° at {waypoint_name(route, after.leg)}, peak bank {peak:.1f}°"
+        text = f"turn {side} {abs(angle):.1f}° at {waypoint_name(route, after.leg)}, peak bank {peak:.1f}°"
         entries.append(TimelineEntry(float(track.time[after.first]), "turn", text))
     return entries
 
 
-def _clearances(log: FlightLog, stretches: list[_Stretch]) -> list[TimelineEntry]:
+def _clearances(log: FlightLog, parts: list[_LegRows]) -> list[TimelineEntry]:
     terrain, track = log.setup.scenario.terrain, log.track
     if terrain is None:
         return [TimelineEntry(float(track.time[0]), "ground", "no terrain in the log: clearance is not known")]
     low, at = segment_clearances(terrain, track.position)
     required = log.setup.scenario.limits.min_clearance_m
     entries = []
-    for group in _grouped(stretches, log.setup.route):
-        stretch, name = replace(group[0], last=group[-1].last), f"leg {group[0].leg}"
+    for group in _by_circle(parts, log.setup.route):
+        part, name = replace(group[0], last=group[-1].last), f"leg {group[0].leg}"
         if len(group) > 1:
             name = f"legs {group[0].leg} to {group[-1].leg}"
         # Segment k goes from row k to row k + 1; the one that leads into the next leg belongs to this one.
-        here = low[stretch.first : stretch.last + 1]
+        here = low[part.first : part.last + 1]
         if not np.isfinite(here).any():
-            time = float(track.time[stretch.first])
+            time = float(track.time[part.first])
             entries.append(TimelineEntry(time, "ground", f"{name}: no terrain data under it"))
             continue
-        k = stretch.first + int(np.nanargmin(here))
+        k = part.first + int(np.nanargmin(here))
         time = float(track.time[k] + at[k] * (track.time[k + 1] - track.time[k]))
-        short = "" if low[k] >= required else f", under the required {required:.0f} m"
-        part = "" if np.isfinite(here).all() else ", where there is terrain data"
-        text = f"lowest of {name}: {low[k]:.1f} m above ground{short}{part}"
+        below = "" if low[k] >= required else f", under the required {required:.0f} m"
+        known = "" if np.isfinite(here).all() else ", where there is terrain data"
+        text = f"lowest of {name}: {low[k]:.1f} m above ground{below}{known}"
         entries.append(TimelineEntry(time, "ground", text))
     return entries
 
@@ -188,22 +201,22 @@ def _threats(log: FlightLog) -> list[TimelineEntry]:
     threats, track = log.setup.scenario.threats, log.track
     entries = []
     for k, name in enumerate(threats.names):
-        for reach, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
+        for unit, radius in (("missile", threats.kill_radius[k]), ("radar", threats.detection_radius[k])):
             for stay in passages(track.time, track.position, threats.position[k], float(radius)):
-                entries += _stay(name, reach, float(radius), stay)
+                entries += _stay(name, unit, float(radius), stay)
     return entries
 
 
-def _stay(name: str, reach: str, radius: float, stay: Passage) -> list[TimelineEntry]:
-    entered = TimelineEntry(stay.start, "threat", f"inside the {reach} range of {name} ({radius:.0f} m)")
+def _stay(name: str, unit: str, radius: float, stay: Passage) -> list[TimelineEntry]:
+    entered = TimelineEntry(stay.start, "threat", f"inside the {unit} range of {name} ({radius:.0f} m)")
     inside = f"{stay.end - stay.start:.1f} s inside, closest {stay.closest:.0f} m"
     if not stay.whole:
-        return [entered, TimelineEntry(stay.end, "threat", f"still inside the {reach} range of {name}: {inside}")]
-    return [entered, TimelineEntry(stay.end, "threat", f"outside the {reach} range of {name}: {inside}")]
+        return [entered, TimelineEntry(stay.end, "threat", f"still inside the {unit} range of {name}: {inside}")]
+    return [entered, TimelineEntry(stay.end, "threat", f"outside the {unit} range of {name}: {inside}")]
 
 
 def _throttle(track: Track) -> list[TimelineEntry]:
-    throttle = track.commands[:, 3]
+    _, _, _, throttle = track.commands.T
     entries = []
     for name, held in (("full", throttle >= 1.0 - _THROTTLE_EDGE), ("closed", throttle <= _THROTTLE_EDGE)):
         padded = np.concatenate([[False], held, [False]])

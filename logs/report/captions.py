@@ -1,4 +1,4 @@
-"""What stands beside each picture of the report: heading, alternative text and caption."""
+"""Captions of the report's pictures: heading, alternative text, and how to read each."""
 
 import base64
 from collections.abc import Mapping
@@ -11,8 +11,11 @@ from flight.simulation.flight_setup import FlightSetup
 class ReportPicture:
     """One picture of the page.
 
-    identifier: of its section.  title: its heading.  alternative: its text for who cannot see it.  caption: how to read
-    it.  data: its address in the page.
+    identifier: of its section.
+    title: its heading.
+    alternative: its text for those who cannot see it.
+    caption: how to read it.
+    data: its address in the page.
     """
 
     identifier: str
@@ -22,6 +25,13 @@ class ReportPicture:
     data: str
 
 
+@dataclass(frozen=True, slots=True)
+class _Caption:
+    title: str
+    alternative: str
+    caption: str
+
+
 def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, bytes]) -> list[ReportPicture]:
     """List the page's pictures in its order; what was not drawn is left out.
 
@@ -29,21 +39,31 @@ def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, byte
     """
     return [
         ReportPicture(
-            name, *words, "data:image/png;base64," + base64.b64encode(pictures[f"{name}.png"]).decode("ascii")
+            identifier=name,
+            title=caption.title,
+            alternative=caption.alternative,
+            caption=caption.caption,
+            data="data:image/png;base64," + base64.b64encode(pictures[f"{name}.png"]).decode("ascii"),
         )
-        for name, words in _words(setup, flown).items()
+        for name, caption in _captions(setup, flown).items()
         if f"{name}.png" in pictures
     ]
 
 
-def _words(setup: FlightSetup, flown: bool) -> dict[str, tuple[str, str, str]]:
+def _captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
+    """Captions by the picture's name, in the page's order."""
+    return _route_captions(setup, flown) | _FLIGHT_CAPTIONS
+
+
+def _route_captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
+    """Captions of the pictures of route and terrain, which a plan has, too, that was not flown."""
     legs, threats = setup.route.legs, len(setup.scenario.threats)
     ground = "shaded terrain" if setup.scenario.terrain is not None else "no terrain"
     track = " and the flown track" if flown else ""
     heights = "planned and flown heights" if flown else "planned heights"
     progress = "Flown heights stand at the flight's progress along the planned path. " if flown else ""
     return {
-        "map": (
+        "map": _Caption(
             "Map",
             f"Map, north up: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
             "The broad line is the plan, the thin line on it the flight. Where they part, at corners, the aircraft "
@@ -51,50 +71,54 @@ def _words(setup: FlightSetup, flown: bool) -> dict[str, tuple[str, str, str]]:
             if flown
             else "Nothing was flown: the line is the plan.",
         ),
-        "profile": (
+        "profile": _Caption(
             "Profile",
             f"Heights along the path: terrain, required clearance, {heights}, the ceiling, and the missile and radar "
             "spheres that stand over the path.",
             f"{progress}A sphere is cut where the path runs through its column of air; the path is within reach only "
             "where its line lies inside the cut.",
         ),
-        "scene": (
+        "scene": _Caption(
             "3-D view",
             f"View from aside: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
             "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
             "What a ridge hides shows faintly.",
         ),
-        "turns": (
-            "Turn by turn, leg by leg",
-            "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground and waypoint.",
-            "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's. Ringed: fails.",
-        ),
-        "time": (
-            "Over time",
-            "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground.",
-            "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
-            "above ground is computed from track and terrain.",
-        ),
-        "exposure": (
-            "Exposure",
-            "Plots along the flown distance: strength and sum of the exposure to missiles and to radars.",
-            "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
-            "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time.",
-        ),
-        "controls": (
-            "Controls",
-            "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits.",
-            "Shaded: the command stands at the control's limit, and the aircraft can give no more.",
-        ),
-        "energy": (
-            "Energy",
-            "Plots over time: battery energy used, power, current, and the aircraft's energy as a height.",
-            "Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for.",
-        ),
-        "envelope": (
-            "Envelope",
-            "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit.",
-            "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
-            "outside for a moment, in a gust or a pull-up; a leg may not.",
-        ),
     }
+
+
+_FLIGHT_CAPTIONS = {
+    "turns": _Caption(
+        "Turn by turn, leg by leg",
+        "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground and waypoint.",
+        "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's. Ringed: fails.",
+    ),
+    "time": _Caption(
+        "Over time",
+        "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground.",
+        "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
+        "above ground is computed from track and terrain.",
+    ),
+    "exposure": _Caption(
+        "Exposure",
+        "Plots along the flown distance: strength and sum of the exposure to missiles and to radars.",
+        "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
+        "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time.",
+    ),
+    "controls": _Caption(
+        "Controls",
+        "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits.",
+        "Shaded: the command stands at the control's limit, and the aircraft can give no more.",
+    ),
+    "energy": _Caption(
+        "Energy",
+        "Plots over time: battery energy used, power, current, and the aircraft's energy as a height.",
+        "Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for.",
+    ),
+    "envelope": _Caption(
+        "Envelope",
+        "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit.",
+        "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
+        "outside for a moment, in a gust or a pull-up; a leg may not.",
+    ),
+}

@@ -1,4 +1,4 @@
-"""Two flights side by side: what each did, and the difference, from their logs alone."""
+"""Two flights measured alike, and their differences, from their logs alone."""
 
 import math
 from collections.abc import Callable
@@ -35,7 +35,12 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Two flights with their names and verdicts, and what differs."""
+    """Two flights and what differs.
+
+    logs, names, verdicts: of the first and the second flight.
+    differences: each quantity that was measured, differing or not.
+    notes: what the flights do not share, and how far apart their tracks are, in sentences.
+    """
 
     logs: tuple[FlightLog, FlightLog]
     names: tuple[str, str]
@@ -47,7 +52,15 @@ class Comparison:
 def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
     """Judge and measure both flights alike.
 
-    names: shown for each; where they are the same, (first) and (second) tell them apart.
+    names: of the two in tables and legends; "(first)" and "(second)" are added to names that are the same.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> comparison = compare_logs(log, log, names=("one", "other"))
+    >>> comparison.differences[0]
+    Difference(name='time in the air', unit='s', first=36.5, second=36.5)
+    >>> comparison.notes
+    ('tracks: 0.00 m apart on average, 0.00 m at most',)
     """
     if names[0] == names[1]:
         names = (f"{names[0]} (first)", f"{names[1]} (second)")
@@ -69,20 +82,23 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     """Measure a flight: (name, unit) and value."""
     good = np.isfinite(track.position).all(axis=1)
     position, time = np.ascontiguousarray(track.position[good]), np.ascontiguousarray(track.time[good])
+    roll, _, _ = track.attitude.T
     found = {
         ("time in the air", "s"): float(track.time[-1] - track.time[0]),
         ("distance flown", "m"): float(path_length(position)) if len(position) > 1 else math.nan,
         ("energy used", "Wh"): float(track.energy[-1]),
-        ("mean airspeed", "m/s"): _of(np.mean, track.airspeed),
-        ("highest", "m AMSL"): _of(np.max, position[:, 2]),
-        ("largest bank", "deg"): math.degrees(_of(np.max, np.abs(track.attitude[:, 0]))),
-        ("largest load factor", "g"): _of(np.max, track.load_factor),
-        ("largest cross-track", "m"): _of(np.max, np.abs(track.cross_track)),
-        ("typical cross-track (rms)", "m"): math.sqrt(_of(np.mean, track.cross_track.astype(np.float64) ** 2)),
-        ("largest height error", "m"): _of(np.max, np.abs(track.height_error)),
+        ("mean airspeed", "m/s"): _reduced(np.mean, track.airspeed),
+        ("highest", "m AMSL"): _reduced(np.max, position[:, 2]),
+        ("largest bank", "deg"): math.degrees(_reduced(np.max, np.abs(roll))),
+        ("largest load factor", "g"): _reduced(np.max, track.load_factor),
+        ("largest cross-track", "m"): _reduced(np.max, np.abs(track.cross_track)),
+        ("typical cross-track (rms)", "m"): math.sqrt(_reduced(np.mean, track.cross_track.astype(np.float64) ** 2)),
+        ("largest height error", "m"): _reduced(np.max, np.abs(track.height_error)),
     }
     if setup.scenario.terrain is not None and len(position) > 1:
-        found["least height above ground", "m"] = _of(np.min, segment_clearances(setup.scenario.terrain, position)[0])
+        found["least height above ground", "m"] = _reduced(
+            np.min, segment_clearances(setup.scenario.terrain, position)[0]
+        )
     threats = setup.scenario.threats
     if len(threats) and len(position) > 1:
         for name, radii, scales in (
@@ -100,7 +116,7 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
     return found
 
 
-def _of(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
+def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
     """Apply a reduction to the values that are numbers; NaN where there are none."""
     finite = values[np.isfinite(values)].astype(np.float64)
     return float(reduce(finite)) if finite.size else math.nan
@@ -119,7 +135,7 @@ def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
 
 
 def _notes(first: FlightLog, second: FlightLog) -> list[str]:
-    """Say what the two flights do not share, and how far apart their tracks are."""
+    """Note what the two flights do not share, and how far apart their tracks are."""
     a, b = first.setup, second.setup
     notes = []
     for name, left, right in (
@@ -153,7 +169,7 @@ def _wind(setup: FlightSetup) -> str:
 
 def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     """List quantity, unit, first, second, second less first, as text."""
-    first, second = (_word(verdict) for verdict in comparison.verdicts)
+    first, second = (_label(verdict) for verdict in comparison.verdicts)
     rows: list[tuple[str, ...]] = [("verdict", "", first, second, "")]
     for item in comparison.differences:
         digits = None if item.unit else 0
@@ -163,12 +179,22 @@ def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
     return rows
 
 
-def _word(verdict: Verdict) -> str:
+def _label(verdict: Verdict) -> str:
     return "flyable" if verdict.flyable else "not flyable" if verdict.complete else "incomplete"
 
 
 def difference_lines(comparison: Comparison) -> list[str]:
-    """Set the table of differences for a terminal."""
+    """Set the table of differences and the notes in lines for a terminal.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> lines = difference_lines(compare_logs(log, log, names=("one", "other")))
+    >>> for line in lines[:3]:
+    ...     print(line[-42:])
+             one        other  difference
+      not flyable  not flyable
+             36.5         36.5        0.00
+    """
     head = ("", "", *(name[-24:] for name in comparison.names), "difference")
     rows = [head, *difference_rows(comparison)]
     rows = [(f"{name} ({unit})" if unit else name, *rest) for name, unit, *rest in rows]

@@ -1,16 +1,16 @@
-"""The comparison of two flights as pictures and a page."""
+"""The comparison of two flights as files: pictures, and a page that holds them."""
 
 import base64
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
-from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_overlay
+from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_both_over_distance
 from logs.figures.elements.style import png_bytes, svg_bytes
 from logs.report.compare import Comparison, difference_rows
 from world.atomic_files import write_whole
 
-_WORDS = {
+_ALTERNATIVES = {
     "compare-map.png": "Both flights from above, over the first one's map",
     "compare-profile.png": "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
 }
@@ -19,12 +19,22 @@ _WORDS = {
 def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
     """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, made if it is missing.
 
-    svg: the pictures as SVG, too.  Returns the paths written.  Raises OSError.
+    svg: the pictures as SVG, too.  The map is left out where the flights' map origins differ.
+    Returns the paths written.  Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.report.compare import compare_logs
+    >>> log = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paths = write_comparison(Path(folder), compare_logs(log, log, names=("one", "other")))
+    >>> [path.name for path in paths]
+    ['compare-map.png', 'compare-profile.png', 'compare.html']
     """
     first, second = (
         NamedFlight(name, log.setup, log.track) for name, log in zip(comparison.names, comparison.logs, strict=True)
     )
-    figures = {"compare-profile": draw_overlay((first, second))}
+    figures = {"compare-profile": draw_both_over_distance((first, second))}
     if first.setup.scenario.origin == second.setup.scenario.origin:
         figures = {"compare-map": draw_both_on_map((first, second)), **figures}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
@@ -41,7 +51,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
 def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
     """The page, its pictures inside."""
     pictures = [
-        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _WORDS[name])
+        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _ALTERNATIVES[name])
         for name, data in files.items()
     ]
     verdicts = [

@@ -1,4 +1,4 @@
-"""The report of a flight: one HTML page that needs nothing else, and its pictures as files.
+"""The report of a flight: one HTML page that needs no other file, and its pictures as files.
 
 The page holds its pictures, its style and one script, that of the 3-D view, which its policy names by hash; it asks
 no network for anything, and without the script a still picture stands in the view's place.
@@ -41,14 +41,28 @@ def write_report(
     events: Sequence["LogEvent"] = (),
     svg: bool = False,
 ) -> list[Path]:
-    """Write the figures and ``report.html`` into a folder, made if it is missing.
+    """Write the figures of `logs.figures.draw_all.FIGURE_FILES` and ``report.html`` into a folder, made if missing.
 
-    The figures are those of `logs.figures.draw_all.FIGURE_FILES`.
-
+    track: None for a plan that was not flown.
+    ended: how the flight ended, as in its log; None where unknown.
+    versions: of planfly and the packages it depends on.
+    command: the command line that makes the same flight again.
+    events: the log's lines, shown with their times.
     svg: the figures as SVG, too.
 
     Everything is drawn before the first file is written; each file is written whole or not at all.
     Returns the paths written.  Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.judge_geometry import judge_geometry
+    >>> setup = example_log().setup
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paths = write_report(
+    ...         Path(folder), setup, None, judge_geometry(setup), ended=None, versions={}, command="planfly check"
+    ...     )
+    >>> [path.name for path in paths]
+    ['map.png', 'profile.png', 'scene.png', 'turns.png', 'envelope.png', 'report.html']
     """
     from logs.figures.draw_all import FIGURE_FILES, draw_pictures
 
@@ -56,7 +70,8 @@ def write_report(
     pictures = draw_pictures(setup, track, verdict, svg=svg)
     page = _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)
-    files = {name: data for name, data in pictures.items() if name.partition(".")[0] in FIGURE_FILES}
+    as_files = {f"{name}.{kind}" for name in FIGURE_FILES for kind in ("png", "svg")}
+    files = {name: data for name, data in pictures.items() if name in as_files}
     files["report.html"] = page.encode("utf-8")
     for name, data in files.items():
         write_whole(out_dir / name, data)
@@ -75,8 +90,10 @@ def report_html(
 ) -> str:
     """Make the page.
 
-    track: None for a plan that was not flown.  ended: how the flight ended, in the log's words; None where unknown.
-    versions: of planfly and what it stands on.  command: the command line that makes the same flight again.
+    track: None for a plan that was not flown.
+    ended: how the flight ended, as in its log; None where unknown.
+    versions: of planfly and the packages it depends on.
+    command: the command line that makes the same flight again.
     events: the log's lines, shown with their times.
     """
     from logs.figures.draw_all import draw_pictures

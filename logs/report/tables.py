@@ -1,4 +1,4 @@
-"""What a report's tables hold: the legs one by one, the facts of scenario and aircraft, the energy."""
+"""The contents of the report's tables: legs, threats, controls, energy, and facts of scenario and flight."""
 
 import hashlib
 import math
@@ -90,12 +90,13 @@ def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[s
     rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
     if track is None or rows.size == 0:
         return (NOTHING,) * 7
+    roll, _, _ = track.attitude[rows].T
     # A leg ends where the next one begins.
     last = min(int(rows[-1]) + 1, len(track) - 1)
     return (
         number(float(track.time[last] - track.time[rows[0]]), digits=1),
         number(float(np.mean(track.airspeed[rows], dtype=np.float64)), digits=1),
-        number(math.degrees(_peak(track.attitude[rows, 0])), digits=1),
+        number(math.degrees(_peak(roll)), digits=1),
         number(_peak(track.cross_track[rows]), digits=2),
         number(_peak(track.height_error[rows]), digits=2),
         number(_least(above[rows]) if above is not None else None, digits=1),
@@ -126,7 +127,7 @@ def _least(values: Floats) -> float:
 
 
 def scenario_facts(setup: FlightSetup) -> Facts:
-    """Describe the world that was flown in."""
+    """Facts of the scenario: area, terrain, threats, limits, wind."""
     scenario = setup.scenario
     terrain = scenario.terrain
     facts: Facts = [("Scenario", scenario.name)]
@@ -167,17 +168,17 @@ def _limit_facts(setup: FlightSetup) -> Facts:
     def angle(value: float | str) -> str:
         return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
 
-    blows = f"{quantity(wind.speed, 'm/s')} from {math.degrees(wind.from_course) % 360.0:03.0f}°"
+    wind_text = f"{quantity(wind.speed, 'm/s')} from {math.degrees(wind.from_course) % 360.0:03.0f}°"
     if wind.gradient:
         gain = number(100.0 * wind.gradient, signed=True)
-        blows += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gain} m/s per 100 m of height"
+        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gain} m/s per 100 m of height"
     return [
         (
             "Limits",
             f"turn {angle(limits.max_turn_deg)}, climb {angle(limits.max_climb_deg)}, "
             f"dive {angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground",
         ),
-        ("Wind", f"{blows if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
+        ("Wind", f"{wind_text if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
     ]
 
 
@@ -217,7 +218,7 @@ def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
 
 
 def notes_of(setup: FlightSetup) -> list[str]:
-    """List what the mission file said oddly, and what of it cannot be flown as written."""
+    """List the mission file's warnings, and what of it cannot be flown as written."""
     return [*setup.mission.warnings, *setup.route.notes]
 
 
@@ -259,27 +260,27 @@ PASSAGE_COLUMNS = ("unit", "reach", "entered (s)", "left (s)", "inside (s)", "cl
 
 
 def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
-    """List the stays inside missiles' and radars' reach, in order of time, in the columns of `PASSAGE_COLUMNS`."""
+    """List the stays inside missiles' and radars' spheres, in order of time, in the columns of `PASSAGE_COLUMNS`."""
     if track is None or len(track) == 0:
         return []
     threats = setup.scenario.threats
     stays = [
-        (stay, name, reach, float(radii[k]))
+        (stay, name, unit, float(radii[k]))
         for k, name in enumerate(threats.names)
-        for reach, radii in (("missile", threats.kill_radius), ("radar", threats.detection_radius))
+        for unit, radii in (("missile", threats.kill_radius), ("radar", threats.detection_radius))
         for stay in passages(track.time, track.position, threats.position[k], float(radii[k]))
     ]
     return [
         (
             name,
-            reach,
+            unit,
             number(stay.start, digits=1),
             number(stay.end, digits=1) if stay.whole else "still inside",
             number(stay.end - stay.start, digits=1),
             number(stay.closest, digits=0),
             number(radius, digits=0),
         )
-        for stay, name, reach, radius in sorted(stays, key=lambda item: item[0].start)
+        for stay, name, unit, radius in sorted(stays, key=lambda item: item[0].start)
     ]
 
 
@@ -289,16 +290,16 @@ def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, 
         return []
     lasts = np.append(np.diff(track.time), 0.0)
     rows: list[tuple[str, ...]] = []
-    for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
+    for k, ((name, limit), command) in enumerate(zip(control_limits(setup.aircraft), track.commands.T, strict=True)):
         low = 0.0 if name == "throttle" else -limit
         held = float(lasts[held_at_limit(track, k, low, limit)].sum())
         scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
-        peak = number(scale * _peak(track.commands[:, k]), digits=1)
-        shown = number(scale * limit, digits=1)
+        peak = number(scale * _peak(command), digits=1)
+        limit_text = number(scale * limit, digits=1)
         rows.append(
             (
                 name,
-                shown if shown == NOTHING else shown + unit,
+                limit_text if limit_text == NOTHING else limit_text + unit,
                 peak + unit,
                 number(held, digits=1) if math.isfinite(limit) else NOTHING,
                 number(100.0 * held / max(float(lasts.sum()), 1e-9), digits=1) if math.isfinite(limit) else NOTHING,

@@ -85,7 +85,7 @@ def judge_plan_only(plan: Plan) -> Verdict:
         count = int(plan.violations[violation])
         bad = bool(count) or margin < 0.0
         if rule == "turn":
-            bad = bad or plan.certificate.turn_room < 0.0
+            bad = bad or plan.certificate.available_length < 0.0
         known = math.isfinite(margin)
         reason = f"least margin {margin * factor:.2f} {unit}" if known else "no margin is known"
         if bad:

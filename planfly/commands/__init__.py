@@ -1,1 +1,1 @@
-"""The commands, one a file."""
+"""One module a command, each with a function of its own name; `registry` finds it."""

@@ -1,4 +1,4 @@
-"""``planfly aircraft``: what an aircraft is and can do, as a table and as pictures."""
+"""``planfly aircraft``: mass, trims, modes, envelope and step responses of an aircraft, as tables and as pictures."""
 
 import argparse
 import math
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.progress import progress
-from planfly.terminal.targets import prepare_folder, refuse_folder
+from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
 from world.atomic_files import write_whole
 from world.errors import PlanflyError
 
@@ -23,7 +23,7 @@ _WIND = 10.0
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """``planfly aircraft [NAME]``."""
+    """List the embedded aircraft, or print and draw the one that is named."""
     from aircraft.catalog import aircraft_names, find_aircraft, load_aircraft, model_hash
     from world.scenario_tables import names_folder
 
@@ -37,11 +37,11 @@ def aircraft(args: argparse.Namespace) -> int:
         identity = model_hash(chosen)
     except ValueError as error:
         raise PlanflyError(str(error)) from error
-    folder = Path(args.out) if args.out else Path("runs") / f"aircraft-{chosen.name}"
+    folder = Path(args.out) if args.out else RESULTS / f"aircraft-{chosen.name}"
     if args.out:
         refuse_folder(folder, args.overwrite)
     # Everything is worked out before anything is written.
-    pictures = _portray(chosen, identity, motor_braking=args.motor_braking)
+    pictures = _print_and_draw(chosen, identity, motor_braking=args.motor_braking)
     prepare_folder(folder, tuple(pictures))
     for name, data in pictures.items():
         write_whole(folder / name, data)
@@ -49,7 +49,7 @@ def aircraft(args: argparse.Namespace) -> int:
     return FLYABLE
 
 
-def _portray(chosen: "Aircraft", identity: str, *, motor_braking: bool) -> dict[str, bytes]:
+def _print_and_draw(chosen: "Aircraft", identity: str, *, motor_braking: bool) -> dict[str, bytes]:
     from flight.dynamics.characteristics import AMSL, modes_at, step_responses, trim_table
     from flight.dynamics.envelope_tables import load_envelope
     from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims

@@ -1,48 +1,64 @@
 """``planfly export``: a plan, a mission or a log as the files that its targets' suffixes name."""
 
 import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from flight.mission.fences import with_fences
-from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
-from logs.recording.reader import read_log
+from logs.recording.reader import FlightLog, read_log
 from logs.replay.kml_gpx import MapLine, gpx_text, kml_text, plan_line, track_line
-from planfly.airframe import load_airframe
-from planfly.open_mission import open_mission
+from planfly.open_mission import is_log, open_mission, open_plan
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.results import print_warnings
+from planfly.terminal.stored_logs import warn_of_loss
 from planfly.terminal.targets import refuse_existing
-from planner.plan import read_plan
 from world.atomic_files import write_whole
 from world.errors import MissionError
+from world.scenario import Scenario
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
 _HOLDS = {"fence": "fence items", "rally": "rally points"}
 
 
-def export(args: argparse.Namespace, *, log: bool) -> int:
-    """Read the source, then write every target; ``log``: the source is a flight log."""
-    source, targets = Path(args.plan), [Path(name) for name in args.files]
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """What an input holds.
+
+    mission: its items, and a plan's threats as fences.
+    lines: on a map, by what they are; none where no target asks for one.
+    notes: what the mission does not hold of the plan.
+    log: the input, where it is a flight log.
+    """
+
+    mission: Mission
+    lines: dict[str, MapLine] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    log: FlightLog | None = None
+
+
+def export(args: argparse.Namespace) -> int:
+    """Read the source, then write every target; 3 for a log that is cut short."""
+    path, targets = Path(args.plan), [Path(name) for name in args.files]
     for target in targets:
         if target.suffix.lower() not in MAPS:
-            _known(target)
-        refuse_existing(target, args.overwrite, Path(args.plan))
+            _refuse_unknown(target)
+        refuse_existing(target, args.overwrite, path)
     maps = any(target.suffix.lower() in MAPS for target in targets)
-    mission, notes, lines, problem = _from_log(source) if log else _from_mission(source, maps)
-    texts = [(target, *_text(mission, lines, target, str(source))) for target in targets]
-    print_warnings([*mission.warnings, *notes])
-    for target, text, what in texts:
+    source = _read_log(path) if path.is_file() and is_log(path) else _read_mission(path, maps)
+    texts = [(target, *_text(source, target, str(path))) for target in targets]
+    print_warnings([*source.mission.warnings, *source.notes])
+    for target, text, content in texts:
         write_whole(target, text)
-        print(f"{'map' if target.suffix.lower() in MAPS else 'mission':<9} {target} ({what})")
-    if problem:
-        print_warnings([problem])
+        print(f"{'map' if target.suffix.lower() in MAPS else 'mission':<9} {target} ({content})")
+    if source.log is not None and not source.log.complete:
+        warn_of_loss(source.log)
         return LOSS
     return FLYABLE
 
 
-def _known(target: Path) -> None:
+def _refuse_unknown(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
@@ -50,36 +66,39 @@ def _known(target: Path) -> None:
         raise MissionError(f"{target}: suffix {target.suffix!r}: allowed {allowed}") from None
 
 
-_Read = tuple[Mission, tuple[str, ...], list[MapLine], str]
-
-
-def _from_log(source: Path) -> _Read:
-    log = read_log(source)
-    problem = "" if log.complete else f"{source}: incomplete: {log.problem}; it ends at {log.end_time:.1f} s"
-    lines = [plan_line(log.setup)]
+def _read_log(path: Path) -> _Source:
+    log = read_log(path)
+    lines = {"plan": plan_line(log.setup)}
     if len(log.track):
-        lines.append(track_line(log.setup, log.track))
-    return log.setup.mission, (), lines, problem
+        lines["flown"] = track_line(log.setup, log.track)
+    return _Source(log.setup.mission, lines, log=log)
 
 
-def _from_mission(source: Path, maps: bool) -> _Read:
-    if not source.is_file():
-        raise MissionError(f"{source}: no such file; a plan.json, mission file or log is expected")
-    lines = [plan_line(open_mission(source, None, None).setup)] if maps else []
-    if source.suffix.lower() != ".json":
-        return read_mission(source), (), lines, ""
-    made = read_plan(source)
-    airframe = load_airframe(made.scenario)
-    mission = plan_mission(made, airframe.airspeed, airframe.max_bank, source=str(source))
-    fenced, notes = with_fences(mission, made.scenario)
-    return fenced, notes, lines, ""
+def _read_mission(path: Path, maps: bool) -> _Source:
+    """A plan or a mission file; a map wants its route, too, which not every mission has."""
+    if not path.is_file():
+        raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected")
+    is_plan = path.suffix.lower() == ".json"
+    if maps:
+        setup = open_mission(path, None, None).setup
+        lines = {"plan": plan_line(setup)}
+        return _with_fences(setup.mission, setup.scenario, lines) if is_plan else _Source(setup.mission, lines)
+    if not is_plan:
+        return _Source(read_mission(path))
+    opened = open_plan(path)
+    return _with_fences(opened.mission, opened.scenario, {})
 
 
-def _text(mission: Mission, lines: list[MapLine], target: Path, title: str) -> tuple[str, str]:
+def _with_fences(mission: Mission, scenario: Scenario, lines: dict[str, MapLine]) -> _Source:
+    fenced, notes = with_fences(mission, scenario)
+    return _Source(fenced, lines, notes)
+
+
+def _text(source: _Source, target: Path, title: str) -> tuple[str, str]:
     """Text of a target, and what it holds."""
-    suffix = target.suffix.lower()
+    suffix, mission = target.suffix.lower(), source.mission
     if suffix in MAPS:
-        return MAPS[suffix](title, lines), " and ".join(line.name.rsplit(" ", 1)[-1] for line in lines)
+        return MAPS[suffix](title, list(source.lines.values())), " and ".join(source.lines)
     kind = mission_kind(target)
     if kind in _HOLDS:
         count = len(mission.fences if kind == "fence" else mission.rally)

@@ -1,194 +1,27 @@
-"""Section V of the paper, run again: seeded runs of each problem in each encoding, and what they came to."""
+"""``planfly paper``: section V of the paper planned again, as tables and figures."""
 
-import itertools
-import os
-import signal
-import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
-from multiprocessing import get_context
+import argparse
+from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
-from planfly.airframe import load_airframe
-from planfly.pipeline import Advance, make_plan
-from planner.plan import Objective
-from planner.search.algorithms import find_algorithm
-from world.scenario import Scenario, load_scenario
-
-Floats = NDArray[np.float64]
-
-PROBLEMS = (7, 15, 30, 60)
-# The paper's planner, and the baselines that it is compared with (Figs. 9-12).
-PAPER, BASELINES = "umda", ("umda-cartesian", "umda-polar")
+from planfly.paper.files import file_names, table_text, write_figures, write_tables
+from planfly.paper.seeded_plans import PROBLEMS, plan_section, table
+from planfly.terminal.exit_codes import FLYABLE
+from planfly.terminal.progress import progress
+from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
 
 
-@dataclass(frozen=True, slots=True)
-class PaperRun:
-    """One seeded run.
-
-    waypoints: (w, 3) world m.  violations: (4,) counts; objectives: (4,), on the paper's points.  certified: the
-    continuous check passes and no missile reaches the path.  kill_probability, detection_probability: 1 minus the
-    product of (1 - p) over the points and units that the paper sums.  history: (g, 3) length ratio, kill exposure
-    and violations of the best path after each generation.  seconds: CPU time.
-    """
-
-    threats: int
-    algorithm: str
-    seed: int
-    waypoints: Floats
-    violations: tuple[int, ...]
-    objectives: tuple[float, ...]
-    certified: bool
-    kill_probability: float
-    detection_probability: float
-    evaluations: int
-    history: Floats
-    seconds: float
-
-    @property
-    def safe(self) -> bool:
-        """As the paper counts: no violation and no kill exposure on its six points a leg."""
-        return not any(self.violations) and self.objectives[Objective.KILL_EXPOSURE] == 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """One line of the table: the runs of one algorithm on one problem.
-
-    safe: by the paper's points; certified: by the continuous check.  length_median, length_worst: PLR of the runs
-    that are safe by the paper's points, None without any.  The others are over all runs.
-    """
-
-    threats: int
-    algorithm: str
-    runs: int
-    safe: int
-    certified: int
-    length_median: float | None
-    length_worst: float | None
-    kill_median: float
-    kill_worst: float
-    kill_probability_worst: float
-    detection_median: float
-    seconds_median: float
-
-
-def problem_name(threats: int) -> str:
-    """Name of the embedded scenario of a problem."""
-    return f"paper-{threats:02d}"
-
-
-def exposure_probability(scenario: Scenario, waypoints: Floats, kind: str) -> float:
-    """1 minus the product of (1 - p) over the dividing points and units within reach; p = (scale / d)^4, at most 1.
-
-    waypoints: (w, 3).  kind: "kill" or "detection".  The paper's sums (eq. 9, 10) have no upper bound; this has.
-    """
-    share = np.arange(6)[:, None] / 6.0
-    points = np.concatenate([a + share * (b - a) for a, b in itertools.pairwise(waypoints)])
-    points = np.vstack([points, waypoints[-1:]])
-    threats = scenario.threats
-    radius, scale = getattr(threats, f"{kind}_radius"), getattr(threats, f"{kind}_scale")
-    distance = np.sqrt(((points[:, None, :] - threats.position[None]) ** 2).sum(axis=-1))
-    chance = np.minimum(1.0, (scale / np.maximum(distance, 1.0)) ** 4)
-    chance[(distance > radius) | (radius <= 0.0)] = 0.0
-    return float(1.0 - np.prod(1.0 - chance))
-
-
-def run_once(threats: int, algorithm: str, seed: int) -> PaperRun:
-    """Plan once, and keep what tables and figures need."""
-    scenario = load_scenario(problem_name(threats))
-    airframe = load_airframe(scenario)
-    began = time.process_time()
-    plan = make_plan(scenario, airframe, seed, algorithm)
-    seconds = time.process_time() - began
-    return PaperRun(
-        threats=threats,
-        algorithm=plan.algorithm,
-        seed=seed,
-        waypoints=plan.waypoints,
-        violations=tuple(int(value) for value in plan.violations),
-        objectives=tuple(float(value) for value in plan.objectives),
-        certified=plan.safe,
-        kill_probability=exposure_probability(scenario, plan.waypoints, "kill"),
-        detection_probability=exposure_probability(scenario, plan.waypoints, "detection"),
-        evaluations=plan.evaluations,
-        history=plan.history,
-        seconds=seconds,
-    )
-
-
-def run_section(
-    problems: Sequence[int], runs: int, algorithm: str, jobs: int | None = None, advance: "Advance | None" = None
-) -> list[PaperRun]:
-    """All runs, in the order of problem, algorithm and seed 1..runs, whatever the number of processes.
-
-    algorithm: shown in place of the paper's; the two baselines always run beside it.  jobs: processes, by default
-    one for each core that this process may use.  Raises ScenarioError for an unknown algorithm.
-    """
-    names = [find_algorithm(algorithm, "--algorithm").name]
-    names += [name for name in BASELINES if name not in names]
-    tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, runs + 1)]
-    count = min(len(tasks), jobs or len(os.sched_getaffinity(0)))
-    done: list[PaperRun] = []
-    for item in _results(tasks, count):
-        done.append(item)
-        if advance is not None:
-            remark = f"{item.threats} threats, {item.algorithm}, seed {item.seed}"
-            advance(len(done), len(tasks), remark)
-    return done
-
-
-def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[PaperRun]:
-    """Results in the order of the tasks.  The first runs here: it compiles what the other processes then load."""
-    yield run_once(*tasks[0])
-    if count == 1:
-        yield from (run_once(*task) for task in tasks[1:])
-        return
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_leave_interrupts)
-    try:
-        yield from pool.map(_run_task, tasks[1:])
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _leave_interrupts() -> None:
-    """Ctrl-C reaches every process of the group; only the first one may speak of it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _run_task(task: tuple[int, str, int]) -> PaperRun:
-    return run_once(*task)
-
-
-def table(done: Sequence[PaperRun]) -> list[Row]:
-    """One row for each problem and algorithm, in the order they ran."""
-    groups: dict[tuple[int, str], list[PaperRun]] = {}
-    for item in done:
-        groups.setdefault((item.threats, item.algorithm), []).append(item)
-    return [_row(group) for group in groups.values()]
-
-
-def _row(group: list[PaperRun]) -> Row:
-    lengths = [item.objectives[Objective.LENGTH_RATIO] for item in group if item.safe]
-    kills = _column(group, lambda item: item.objectives[Objective.KILL_EXPOSURE])
-    return Row(
-        threats=group[0].threats,
-        algorithm=group[0].algorithm,
-        runs=len(group),
-        safe=sum(item.safe for item in group),
-        certified=sum(item.certified for item in group),
-        length_median=float(np.median(lengths)) if lengths else None,
-        length_worst=max(lengths) if lengths else None,
-        kill_median=float(np.median(kills)),
-        kill_worst=float(kills.max()),
-        kill_probability_worst=float(_column(group, lambda item: item.kill_probability).max()),
-        detection_median=float(np.median(_column(group, lambda item: item.objectives[Objective.DETECTION_EXPOSURE]))),
-        seconds_median=float(np.median(_column(group, lambda item: item.seconds))),
-    )
-
-
-def _column(group: list[PaperRun], value: Callable[[PaperRun], float]) -> Floats:
-    return np.array([value(item) for item in group])
+def paper(args: argparse.Namespace) -> int:
+    """Plan, write and print; 0 whatever the table holds: no path in it is an answer too."""
+    folder = Path(args.out) if args.out else RESULTS / "paper"
+    if args.out:
+        refuse_folder(folder, args.overwrite)
+    with progress("planning") as advance:
+        plans = plan_section(args.problems, args.runs, args.algorithm, args.jobs, advance)
+    rows = table(plans)
+    prepare_folder(folder, tuple(file_names(PROBLEMS)))
+    write_tables(folder, rows, plans)
+    with progress("drawing"):
+        write_figures(folder, plans)
+    print(table_text(rows))
+    print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
+    return FLYABLE

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,9 @@ from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
-from planfly.pipeline import flight_events, fly, make_plan, make_setup
+from planfly.pipeline import fly, make_plan, make_setup
 from planfly.refine import refine
+from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, write_missions, write_pictures, write_verdict
 from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, refuse_folder
@@ -20,7 +22,24 @@ from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_flight
 
 
-def run(args: argparse.Namespace) -> Verdict:
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """What every round has in common.
+
+    scenario: what each round is judged in.
+    airframe: its aircraft.
+    command: the line that repeats it, for the report.
+    folder: where the results go.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    seed: int
+    command: str
+    folder: Path
+
+
+def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
     scenario = with_flight(load_scenario(args.scenario), guidance=args.guidance, nav=args.nav)
     seed = choose_seed(scenario, args.seed)
@@ -28,11 +47,7 @@ def run(args: argparse.Namespace) -> Verdict:
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
     if args.out:
         refuse_folder(folder, args.overwrite)
-    command = f"planfly run {args.scenario} --seed {seed}" + "".join(
-        f" --{name} {value}"
-        for name, value in (("refine", args.refine), ("guidance", args.guidance), ("nav", args.nav))
-        if value
-    )
+    task = _Task(scenario, airframe, seed, _command_line(args, seed), folder)
     cleared = False
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
@@ -43,36 +58,42 @@ def run(args: argparse.Namespace) -> Verdict:
         if not cleared:
             prepare_folder(folder)
             cleared = True
-        return _fly_round(folder, scenario, airframe, plan, seed, command)
+        return _fly_round(task, plan)
 
     verdict, rounds = refine(scenario, args.refine, one_round, lambda number: _keep(folder, number))
     if args.refine:
         write_whole(folder / "rounds.json", json.dumps(rounds, indent=1) + "\n")
         _print_rounds(rounds, folder)
-    return verdict
+    return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
-def _fly_round(
-    folder: Path, scenario: Scenario, airframe: Airframe, plan: Plan, seed: int, command: str
-) -> tuple[Verdict, bool]:
+def _command_line(args: argparse.Namespace, seed: int) -> str:
+    options = (("refine", args.refine), ("guidance", args.guidance), ("nav", args.nav))
+    given = "".join(f" --{name} {value}" for name, value in options if value)
+    return f"planfly run {args.scenario} --seed {seed}{given}"
+
+
+def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
+    """Write a plan and its mission, and fly it if it is feasible: the verdict, and whether it was flown."""
+    folder, airframe = task.folder, task.airframe
     write_whole(folder / "plan.json", plan_json(plan))
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints")
     write_missions(mission, [folder / "mission.waypoints", folder / "mission.plan"])
-    setup = make_setup(scenario, airframe, mission, seed, plan=plan)
     if not plan.feasible:
         verdict = judge_plan_only(plan)
         write_verdict(folder / "verdict.json", verdict)
         print_verdict(verdict, [])
         print(f"results   {folder}/ (plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown)")
         return verdict, False
+    setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with progress("flying") as advance:
-        track, ended, verdict = fly(setup, airframe, folder / "flight.mcap", advance)
-    write_verdict(folder / "verdict.json", verdict)
+        flown = fly(setup, airframe, folder / "flight.mcap", advance)
+    write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):
-        write_pictures(folder, setup, track, verdict, ended, command, events=flight_events(track, ended))
-    print_verdict(verdict, setup.route.notes)
+        write_pictures(folder, setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)
+    print_verdict(flown.verdict, setup.route.notes)
     print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
-    return verdict, True
+    return flown.verdict, True
 
 
 def _keep(folder: Path, number: int) -> None:

@@ -57,7 +57,7 @@ def wind(text: str) -> tuple[float, float]:
     return speed, source
 
 
-def moment(text: str) -> float:
+def flight_time(text: str) -> float:
     """Time of a flight, s."""
     try:
         value = float(text)
@@ -68,9 +68,9 @@ def moment(text: str) -> float:
     return value
 
 
-def moment_or_stations(text: str) -> float | str:
+def time_or_stations(text: str) -> float | str:
     """A time of the flight, or where ground stations listen: an address has a colon."""
-    return text if ":" in text else moment(text)
+    return text if ":" in text else flight_time(text)
 
 
 def budget(text: str) -> tuple[int | None, float | None]:

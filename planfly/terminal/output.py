@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TextIO
 
 
-class _Patient(io.TextIOBase):
+class _TolerantStream(io.TextIOBase):
     """Writes to a stream until its reader has gone, and drops the rest."""
 
     def __init__(self, stream: TextIO) -> None:
@@ -21,7 +21,7 @@ class _Patient(io.TextIOBase):
         return True
 
     def isatty(self) -> bool:
-        """Tell what the stream behind is."""
+        """Whether the stream behind is a terminal."""
         return self._stream.isatty()
 
     def write(self, text: str, /) -> int:
@@ -49,11 +49,11 @@ class _Patient(io.TextIOBase):
 
 
 @contextlib.contextmanager
-def patient_output() -> Iterator[None]:
+def tolerate_closed_output() -> Iterator[None]:
     """Let standard output be closed by whoever reads it."""
-    patient = _Patient(sys.stdout)
-    with contextlib.redirect_stdout(patient):
+    tolerant = _TolerantStream(sys.stdout)
+    with contextlib.redirect_stdout(tolerant):
         try:
             yield
         finally:
-            patient.flush()
+            tolerant.flush()

@@ -8,9 +8,8 @@ from planfly import __version__
 from planfly.terminal.argument_types import (
     budget,
     count,
+    flight_time,
     leg,
-    moment,
-    moment_or_stations,
     port,
     positive,
     positive_count,
@@ -18,6 +17,7 @@ from planfly.terminal.argument_types import (
     seed,
     speedup,
     threat,
+    time_or_stations,
     wind,
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
@@ -222,7 +222,7 @@ def _add_log_commands(command: _Command) -> None:
 def _add_replay_and_recover(command: _Command) -> None:
     replay = command(
         "replay",
-        "tell a flight again from its log alone: on a terminal as instruments, elsewhere as a timeline",
+        "replay a flight from its log alone: on a terminal as instruments, elsewhere as a timeline",
         "planfly replay flight.mcap --speed 20 --from 60",
     )
     replay.add_argument("log", metavar="LOG.mcap", help="a flight log")
@@ -233,11 +233,11 @@ def _add_replay_and_recover(command: _Command) -> None:
         help="at X times real time (default: 1 on a terminal and into Foxglove; a film of 20 s; else at once)",
     )
     replay.add_argument("--at-once", action="store_true", help="the timeline at once, on a terminal too")
-    replay.add_argument("--from", dest="start", metavar="S", type=moment, help="from this time of the flight, s")
+    replay.add_argument("--from", dest="start", metavar="S", type=flight_time, help="from this time of the flight, s")
     replay.add_argument(
         "--to",
         metavar="S|IP:PORT,...",
-        type=moment_or_stations,
+        type=time_or_stations,
         help="to this time of the flight, s; or play the log into the ground stations that listen there",
     )
     _own_link(replay, bind="127.0.0.1:0")
@@ -290,7 +290,7 @@ def _add_serve(command: _Command) -> None:
 def _add_paper(command: _Command) -> None:
     paper = command(
         "paper",
-        "run the paper's section V again: tables and figures of seeded runs in three encodings",
+        "plan the paper's section V again: tables and figures of seeded plans in three encodings",
         "planfly paper --problems 7,60 --runs 5 --out my-paper",
     )
     paper.add_argument(

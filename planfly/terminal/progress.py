@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def progress(title: str) -> Iterator["Advance"]:
-    """Report a stage of work; the caller tells how much of how much is done, and a remark."""
+    """Report a stage of work; the caller reports how much of how much is done, and a remark."""
     if not sys.stderr.isatty():
         yield from _lines(title)
         return

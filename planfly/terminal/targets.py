@@ -4,7 +4,7 @@ from pathlib import Path
 
 from world.errors import PlanflyError
 
-RUNS = Path("runs")
+RESULTS = Path("runs")
 RUN_FILES = (
     "plan.json",
     "mission.waypoints",
@@ -55,14 +55,26 @@ def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:
     rounds = sorted(folder.glob("round-[0-9]*")) if files is RUN_FILES else []
     if files is RUN_FILES:
         (folder / "rounds.json").unlink(missing_ok=True)
-    for place in (folder, *rounds):
+    for directory in (folder, *rounds):
         for name in files:
-            (place / name).unlink(missing_ok=True)
-        if place != folder and not any(place.iterdir()):
-            place.rmdir()
+            (directory / name).unlink(missing_ok=True)
+        if directory != folder and not any(directory.iterdir()):
+            directory.rmdir()
 
 
 def default_folder(name: str, seed: int) -> Path:
-    """Where results go that nobody named a place for: ``runs/<name>-seed<N>``."""
+    """Where results go that nobody named a folder for: ``runs/<name>-seed<N>``."""
     safe = "".join(letter if letter.isalnum() or letter in "-_." else "-" for letter in name).lstrip(".") or "run"
-    return RUNS / f"{safe}-seed{seed}"
+    return RESULTS / f"{safe}-seed{seed}"
+
+
+def named_or_default(named: str | None, default: Path, overwrite: bool, source: Path) -> Path:
+    """The target file that was named, or the default, which is replaced.
+
+    source: the input, which no target may be.  Raises PlanflyError for a named one that `refuse_existing` refuses.
+    """
+    if named is None:
+        return default
+    target = Path(named)
+    refuse_existing(target, overwrite, source)
+    return target

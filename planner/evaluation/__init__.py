@@ -1,1 +1,1 @@
-"""What a candidate path is judged by: its encoding, the problem as arrays, the scores, and the certificate."""
+"""What a candidate path is evaluated by: its encoding, the problem as arrays, the scores, and the certificate."""

@@ -1,6 +1,7 @@
 """Encodings: how a vector of numbers in a box becomes waypoints.
 
-`rotated` is the paper's idea (section III, eq. 12); `cartesian` and `polar` are what the paper compares it with.
+`rotated` is the idea of Yang, Tang and Lozano (CEC 2014, section III, eq. 12); `cartesian` and `polar` are what they
+compare it with.
 Lengths, angles and slopes survive the rotation, so nothing outside this file works in rotated axes except the
 grids that seed a search.
 """
@@ -8,6 +9,7 @@ grids that seed a search.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,51 +20,64 @@ Floats = NDArray[np.float64]
 _SHORTEST = 0.05
 
 
-@dataclass(frozen=True, slots=True)
-class Frame:
-    """The rotated frame: `along` from start to destination on the plane, `across` to its left, `up` unchanged.
+class RotatedFrame(NamedTuple):
+    """The rotated frame: `along` from start to destination on the map, `across` to its left, `up` unchanged (eq. 12).
 
-    origin: (2,) m.  direction: (2,) unit vector.  length: horizontal distance D, m.
+    east, north: of its origin, the start, m.
+    cosine, sine: of the angle from east to the destination, counter-clockwise.
+    length: horizontal distance D from start to destination, m.
     """
 
-    origin: Floats
-    direction: Floats
+    east: float
+    north: float
+    cosine: float
+    sine: float
     length: float
 
     def rotate(self, points: ArrayLike) -> Floats:
         """World (..., 3) to along, across, up (eq. 12)."""
         points = np.asarray(points, dtype=np.float64)
-        east, north = points[..., 0] - self.origin[0], points[..., 1] - self.origin[1]
-        c, s = self.direction
+        east, north = points[..., 0] - self.east, points[..., 1] - self.north
+        c, s = self.cosine, self.sine
         return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
 
     def restore(self, points: ArrayLike) -> Floats:
         """Along, across, up (..., 3) to world: the inverse of `rotate`."""
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
-        c, s = self.direction
+        c, s = self.cosine, self.sine
         out = np.empty(points.shape)
-        out[..., 0] = self.origin[0] + c * along - s * across
-        out[..., 1] = self.origin[1] + s * along + c * across
+        out[..., 0] = self.east + c * along - s * across
+        out[..., 1] = self.north + s * along + c * across
         out[..., 2] = points[..., 2]
         return out
 
 
-def rotated_frame(start: Floats, destination: Floats) -> Frame:
+def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
     """Frame of a mission.  Raises ValueError if start and destination share a place on the map."""
     step = destination[:2] - start[:2]
     length = math.hypot(step[0], step[1])
     if length == 0.0:
         raise ValueError("start and destination have the same place: there is no direction along the path")
-    return Frame(np.array(start[:2]), step / length, length)
+    east, north = step / length
+    return RotatedFrame(float(start[0]), float(start[1]), float(east), float(north), length)
 
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
     """A box and the way from its vectors to paths.
 
-    lower, upper: (d,), d = 3(w - 2), three numbers a waypoint in flying order.  decode: (n, d) -> (n, w, 3)
-    world m, start and destination included.
+    name: by which scenarios and commands know it.
+    waypoints: w, of a path, start and destination included.
+    lower, upper: (d,) box, d = 3(w - 2), three numbers a waypoint in flying order.
+    decode: (n, d) -> (n, w, 3) world m, start and destination included.
+
+    >>> space = Space(np.zeros(3), np.array([3000.0, 4000.0, 0.0]), np.array([[0, 3000], [0, 4000]]), (0.0, 500.0))
+    >>> encoding = rotated(space, 4)
+    >>> encoding.lower[0::3].tolist(), encoding.upper[0::3].tolist()  # along, of each waypoint its own interval
+    ([0.0, 2500.0], [2500.0, 5000.0])
+    >>> encoding.decode(np.array([[1000.0, 0.0, 100.0, 4000.0, 0.0, 100.0]])).round(6).tolist()
+    [[[0.0, 0.0, 0.0], [600.0, 800.0, 100.0], [2400.0, 3200.0, 100.0], [3000.0, 4000.0, 0.0]]]
     """
 
     name: str
@@ -81,8 +96,11 @@ class Encoding:
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """Where a path may go: its ends (3,), the map (2, 2), heights up[0]..up[1] and the reach across, all in m.
+    """Where a path may go; lengths in m.
 
+    start, destination: (3,) fixed ends.
+    bounds: (2, 2) map.
+    up: lowest and highest waypoint.
     across: half-width of the box either side of the straight line, or None to take it from the map.
     """
 
@@ -100,7 +118,7 @@ def _with_ends(space: Space, inner: Floats) -> Floats:
 
 
 def rotated(space: Space, waypoints: int) -> Encoding:
-    """Paper's encoding: inner waypoint i lies in the i-th of w - 2 equal intervals along the way (section III)."""
+    """Rotated frame: inner waypoint i lies in the i-th of w - 2 equal intervals along the way (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     left, right = _across_spans(frame, space, edges)
@@ -119,19 +137,18 @@ def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
     return np.clip(inner.reshape(len(paths), -1), encoding.lower, encoding.upper)
 
 
-def _across_spans(frame: Frame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
+def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
     """Span (k,), (k,) across the line that the map covers between each two edges (k + 1,) along.
 
-    +-across where that is given.
+    From -across to across where the space gives that.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
-    c, s = frame.direction
+    c, s = frame.cosine, frame.sine
     along = np.linspace(edges[:-1], edges[1:], 9, axis=1)
     a, b = np.full(along.shape, -math.inf), np.full(along.shape, math.inf)
-    for axis, (share, slope) in enumerate(((c, -s), (s, c))):
-        first = space.bounds[axis, 0] - frame.origin[axis] - share * along
-        last = space.bounds[axis, 1] - frame.origin[axis] - share * along
+    for (west, east), origin, share, slope in zip(space.bounds, frame[:2], (c, s), (-s, c), strict=True):
+        first, last = west - origin - share * along, east - origin - share * along
         if abs(slope) > 1e-12:
             a = np.maximum(a, np.minimum(first / slope, last / slope))
             b = np.minimum(b, np.maximum(first / slope, last / slope))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, PerformanceTable, turn_tangents, wind_speed_at
-from planner.evaluation.problem_arrays import Rules
+from planner.evaluation.problem_arrays import ProblemArrays
 from world.geometry import turning_angle
 from world.kernels import compiled, inlined
 
@@ -17,24 +17,18 @@ ARC_STEP = math.radians(15.0)
 
 
 @inlined
-def blend_reach(table: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
     """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
-    speed = table.airspeed + wind_speed_at(table, amsl)
-    reach: float = speed * speed / (2.0 * BLEND_ACCELERATION)
-    return reach
+    speed = aircraft.airspeed + wind_speed_at(aircraft, amsl)
+    length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
+    return length
 
 
 @compiled
-def corner(rules: Rules, before: Floats, at: Floats, after: Floats, radius: float) -> Floats:  # pragma: no cover
-    """Vertices (k, 3) of the way that a flight takes past a waypoint: see `corner_past`."""
-    return corner_past(rules.aircraft, before, at, after, radius)
-
-
-@compiled
-def corner_past(
-    table: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
-) -> Floats:  # pragma: no cover
-    """Vertices (k, 3) of the way that a flight takes past a waypoint, at least as low as the flight.
+def fly_by_vertices(
+    aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
+) -> Floats:  # pragma: no cover - compiled
+    """Vertices (k, 3) of the way that a flight takes past the waypoint `at`, at least as low as the flight.
 
     They are: a point on the leg where the blend of heights begins, the fly-by arc of this radius from tangent point to
     tangent point, and a point on the next leg where the blend ends.  Height is even along the arc; where the slope
@@ -56,22 +50,23 @@ def corner_past(
     arc = radius * turn if chords > 0 else 0.0
     low, high = at[2] - tangent * slope_in, at[2] + tangent * slope_out
     slope = (high - low) / arc if chords > 0 else slope_out
-    room_in, room_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
-    beside = 0.5 * arc if chords > 0 else min(room_in, room_out)
-    room_in, room_out = min(room_in, beside), min(room_out, beside)
-    reach = blend_reach(table, at[2])
-    half_in = min(abs(slope_in - slope) * reach, room_in)
-    half_out = min(abs(slope - slope_out) * reach, room_out) if chords > 0 else half_in
-    cut_in = 0.25 * max(0.0, slope_in - slope) * half_in
-    cut_out = 0.25 * max(0.0, slope - slope_out) * half_out
+    available_in, available_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
+    beside = 0.5 * arc if chords > 0 else min(available_in, available_out)
+    available_in, available_out = min(available_in, beside), min(available_out, beside)
+    blend = half_blend_length(aircraft, at[2])
+    half_in = min(abs(slope_in - slope) * blend, available_in)
+    half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
+    deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in
+    deviation_out = 0.25 * max(0.0, slope - slope_out) * half_out
     out = np.empty((chords + 3, 3))
     _set(out, 0, at[0] - ux * (tangent + half_in), at[1] - uy * (tangent + half_in), low - half_in * slope_in)
     side = 1.0 if ux * vy - uy * vx >= 0.0 else -1.0
     for k in range(chords + 1):
         f = k / chords if chords > 0 else 0.0
         ahead, aside = radius * math.sin(f * turn) - tangent, side * radius * (1.0 - math.cos(f * turn))
-        cut = cut_in + f * (cut_out - cut_in)
-        _set(out, k + 1, at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside, low + f * (high - low) - cut)
+        lowered = deviation_in + f * (deviation_out - deviation_in)
+        east, north = at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside
+        _set(out, k + 1, east, north, low + f * (high - low) - lowered)
     away = tangent + half_out
     _set(out, chords + 2, at[0] + vx * away, at[1] + vy * away, high + half_out * slope_out)
     return out
@@ -85,28 +80,28 @@ def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  
 
 
 @compiled
-def corner_radii(rules: Rules, path: Floats) -> Floats:  # pragma: no cover - compiled
+def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
     """Radius (m) of the fly-by arc at each waypoint (w,); 0 at the ends and where the path goes straight on.
 
     Where a number alone limits turns, a leg may be shorter than its two turns.  Nothing flies those arcs, so there
-    are none: the corners are judged as drawn, and the flight shows what the aircraft makes of them.  A fly-over passes
-    outside its corner, and has none either.
+    are none: the corners are evaluated as drawn, and the flight shows what the aircraft makes of them.  A fly-over
+    passes outside its corner, and has none either.
     """
-    if rules.fly_over:
+    if data.fly_over:
         return np.zeros(path.shape[0])
-    tangents = turn_tangents(rules.aircraft, path)
+    tangents = turn_tangents(data.aircraft, path)
     count = path.shape[0]
     fits = np.ones(count, dtype=np.bool_)
-    if not rules.room:
+    if not data.legs_hold_turns:
         for i in range(count - 1):
             if tangents[i] + tangents[i + 1] > math.hypot(path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]):
                 fits[i] = False
                 fits[i + 1] = False
+    radii = np.zeros(count)
     for i in range(1, count - 1):
         if not fits[i]:
-            tangents[i] = 0.0
             continue
         turn = turning_angle(path[i - 1, 0], path[i - 1, 1], path[i, 0], path[i, 1], path[i + 1, 0], path[i + 1, 1])
         half = math.tan(0.5 * min(turn, math.pi - 1e-6))
-        tangents[i] = tangents[i] / half if half > 1e-9 and not math.isinf(tangents[i]) else 0.0
-    return tangents
+        radii[i] = tangents[i] / half if half > 1e-9 and not math.isinf(tangents[i]) else 0.0
+    return radii

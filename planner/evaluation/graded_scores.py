@@ -1,6 +1,6 @@
-"""The graded judge: how far a path misses its constraints, along the whole of it, and how long missiles reach it.
+"""The graded scores: how far a path violates its constraints, along the whole of it, and how long missiles reach it.
 
-It looks at every leg, and at the arcs and parabolas with which a flight cuts the corners, where these could come out
+They look at every leg, and at the arcs and parabolas with which a flight cuts the corners, where these could come out
 differently.
 """
 
@@ -11,12 +11,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
-from planner.evaluation.fly_by_corners import ARC_STEP, blend_reach, corner_past
-from planner.evaluation.leg_constraints import Gauge, constraints, make_gauge, measure_corners, measure_legs
-from planner.evaluation.missile_index import Missiles, kill_density
+from planner.evaluation.clearance_buffer import RequiredClearance
+from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length
+from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
+from planner.evaluation.leg_geometry import CORNER, LEG, measure_corners, measure_legs
+from planner.evaluation.missile_index import MissileIndex, kill_density
 from planner.evaluation.paper_scores import POINTS
-from planner.evaluation.problem_arrays import CORNER_SLACK, Rules, Steep
-from planner.evaluation.terrain_clearance import DEPTH, GROUND_A, GROUND_B, LINE, pixels, sound, terrain_excess
+from planner.evaluation.problem_arrays import (
+    OBJECTIVES,
+    VIOLATIONS,
+    ProblemArrays,
+    Record,
+    Records,
+    SlopeBounds,
+    as_columns,
+)
+from planner.evaluation.terrain_clearance import TERRAIN_LEG, sample_terrain, segment_pixels, terrain_excess
 from world.frames import PolyMapRecord
 from world.kernels import compiled, compiled_views, inlined
 
@@ -24,171 +34,202 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Heights = NDArray[np.float32]
 
+# A corner that a flight takes further from the legs than this (m) is evaluated in any case.
+CORNER_TOLERANCE = 30.0
 # Rise of an arc above its chord, as a share of its radius.
 CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
-# Columns of `Bench.bends`.
-RADIUS, DROP, ASIDE, REACH, WATCH = 0, 1, 2, 3, 4
+# How a corner that is flown departs from the legs, m: radius of its arc, downwards and sideways at most.
+FLOWN_CORNER = np.dtype(
+    [
+        ("radius", np.float64),
+        ("blend_deviation", np.float64),
+        ("fly_by_offset", np.float64),
+        # How far from the legs missiles matter to it; 0 where it is evaluated in any case.
+        ("missile_distance", np.float64),
+    ],
+    align=True,
+)
+# Distance from missiles near both ends of a leg, m.
+MISSILE_GAP = np.dtype([("at_beginning", np.float64), ("at_end", np.float64)], align=True)
 
 
-class Bench(NamedTuple):
-    """Scratch for judging one path after another.
+class PathScratch(NamedTuple):
+    """Scratch for evaluating one path of w waypoints after another.
 
-    legs, corners: measured.  bends: (w, 5) of `_measure_bends`.  lines: (w - 1, `LINE`) of `sound`, asked: (w - 1,)
-    legs that it has not finished.  gaps: (w - 1, 2) distance from missiles near both ends of each leg.
+    legs: `LEG` records (w - 1,), and corners: `CORNER` records (w,), as measured.
+    flown: `FLOWN_CORNER` records (w,).
+    extents: (w,) how far from each waypoint a flight leaves the legs, m.
+    terrain_legs: `TERRAIN_LEG` records (w - 1,), and unfinished: (w - 1,) legs whose samples are not all taken.
+    gaps: `MISSILE_GAP` records (w - 1,).
     """
 
-    legs: Floats
-    corners: Floats
-    bends: Floats
-    lines: Floats
-    gaps: Floats
-    asked: Ints
+    legs: Records
+    corners: Records
+    flown: Records
+    extents: Floats
+    terrain_legs: Records
+    unfinished: Ints
+    gaps: Records
 
 
 @compiled
-def make_bench(rules: Rules, count: int) -> Bench:  # pragma: no cover - compiled
+def make_scratch(count: int) -> PathScratch:  # pragma: no cover - compiled
     """Scratch for paths of `count` waypoints."""
-    return Bench(
-        np.empty((count - 1, 4)),
-        np.zeros((count, 2)),
-        np.zeros((count, 5)),
-        np.empty((count - 1, LINE)),
-        np.empty((count - 1, 2)),
-        np.empty(count - 1, dtype=np.int64),
+    return PathScratch(
+        np.zeros(count - 1, dtype=LEG),
+        np.zeros(count, dtype=CORNER),
+        np.zeros(count, dtype=FLOWN_CORNER),
+        np.zeros(count),
+        np.zeros(count - 1, dtype=TERRAIN_LEG),
+        np.zeros(count - 1, dtype=np.int64),
+        np.zeros(count - 1, dtype=MISSILE_GAP),
     )
 
 
 @compiled
 def score_path(
-    rules: Rules, gauge: Gauge, bench: Bench, paths: Floats, n: int, missed: Floats, objectives: Floats
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    scratch: PathScratch,
+    path: Floats,
+    violations: Record,
+    objectives: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Judge path n of (n, w, 3): rows n of missed (n, 4), which must be 0, and of objectives."""
-    # Arrays are taken out of the rules once: handing the rules on costs more than a leg's whole judgement.
-    heights, to_pixel, missiles = rules.heights, rules.to_pixel, rules.missiles
-    steep, table, clear, margin = rules.steep, rules.aircraft, gauge.clear, rules.kill_margin
-    legs, corners, bends, lines, gaps = bench.legs, bench.corners, bench.bends, bench.lines, bench.gaps
-    asked = bench.asked
-    count = paths.shape[1]
-    measure_legs(paths, n, legs)
-    measure_corners(rules, gauge, paths, n, legs, corners)
-    constraints(rules, gauge, paths, n, legs, corners, True, missed)
-    _measure_bends(table, rules.room, rules.fly_over, paths, n, legs, corners, bends)
-    sound(heights, steep, to_pixel, clear, paths, n, legs, bends[:, REACH], lines, asked)
+    """Evaluate a path (w, 3): fill a `VIOLATIONS` record, which must be 0, and an `OBJECTIVES` record."""
+    # Arrays are taken out of the data once: handing it on costs more than a leg's whole evaluation.
+    heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
+    bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
+    legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
+    terrain_legs, gaps = scratch.terrain_legs, scratch.gaps
+    count = path.shape[0]
+    measure_legs(path, legs)
+    measure_corners(data, limits.wind, path, legs, corners)
+    add_leg_violations(data, limits, path, legs, corners, True, violations)
+    _measure_flown(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+    sample_terrain(heights, bounds, to_pixel, required, path, legs, extents, terrain_legs, scratch.unfinished)
     length, kill = 0.0, 0.0
     for i in range(count - 1):
-        x, y, z = paths[n, i, 0], paths[n, i, 1], paths[n, i, 2]
-        x2, y2, z2 = paths[n, i + 1, 0], paths[n, i + 1, 1], paths[n, i + 1, 2]
-        slack = max(bends[i, WATCH], bends[i + 1, WATCH])
-        dose, gaps[i, 0], gaps[i, 1] = kill_density(
-            missiles, margin, slack, x, y, z, x2, y2, z2, bends[i, REACH], bends[i + 1, REACH]
+        x, y, z = path[i, 0], path[i, 1], path[i, 2]
+        x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
+        within = max(flown[i].missile_distance, flown[i + 1].missile_distance)
+        dose, at_beginning, at_end = kill_density(
+            missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1]
         )
-        missed[n, 2] += lines[i, DEPTH]
-        kill += dose * legs[i, 3]
-        length += legs[i, 3]
+        gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
+        violations.terrain += terrain_legs[i].depth
+        kill += dose * legs[i].length
+        length += legs[i].length
     for i in range(1, count - 1):
-        drop, aside = bends[i, DROP], bends[i, ASIDE]
-        low = min(lines[i - 1, GROUND_B], lines[i, GROUND_A]) < drop + clear[9] * aside
-        close = drop + aside > CORNER_SLACK or min(gaps[i - 1, 1], gaps[i, 0]) < drop + aside
+        drop, aside = flown[i].blend_deviation, flown[i].fly_by_offset
+        nearest = min(terrain_legs[i - 1].height_at_end, terrain_legs[i].height_at_beginning)
+        low = nearest < drop + required.steepest_loss * aside
+        close = drop + aside > CORNER_TOLERANCE or min(gaps[i - 1].at_end, gaps[i].at_beginning) < drop + aside
         if drop + aside < 0.01 or not (low or close):
             continue
-        arc = corner_past(table, paths[n, i - 1], paths[n, i], paths[n, i + 1], bends[i, RADIUS])
+        vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
         if low:
-            missed[n, 2] += _corner_depth(heights, steep, to_pixel, clear, arc)
+            violations.terrain += _corner_depth(heights, bounds, to_pixel, required, vertices)
         if close:
-            kill += _corner_kill(missiles, margin, arc)
-    objectives[n, 0] = length / gauge.straight
-    objectives[n, 1] = kill * POINTS * (count - 1) / length
+            kill += _corner_kill(missiles, margin, vertices)
+    objectives.length_ratio = length / limits.straight_distance
+    objectives.kill_exposure = kill * POINTS * (count - 1) / length
+
+
+def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
+    """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and fly-by arcs.
+
+    Violations by `planner.plan.Violation`: rad and 100 m of leg; m per m; m x km; m.  Of the objectives, by
+    `planner.plan.Objective`, length ratio and kill exposure: the mean density along the path times the paper's number
+    of points, so that it compares with its sum.  Detection and height stay 0: here they would decide between paths of
+    the same length to the last digit only.
+    """
+    violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
+    _score_paths(data, paths, violations, objectives)
+    return as_columns(violations), as_columns(objectives)
 
 
 @compiled
-def graded_scores(rules: Rules, paths: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
-    """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and fly-by arcs.
-
-    Of the objectives length ratio and kill exposure: the mean density along the path times the paper's number of
-    points, so that it compares with its sum.  Detection and height stay 0: here they would decide between paths of
-    the same length to the last digit only.
-    """
-    number, count, _ = paths.shape
-    missed = np.zeros((number, 4))
-    objectives = np.zeros((number, 4))
-    gauge = make_gauge(rules)
-    bench = make_bench(rules, count)
-    for n in range(number):
-        score_path(rules, gauge, bench, paths, n, missed, objectives)
-    return missed, objectives
+def _score_paths(
+    data: ProblemArrays, paths: Floats, violations: Records, objectives: Records
+) -> None:  # pragma: no cover - compiled
+    limits = precompute_limits(data)
+    scratch = make_scratch(paths.shape[1])
+    for n in range(paths.shape[0]):
+        score_path(data, limits, scratch, paths[n], violations[n], objectives[n])
 
 
 @inlined
-def _arc_radius(room: bool, legs: Floats, corners: Floats, i: int) -> float:  # pragma: no cover - compiled
+def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:  # pragma: no cover - compiled
     """Radius of the arc at waypoint i: 0 where a number alone limits turns and a leg there is too short for its two.
 
-    As `corners.corner_radii`, of which the ends have no arc.
+    The same as `planner.evaluation.fly_by_corners.fly_by_radii`, of which the ends have no arc.
     """
-    radius: float = corners[i, 1]
-    if math.isinf(corners[i, 0]):
+    radius: float = corners[i].radius
+    if math.isinf(corners[i].tangent):
         return 0.0
-    if not room:
+    if not legs_hold_turns:
         last = legs.shape[0]
-        before = corners[i - 1, 0] if i > 1 else 0.0
-        after = corners[i + 1, 0] if i < last - 1 else 0.0
-        if corners[i, 0] + before > legs[i - 1, 2] or corners[i, 0] + after > legs[i, 2]:
+        before = corners[i - 1].tangent if i > 1 else 0.0
+        after = corners[i + 1].tangent if i < last - 1 else 0.0
+        if corners[i].tangent + before > legs[i - 1].run or corners[i].tangent + after > legs[i].run:
             return 0.0
     return radius
 
 
 @compiled_views
-def _measure_bends(
-    table: PerformanceTable,
-    room: bool,
+def _measure_flown(
+    aircraft: PerformanceTable,
+    legs_hold_turns: bool,
     fly_over: bool,
-    paths: Floats,
-    n: int,
-    legs: Floats,
-    corners: Floats,
-    out: Floats,
+    path: Floats,
+    legs: Records,
+    corners: Records,
+    flown: Records,
+    extents: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill out (w, 5): radius of the flown arc at each waypoint, and how far the flown corner departs from the legs, m.
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of a path's inner waypoints.
 
-    Downwards it is by the crest that is cut, and sideways by at most R(1/cos(theta/2) - 1) and a chord's rise; and it
-    does so within `REACH` of the waypoint: within the tangent and half the arc, or the blend of heights.  `WATCH`: how
-    far from the legs missiles matter to it, 0 where it is judged in any case.
+    The flown corner departs from the legs downwards by the blend of heights, and sideways by at most
+    R(1/cos(theta/2) - 1) and a chord's rise; and it does so within its extent: within the tangent and half the arc, or
+    the blend of heights.
     """
-    slope_out = (paths[n, 1, 2] - paths[n, 0, 2]) / max(legs[0, 2], 1e-6)
+    slope_out = (path[1, 2] - path[0, 2]) / max(legs[0].run, 1e-6)
     for i in range(1, legs.shape[0]):
-        radius = 0.0 if fly_over else _arc_radius(room, legs, corners, i)
-        tangent = corners[i, 0] if radius > 0.0 else 0.0
+        radius = 0.0 if fly_over else _arc_radius(legs_hold_turns, legs, corners, i)
+        tangent = corners[i].tangent if radius > 0.0 else 0.0
         slope_in = slope_out
-        slope_out = (paths[n, i + 1, 2] - paths[n, i, 2]) / max(legs[i, 2], 1e-6)
+        slope_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1e-6)
         crest = max(0.0, slope_in - slope_out)
-        reach = blend_reach(table, paths[n, i, 2])
+        blend = half_blend_length(aircraft, path[i, 2])
         aside = math.sqrt(radius * radius + tangent * tangent) - radius
         aside += min(aside, radius * CHORD_RISE)
-        out[i, RADIUS] = radius
-        out[i, DROP] = 0.5 * tangent * crest + 0.25 * crest * crest * reach + aside * max(abs(slope_in), abs(slope_out))
-        out[i, ASIDE] = aside
-        out[i, REACH] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * reach
-        out[i, WATCH] = aside + out[i, DROP] if aside + out[i, DROP] <= CORNER_SLACK else 0.0
+        drop = 0.5 * tangent * crest + 0.25 * crest * crest * blend + aside * max(abs(slope_in), abs(slope_out))
+        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = radius, drop, aside
+        flown[i].missile_distance = aside + drop if aside + drop <= CORNER_TOLERANCE else 0.0
+        extents[i] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * blend
 
 
 @compiled_views
 def _corner_depth(
-    heights: Heights, steep: Steep, to_pixel: PolyMapRecord, clear: Floats, arc: Floats
+    heights: Heights, slope_bounds: SlopeBounds, to_pixel: PolyMapRecord, required: RequiredClearance, vertices: Floats
 ) -> float:  # pragma: no cover - compiled
     """Depth below the required clearance along a flown corner (k, 3), m x km."""
     total = 0.0
-    for k in range(arc.shape[0] - 1):
-        x, y, z, x2, y2, z2 = arc[k, 0], arc[k, 1], arc[k, 2], arc[k + 1, 0], arc[k + 1, 1], arc[k + 1, 2]
-        ends = pixels(to_pixel, x, y, x2, y2)
-        total += terrain_excess(heights, steep, clear, ends, x, y, z, x2, y2, z2)
+    for k in range(vertices.shape[0] - 1):
+        x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
+        x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
+        ends = segment_pixels(to_pixel, x, y, x2, y2)
+        total += terrain_excess(heights, slope_bounds, required, ends, x, y, z, x2, y2, z2)
     return total
 
 
 @compiled_views
-def _corner_kill(missiles: Missiles, margin: float, arc: Floats) -> float:  # pragma: no cover - compiled
+def _corner_kill(missiles: MissileIndex, margin: float, vertices: Floats) -> float:  # pragma: no cover - compiled
     """Kill density x length along a flown corner (k, 3)."""
     total = 0.0
-    for k in range(arc.shape[0] - 1):
-        x, y, z, x2, y2, z2 = arc[k, 0], arc[k, 1], arc[k, 2], arc[k + 1, 0], arc[k + 1, 1], arc[k + 1, 2]
+    for k in range(vertices.shape[0] - 1):
+        x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
+        x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
         dose, _, _ = kill_density(missiles, margin, 0.0, x, y, z, x2, y2, z2, 0.0, 0.0)
         total += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
     return total

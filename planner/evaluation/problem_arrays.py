@@ -1,53 +1,83 @@
-"""What the compiled judges are given: a scenario and its limits as numbers and arrays."""
+"""What compiled code evaluates paths with: a scenario and its limits as numbers and arrays."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
-from planner.evaluation.missile_index import Missiles
-from planner.evaluation.threat_grid import Cells
+from planner.evaluation.missile_index import MissileIndex
+from planner.evaluation.threat_grid import ThreatCells
+from planner.plan import Objective, Violation
 from world.frames import PolyMapRecord
+from world.threats import Threats
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
+# A numpy array whose rows have named fields, and one of its rows; which fields, a dtype says.
+Records = NDArray[Any]
+Record = Any
 
-# A corner that a flight takes further from the legs than this (m) is judged in any case.
-CORNER_SLACK = 30.0
-# Numbers of a row of `Rules.spheres`: as long as a line of the processor's cache.
-SPHERE = 8
+# One unit of the scenario: its position (m), and radius and scale (m) of its missile and its radar.
+THREAT = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("east", "north", "up", "kill_radius", "kill_scale", "detection_radius", "detection_scale")
+    ]
+)
+# The same as a point is compared with it: radii to the power of two, scales to the power of four, and what makes it as
+# long as a line of the processor's cache.
+SPHERE = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("east", "north", "up", "kill_radius2", "kill_scale4", "detection_radius2", "detection_scale4")
+    ]
+    + [("padding", np.float64)]
+)
+# What is found of one path, by the names of `Violation` and `Objective` and in their order.
+VIOLATIONS = np.dtype([(item.name.lower(), np.float64) for item in Violation])
+OBJECTIVES = np.dtype([(item.name.lower(), np.float64) for item in Objective])
 
 
-class Steep(NamedTuple):
-    """How steep the ground is, m per m: nowhere more than `most`, and within `reach` m of tile i, j than slopes[i, j].
+class SlopeBounds(NamedTuple):
+    """How steep the ground is at most, m per m.
 
-    Tiles are of `world.terrain.TILE` pixels a side.
+    steepest: anywhere.
+    tiles: within `tile_side` m of each tile of `world.terrain.TILE` pixels a side.
     """
 
-    most: float
-    slopes: Heights
-    reach: float
+    steepest: float
+    tiles: Heights
+    tile_side: float
 
 
-class Rules(NamedTuple):
-    """What paths are judged against, in the form that the compiled functions take.
+class ProblemArrays(NamedTuple):
+    """What paths are evaluated against; lengths in m, angles in rad.
 
-    threats: (m, 7) east, north, up, kill radius and scale, detection radius and scale.  spheres: the same, of
-    `pack_spheres`.  aircraft: what it can do.
-    max_turn: rad.  room: whether a leg must hold its turns.  fly_over: whether a
-    turn begins at its waypoint, not before it.  climb, dive: rad, NaN to ask the aircraft.
-    spare: rad kept inside slope limits.  clearance, reserve: m, required and kept on top.  kill_margin: m.
-    pitch: m between terrain samples of the graded judge.
-    start_course, destination_course: rad or NaN.  start_slack, destination_slack: m of reserve at the ends.
-    near: the threats by the points that they may reach.  missiles: the missiles by where they stand.  steep: how steep
-    the ground is.
+    heights: raster of the ground.
+    to_pixel: map from positions to its pixels.
+    threats: `THREAT` records (m,), and spheres the same as `SPHERE` records.
+    aircraft: what it can do, of which turbulence leaves a plan a share.
+    bounds: (2, 2) map; floor and ceiling: lowest and highest waypoint.
+    start, destination: (3,) fixed ends.
+    max_turn: largest course change.
+    legs_hold_turns: whether a leg must be as long as its turns.
+    fly_over: whether a turn begins at its waypoint, not before it.
+    max_climb, max_dive: NaN to ask the aircraft.
+    angle_margin: kept inside slope limits.
+    clearance: required above ground; buffer: wanted on top of it, and start_buffer and destination_buffer at the ends.
+    kill_margin: wanted between path and missile spheres.
+    sample_pitch: between samples of the terrain along a leg, of the graded scores.
+    start_course, destination_course: NaN where none is asked for.
+    threat_cells: the threats by the points that they may reach.
+    missiles: the missiles by where they stand.
+    slope_bounds: of the ground.
     """
 
     heights: Heights
     to_pixel: PolyMapRecord
-    threats: Floats
-    spheres: Floats
+    threats: Records
+    spheres: Records
     aircraft: PerformanceTable
     bounds: Floats
     start: Floats
@@ -55,32 +85,49 @@ class Rules(NamedTuple):
     floor: float
     ceiling: float
     max_turn: float
-    room: bool
+    legs_hold_turns: bool
     fly_over: bool
-    climb: float
-    dive: float
-    spare: float
+    max_climb: float
+    max_dive: float
+    angle_margin: float
     clearance: float
-    reserve: float
+    buffer: float
     kill_margin: float
-    pitch: float
+    sample_pitch: float
     start_course: float
     destination_course: float
-    start_slack: float
-    destination_slack: float
-    near: Cells
-    missiles: Missiles
-    steep: Steep
+    start_buffer: float
+    destination_buffer: float
+    threat_cells: ThreatCells
+    missiles: MissileIndex
+    slope_bounds: SlopeBounds
 
 
-def pack_spheres(threats: Floats) -> Floats:
-    """Threats (m, 7) as a point is compared with them, (m, 8): place, r^2 and scale^4 of missile and radar, and 0."""
-    out = np.zeros((len(threats), SPHERE))
-    out[:, :3] = threats[:, :3]
-    for column in (3, 5):
-        radius = threats[:, column]
-        # A radius of 0 is no weapon, and no square is below this.
-        out[:, column] = np.where(radius > 0.0, radius * radius, -1.0)
-        out[:, column + 1] = threats[:, column + 1] ** 4
+def threat_records(threats: Threats) -> Records:
+    """Units of a scenario as `THREAT` records (m,)."""
+    out = np.zeros(len(threats.position), dtype=THREAT)
+    for axis, name in enumerate(("east", "north", "up")):
+        out[name] = threats.position[:, axis]
+    for name in ("kill_radius", "kill_scale", "detection_radius", "detection_scale"):
+        out[name] = getattr(threats, name)
     out.setflags(write=False)
     return out
+
+
+def sphere_records(threats: Records) -> Records:
+    """`SPHERE` records (m,) of `THREAT` records."""
+    out = np.zeros(len(threats), dtype=SPHERE)
+    for name in ("east", "north", "up"):
+        out[name] = threats[name]
+    for kind in ("kill", "detection"):
+        radius = threats[f"{kind}_radius"]
+        # A radius of 0 is no weapon, and no square is below this.
+        out[f"{kind}_radius2"] = np.where(radius > 0.0, radius * radius, -1.0)
+        out[f"{kind}_scale4"] = threats[f"{kind}_scale"] ** 4
+    out.setflags(write=False)
+    return out
+
+
+def as_columns(records: Records) -> Floats:
+    """Records (n,) whose fields are all float64 as a table (n, fields)."""
+    return records.view(np.float64).reshape(len(records), -1)

@@ -8,8 +8,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.clearance_reserve import required_clearance
-from planner.evaluation.problem_arrays import Steep
+from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
+from planner.evaluation.problem_arrays import Records, SlopeBounds
 from world.frames import PolyMapRecord, polymap
 from world.kernels import compiled_views, inlined
 from world.terrain import TILE, pixel_height
@@ -17,50 +17,69 @@ from world.terrain import TILE, pixel_height
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Heights = NDArray[np.float32]
+# Columns and rows of both ends of a segment.
 Pixels = tuple[float, float, float, float]
 
-# Height above the required clearance that steps over the ground leave unseen, m: corners may use it.
-SEEN = 10.0
+# Up to this height above the required clearance (m) samples are no further apart than the pitch; corners may use it.
+NEAR_GROUND = 10.0
 # Violation of a sample without known ground, m.
 UNKNOWN = 1000.0
-# Columns that `sound` is asked for, of `LINE`.
-DEPTH, GROUND_A, GROUND_B = 8, 9, 10
-LINE = 11
+# A leg over the ground.
+TERRAIN_LEG = np.dtype(
+    [
+        # Pixel of its beginning, and the step from there to its end.
+        ("column", np.float64),
+        ("row", np.float64),
+        ("column_step", np.float64),
+        ("row_step", np.float64),
+        # Shares of the leg: between two samples near the ground; of the next sample; up to which a sample counts as
+        # near the beginning, and from which on as near the end.
+        ("pitch", np.float64),
+        ("share", np.float64),
+        ("beginning", np.float64),
+        ("ending", np.float64),
+        # Sum of depths below the required clearance, m x km; and least heights above it near both ends, m.
+        ("depth", np.float64),
+        ("height_at_beginning", np.float64),
+        ("height_at_end", np.float64),
+    ]
+)
 
 
 @inlined
-def _look(
+def _sample(
     heights: Heights,
-    slopes: Heights,
-    reach: float,
-    clear: Floats,
-    col: float,
+    tiles: Heights,
+    tile_side: float,
+    growth: float,
+    column: float,
     row: float,
     up: float,
     need: float,
     run: float,
     rise: float,
-    step: float,
+    pitch: float,
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Height above the required clearance at a place of a line, and the share of the line that needs no look after it.
+    """Height above the required clearance at a point of a line, and the share of the line to the next sample.
 
-    run, rise: of the whole line, m.  step: share from one sample to the next where the ground is near.
+    tiles, tile_side: of `SlopeBounds`.  growth: of `RequiredClearance`.  need: required clearance, m.
+    run, rise: of the whole line, m.  pitch: share from one sample to the next where the ground is near.
     """
-    ground = pixel_height(heights, col, row)
+    ground = pixel_height(heights, column, row)
     gap = up - ground - need if ground == ground else -UNKNOWN
-    i, j = min(max(int(row) // TILE, 0), slopes.shape[0] - 1), min(max(int(col) // TILE, 0), slopes.shape[1] - 1)
+    i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m for the whole line.
-    fall = (slopes[np.uintp(i), np.uintp(j)] + clear[11]) * run + abs(rise) + 1e-9
-    ahead, known = (gap - SEEN) / fall, reach / (run + 1e-9)
+    fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9
+    ahead, known = (gap - NEAR_GROUND) / fall, tile_side / (run + 1e-9)
     ahead = ahead if ahead < known else known
-    return gap, ahead if ahead > step else step
+    return gap, ahead if ahead > pitch else pitch
 
 
 @compiled_views
 def terrain_excess(
     heights: Heights,
-    steep: Steep,
-    clear: Floats,
+    slope_bounds: SlopeBounds,
+    required: RequiredClearance,
     ends: Pixels,
     ax: float,
     ay: float,
@@ -71,96 +90,101 @@ def terrain_excess(
 ) -> float:  # pragma: no cover - compiled
     """Depth below the required clearance along a-b, summed over samples (m x km).
 
-    ends: columns and rows of a and b.  steep: of the rules.  clear: of `pack_clearance`.
+    ends: columns and rows of a and b.
     """
-    col, row, across, down, rise = ends[0], ends[1], ends[2] - ends[0], ends[3] - ends[1], bz - az
+    column, row, column_step, row_step = ends[0], ends[1], ends[2] - ends[0], ends[3] - ends[1]
+    rise = bz - az
     run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
-    step = 1.0 / max(1.0, math.ceil(run / clear[8]))
-    slopes, reach = steep.slopes, steep.reach
-    need, whole = clear[0] + clear[1], clear[10] > 0.0
+    pitch = 1.0 / max(1.0, math.ceil(run / required.sample_pitch))
+    tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
+    need = required.clearance + required.buffer
     depth, f = 0.0, 0.0
     while True:
-        if not whole:
-            need = required_clearance(clear, ax + f * (bx - ax), ay + f * (by - ay))
-        gap, ahead = _look(
-            heights, slopes, reach, clear, col + f * across, row + f * down, az + f * rise, need, run, rise, step
-        )
+        if not required.same_everywhere:
+            need = clearance_at(required, ax + f * (bx - ax), ay + f * (by - ay))
+        x, y, up = column + f * column_step, row + f * row_step, az + f * rise
+        gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up, need, run, rise, pitch)
         depth -= gap if gap < 0.0 else 0.0
         if f >= 1.0:
             break
         f = min(1.0, f + ahead)
-    return float(depth * max(run, 1.0) * step / 1000.0)
+    return float(depth * max(run, 1.0) * pitch / 1000.0)
 
 
 @compiled_views
-def sound(
-    heights: Heights,
-    steep: Steep,
-    to_pixel: PolyMapRecord,
-    clear: Floats,
-    paths: Floats,
-    n: int,
-    legs: Floats,
-    near: Floats,
-    lines: Floats,
-    asked: Ints,
+def _begin_legs(
+    to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:  # pragma: no cover - compiled
-    """Do the same for all legs of path n: fill lines with depths, and with the least heights near both ends.
-
-    near: (w,) how far from each waypoint that is, m.  lines: (w - 1, 11).  asked: (w - 1,) scratch.
-
-    The least heights are right up to `SEEN`; above that they say no more than "at least `SEEN`".  In rounds, a sample
-    of each leg: the next one of the same leg would wait for what this one finds.
-    """
-    count = legs.shape[0]
-    after = polymap(to_pixel, paths[n, 0, 0], paths[n, 0, 1])
-    for i in range(count):
-        before = after
-        after = polymap(to_pixel, paths[n, i + 1, 0], paths[n, i + 1, 1])
-        run = legs[i, 2]
-        step = 1.0 / max(1.0, math.ceil(run / clear[8]))
-        lines[i, 0], lines[i, 1] = before[0], before[1]
-        lines[i, 2], lines[i, 3] = after[0] - before[0], after[1] - before[1]
-        lines[i, 4], lines[i, 5] = step, 0.0
+    """Fill `TERRAIN_LEG` records (w - 1,) as they are before the first sample."""
+    column, row = polymap(to_pixel, path[0, 0], path[0, 1])
+    for i in range(legs.shape[0]):
+        after_column, after_row = polymap(to_pixel, path[i + 1, 0], path[i + 1, 1])
+        run = legs[i].run
+        pitch = 1.0 / max(1.0, math.ceil(run / sample_pitch))
+        leg = terrain_legs[i]
+        leg.column, leg.row = column, row
+        leg.column_step, leg.row_step = after_column - column, after_row - row
+        leg.pitch, leg.share = pitch, 0.0
         # A sample stands for the step that follows it, and for the one before.
         per_metre = 1.0 / max(run, 1e-9)
-        lines[i, 6] = near[i] * per_metre + step
-        lines[i, 7] = 1.0 - near[i + 1] * per_metre - step
-        lines[i, DEPTH], lines[i, GROUND_A], lines[i, GROUND_B] = 0.0, math.inf, math.inf
-        asked[i] = i
-    slopes, reach = steep.slopes, steep.reach
-    need, whole = clear[0] + clear[1], clear[10] > 0.0
+        leg.beginning = extents[i] * per_metre + pitch
+        leg.ending = 1.0 - extents[i + 1] * per_metre - pitch
+        leg.depth, leg.height_at_beginning, leg.height_at_end = 0.0, math.inf, math.inf
+        column, row = after_column, after_row
+
+
+@compiled_views
+def sample_terrain(
+    heights: Heights,
+    slope_bounds: SlopeBounds,
+    to_pixel: PolyMapRecord,
+    required: RequiredClearance,
+    path: Floats,
+    legs: Records,
+    extents: Floats,
+    terrain_legs: Records,
+    unfinished: Ints,
+) -> None:  # pragma: no cover - compiled
+    """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance, and least heights.
+
+    extents: (w,) how far from each waypoint a place is near an end, m.  unfinished: (w - 1,) scratch.
+
+    The least heights are right up to `NEAR_GROUND`; above that they say no more than "at least that".  In rounds, a
+    sample of each leg: the next one of the same leg would wait for what this one finds.
+    """
+    count = legs.shape[0]
+    _begin_legs(to_pixel, required.sample_pitch, path, legs, extents, terrain_legs)
+    for i in range(count):
+        unfinished[i] = i
+    tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
+    need = required.clearance + required.buffer
     while count > 0:
         left = 0
         for entry in range(count):
-            leg = np.uintp(asked[entry])
-            f, step = lines[leg, 5], lines[leg, 4]
-            up, rise = paths[n, leg, 2], paths[n, leg + np.uintp(1), 2] - paths[n, leg, 2]
-            if not whole:
-                dx, dy = (
-                    paths[n, leg + np.uintp(1), 0] - paths[n, leg, 0],
-                    paths[n, leg + np.uintp(1), 1] - paths[n, leg, 1],
-                )
-                need = required_clearance(clear, paths[n, leg, 0] + f * dx, paths[n, leg, 1] + f * dy)
-            col, row = lines[leg, 0] + f * lines[leg, 2], lines[leg, 1] + f * lines[leg, 3]
-            gap, ahead = _look(heights, slopes, reach, clear, col, row, up + f * rise, need, legs[leg, 2], rise, step)
-            lines[leg, DEPTH] -= gap if gap < 0.0 else 0.0
-            at_a, at_b = gap if f <= lines[leg, 6] else math.inf, gap if f >= lines[leg, 7] else math.inf
-            lines[leg, GROUND_A] = at_a if at_a < lines[leg, GROUND_A] else lines[leg, GROUND_A]
-            lines[leg, GROUND_B] = at_b if at_b < lines[leg, GROUND_B] else lines[leg, GROUND_B]
-            asked[left] = np.int64(leg)
+            k = np.uintp(unfinished[entry])
+            leg = terrain_legs[k]
+            f, pitch = leg.share, leg.pitch
+            up, rise = path[k, 2], path[k + np.uintp(1), 2] - path[k, 2]
+            if not required.same_everywhere:
+                dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
+                need = clearance_at(required, path[k, 0] + f * dx, path[k, 1] + f * dy)
+            x, y = leg.column + f * leg.column_step, leg.row + f * leg.row_step
+            gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up + f * rise, need, legs[k].run, rise, pitch)
+            leg.depth -= gap if gap < 0.0 else 0.0
+            here, there = gap if f <= leg.beginning else math.inf, gap if f >= leg.ending else math.inf
+            leg.height_at_beginning = here if here < leg.height_at_beginning else leg.height_at_beginning
+            leg.height_at_end = there if there < leg.height_at_end else leg.height_at_end
+            unfinished[left] = np.int64(k)
             left += 1 if f < 1.0 else 0
-            lines[leg, 5] = f + ahead if f + ahead < 1.0 else 1.0
+            leg.share = f + ahead if f + ahead < 1.0 else 1.0
         count = left
     for i in range(legs.shape[0]):
-        lines[i, DEPTH] *= max(legs[i, 2], 1.0) * lines[i, 4] / 1000.0
+        terrain_legs[i].depth *= max(legs[i].run, 1.0) * terrain_legs[i].pitch / 1000.0
 
 
 @inlined
-def pixels(
-    to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float
-) -> Pixels:  # pragma: no cover - compiled
+def segment_pixels(to_pixel: PolyMapRecord, ax: float, ay: float, bx: float, by: float) -> Pixels:  # pragma: no cover
     """Columns and rows of both ends of a segment."""
-    col0, row0 = polymap(to_pixel, ax, ay)
-    col1, row1 = polymap(to_pixel, bx, by)
-    return col0, row0, col1, row1
+    column_a, row_a = polymap(to_pixel, ax, ay)
+    column_b, row_b = polymap(to_pixel, bx, by)
+    return column_a, row_a, column_b, row_b

@@ -1,6 +1,7 @@
 """Differential evolution, DE/rand/1/bin: a classical evolutionary algorithm in the same ask and tell.
 
-Storn and Price 1997.  It knows a box, samples and a ranking, and nothing of what they stand for.
+Storn and Price, "Differential Evolution", Journal of Global Optimization 11, 1997.  It knows a box, samples and a
+ranking, and nothing of what they stand for.
 """
 
 from collections.abc import Callable
@@ -13,12 +14,25 @@ from planner.optimisers.umda import Floats, Ints
 WEIGHT, CROSSOVER = 0.5, 0.9
 
 
-class Differential:
-    """One run: each row is challenged by a mix of others and gives way to one that ranks no worse.
+class DifferentialEvolution:
+    """Each row is challenged by a mix of others and gives way to one that ranks no worse, in ask and tell.
 
-    lower, upper: (d,) box.  rank: (n, c) scores -> (n,) ranks, smaller is better.  population: even number of rows.
-    initial: (population, d) first samples; None for uniform.  Half the rows are challenged at a time, so that a
-    generation costs what it costs the estimation of distribution algorithms.
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = DifferentialEvolution(np.full(3, -2.0), np.full(3, 6.0), rank, 20, np.random.default_rng(1))
+    >>> for generation in range(120):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-3)
+    True
+
+    lower, upper: (d,) box.
+    rank: (n, c) scores -> (n,) ranks, smaller is better.
+    population: even number of rows.
+    initial: (population, d) first samples; None for uniform.
+
+    Half the rows are challenged at a time, so that a generation costs what it costs the estimation of distribution
+    algorithms.  samples and scores are the population, (n, d) and (n, c); without rows before the first `tell`.
     """
 
     def __init__(
@@ -40,7 +54,7 @@ class Differential:
             initial = rng.uniform(lower, upper, (population, lower.size))
         self._asked = np.clip(initial, lower, upper)
         self.samples: Floats = np.empty((0, lower.size))
-        self.scores: Floats | None = None
+        self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
         """Rows (n, d) inside the box that want scores: the whole population first, then challengers of half of it."""
@@ -48,7 +62,7 @@ class Differential:
 
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of what was asked, let the better of each pair live, and mix the next challengers."""
-        if self.scores is None:
+        if not len(self.scores):
             self.samples, self.scores = self._asked.copy(), np.array(scores)
         else:
             rows = self._challenged()

@@ -6,18 +6,29 @@ box, groups of columns, samples and a ranking, and nothing of what they stand fo
 """
 
 import numpy as np
-from numba import njit
 
+from planner.optimisers.linear_algebra import cholesky, covariance
 from planner.optimisers.umda import Floats, Umda
+from world.kernels import compiled
 
 # Added to each variance of a group, as a share of their mean.
 RIDGE = 1e-6
 
 
-class Chain(Umda):
-    """One run: as `Umda`, its model a first-order chain over consecutive groups of `GROUP` variables.
+class MarkovChain(Umda):
+    """Ask and tell as `planner.optimisers.umda.Umda`, its model a first-order chain over groups of variables.
 
-    `basis` and `floor` are unused.  The number of variables is a multiple of `GROUP`.
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = MarkovChain(np.full(6, -2.0), np.full(6, 6.0), rank, 400, np.random.default_rng(1))
+    >>> for generation in range(30):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-4)
+    True
+
+    The arguments are those of `Umda`; `basis` and `floor` are unused.  The number of variables is a multiple of
+    `GROUP`, of which each consecutive group depends on the one before it.
     """
 
     GROUP = 3
@@ -26,56 +37,22 @@ class Chain(Umda):
         """Rows drawn group by group, each given the one before; redrawn and then clipped to the box."""
         mean = self.samples.mean(axis=0)
         width = self.upper - self.lower
-        slope, spread = _fit(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, RIDGE)
+        slope, spread = fit_chain(np.ascontiguousarray((self.samples - mean) / width), self.GROUP, RIDGE)
         return self._redraw(
-            lambda rows: mean + width * _draw(self._rng.normal(size=(rows, mean.size)), slope, spread), count
+            lambda rows: mean + width * draw_chain(self._rng.normal(size=(rows, mean.size)), slope, spread), count
         )
 
 
-@njit(cache=True)
-def _cross(rows: Floats, first: int, second: int, size: int) -> Floats:  # pragma: no cover - compiled
-    """Covariance (size, size) of two groups of centred rows, by the columns at which they begin."""
-    out = np.zeros((size, size))
-    for n in range(rows.shape[0]):
-        for i in range(size):
-            for j in range(size):
-                out[i, j] += rows[n, first + i] * rows[n, second + j]
-    out /= rows.shape[0]
-    return out
-
-
-@njit(cache=True)
-def _cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - compiled
-    """Lower factor of a small covariance, ridge x mean variance on its diagonal."""
-    size = matrix.shape[0]
-    trace = 0.0
-    for i in range(size):
-        trace += matrix[i, i]
-    extra = ridge * trace / size + 1e-300
-    out = np.zeros((size, size))
-    for j in range(size):
-        pivot = matrix[j, j] + extra
-        for k in range(j):
-            pivot -= out[j, k] * out[j, k]
-        out[j, j] = np.sqrt(max(pivot, extra))
-        for i in range(j + 1, size):
-            total = matrix[i, j]
-            for k in range(j):
-                total -= out[i, k] * out[j, k]
-            out[i, j] = total / out[j, j]
-    return out
-
-
-@njit(cache=True)
-def _fit(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+@compiled
+def fit_chain(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
     """Of each group (g, size, size): its regression on the group before, and the lower factor of what is left."""
     groups = rows.shape[1] // size
     slope, spread = np.zeros((groups, size, size)), np.zeros((groups, size, size))
-    spread[0] = _cholesky(_cross(rows, 0, 0, size), ridge)
+    spread[0] = cholesky(covariance(rows, 0, 0, size), ridge)
     for g in range(1, groups):
         before, here = (g - 1) * size, g * size
-        factor = _cholesky(_cross(rows, before, before, size), ridge)
-        cross = _cross(rows, here, before, size)
+        factor = cholesky(covariance(rows, before, before, size), ridge)
+        cross = covariance(rows, here, before, size)
         # slope = cross (L L^T)^-1, by two substitutions a row.
         for i in range(size):
             for j in range(size):
@@ -92,12 +69,12 @@ def _fit(rows: Floats, size: int, ridge: float) -> tuple[Floats, Floats]:  # pra
             for i in range(size):
                 for k in range(size):
                     rest[n, i] -= cross[i, k] * rows[n, before + k]
-        spread[g] = _cholesky(_cross(rest, 0, 0, size), ridge)
+        spread[g] = cholesky(covariance(rest, 0, 0, size), ridge)
     return slope, spread
 
 
-@njit(cache=True)
-def _draw(free: Floats, slope: Floats, spread: Floats) -> Floats:  # pragma: no cover - compiled
+@compiled
+def draw_chain(free: Floats, slope: Floats, spread: Floats) -> Floats:  # pragma: no cover - compiled
     """Rows (n, g size) of the chain from independent standard numbers."""
     groups, size, _ = slope.shape
     out = np.zeros(free.shape)

@@ -1,25 +1,28 @@
 """Preference between scored candidates: goals, priorities and Pareto dominance (Fonseca and Fleming 1998).
 
-Levels come in order of priority.  With U the components of a level in which u misses its goal, u is preferred to
-v if u dominates v on U; or if they are equal on U and either v misses a goal outside U, or u is preferred to v at
-the next level (at the lowest: u dominates v on the components it satisfies).  A component without a goal counts
-as missed (goal -inf), so a level without goals has U = all its components.
+Fonseca and Fleming, "Multiobjective optimization and multiple constraint handling with evolutionary algorithms", IEEE
+Transactions on Systems, Man, and Cybernetics A 28, 1998.  Levels come in order of priority.  With U the components of a
+level in which u violates its goal, u is preferred to v if u dominates v on U; or if they are equal on U and either v
+violates a goal outside U, or u is preferred to v at the next level (at the lowest: u dominates v on the components it
+satisfies).  A component without a goal counts as violated (goal -inf), so a level without goals has U = all its
+components.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from world.kernels import compiled
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 NO_GOAL = -np.inf
 
-# Rows that are sorted by insertion; and rows of two columns from which on a tree counts faster than a scan.
-RUN, MANY = 8, 4000
+# Rows sorted by insertion at a time; and rows of two columns from which on a tree counts faster than a scan.
+INSERTED, MANY = 8, 4000
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,38 +38,16 @@ class Level:
             raise ValueError(f"{len(self.columns)} columns and {len(self.goals)} goals: give one goal a column")
 
 
-def preferred(u: Floats, v: Floats, levels: Sequence[Level]) -> bool:
-    """Whether u is preferred to v: the relation as it is defined, for one pair of score rows (c,)."""
-    for number, level in enumerate(levels):
-        columns, goals = list(level.columns), np.array(level.goals)
-        a, b = u[columns], v[columns]
-        missed = a > goals
-        if _dominates(a[missed], b[missed]):
-            return True
-        if not np.array_equal(a[missed], b[missed]):
-            return False
-        if (b[~missed] > goals[~missed]).any():
-            return True
-        if number == len(levels) - 1:
-            return _dominates(a[~missed], b[~missed])
-    return False
-
-
-def _dominates(a: Floats, b: Floats) -> bool:
-    return bool((a <= b).all() and (a < b).any())
-
-
-def generic_ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Count the rows preferred to each row (n, c) -> (n,): by the definition, O(n^2).  For tests."""
-    return np.array([sum(preferred(v, u, levels) for v in scores) for u in scores], dtype=np.int64)
-
-
 def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
-    """Count the rows preferred to each row (n, c) -> (n,), split by level.
+    """How many rows of scores (n, c) are preferred to each, (n,), counted level by level.
 
-    With every component raised to its goal, "u dominates v on U, or is equal there and v misses outside U" is
+    With every component raised to its goal, "u dominates v on U, or is equal there and v violates a goal outside U" is
     Pareto dominance on the level, and only rows equal on it go on to the next: a component outside U is at its
     goal, which no other row is below.  So each level is one dominance count inside groups of ties.
+
+    >>> levels = Level((0,), (0.0,)), Level((1,), (NO_GOAL,))
+    >>> ranks(np.array([[0.0, 9.0], [1.0, 2.0], [0.0, 3.0]]), levels).tolist()  # those that meet the goal come first
+    [1, 2, 0]
     """
     columns = [column for level in levels for column in level.columns]
     goals = [goal for level in levels for goal in level.goals]
@@ -77,12 +58,12 @@ def ranks(scores: Floats, levels: Sequence[Level]) -> Ints:
     return np.asarray(_rank_rows(np.ascontiguousarray(table.T), widths))
 
 
-@njit(cache=True)
+@compiled
 def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compiled
     """Ranks (n,) of a table (c, n) whose levels have these widths."""
     count = table.shape[1]
     total = np.zeros(count, dtype=np.int64)
-    order, spare = np.arange(count), np.empty(count, dtype=np.int64)
+    order, scratch = np.arange(count), np.empty(count, dtype=np.int64)
     sorted_ = np.empty((table.shape[0], count))
     below = np.empty(count, dtype=np.int64)
     # Ties: groups of rows that are equal so far, as positions in the order where each begins, closed by the count.
@@ -97,7 +78,7 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
             distinct += 1
             if end - begin == 1:
                 continue
-            _sort(table, column, width, order, spare, begin, end)
+            _sort(table, column, width, order, scratch, begin, end)
             for c in range(width):
                 for k in range(begin, end):
                     sorted_[c, k] = table[column + c, order[k]]
@@ -121,20 +102,20 @@ def _rank_rows(table: Floats, widths: Ints) -> Ints:  # pragma: no cover - compi
     return total
 
 
-@njit(cache=True)
+@compiled
 def _sort(
-    table: Floats, column: int, width: int, order: Ints, spare: Ints, begin: int, end: int
+    table: Floats, column: int, width: int, order: Ints, scratch: Ints, begin: int, end: int
 ) -> None:  # pragma: no cover - compiled
     """Sort order[begin:end] by the rows' numbers in some columns, the first column first: a stable merge sort."""
     for k in range(begin + 1, end):
-        # Short runs by insertion.
-        low = begin + (k - begin) // RUN * RUN
+        # A few rows at a time by insertion.
+        low = begin + (k - begin) // INSERTED * INSERTED
         row, at = order[k], k
         while at > low and _before(table, column, width, row, order[at - 1]):
             order[at] = order[at - 1]
             at -= 1
         order[at] = row
-    size = RUN
+    size = INSERTED
     while size < end - begin:
         for low in range(begin, end - size, 2 * size):
             middle, high = low + size, min(low + 2 * size, end)
@@ -143,17 +124,17 @@ def _sort(
             left, right = low, middle
             for k in range(low, high):
                 if right >= high or (left < middle and not _before(table, column, width, order[right], order[left])):
-                    spare[k] = order[left]
+                    scratch[k] = order[left]
                     left += 1
                 else:
-                    spare[k] = order[right]
+                    scratch[k] = order[right]
                     right += 1
             for k in range(low, high):
-                order[k] = spare[k]
+                order[k] = scratch[k]
         size *= 2
 
 
-@njit(cache=True)
+@compiled
 def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # pragma: no cover - compiled
     """Whether row a comes before row b, column by column."""
     for c in range(column, column + width):
@@ -162,7 +143,7 @@ def _before(table: Floats, column: int, width: int, a: int, b: int) -> bool:  # 
     return False
 
 
-@njit(cache=True)
+@compiled
 def _count_any(
     rows: Floats, width: int, begin: int, end: int, order: Ints, below: Ints, total: Ints
 ) -> None:  # pragma: no cover - compiled
@@ -186,7 +167,7 @@ def _count_any(
         total[order[k]] += dominators
 
 
-@njit(cache=True)
+@compiled
 def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compiled
     """How many values are not above the limit.  A loop without branches, which becomes vector instructions."""
     count = 0
@@ -195,16 +176,19 @@ def _at_most(values: Floats, limit: float) -> int:  # pragma: no cover - compile
     return count
 
 
-@njit(cache=True)
+@compiled
 def _and_at_most(values: Floats, limit: float, marks: Ints) -> None:  # pragma: no cover - compiled
     """Take the mark from the places of values above the limit."""
     for k in range(values.size):
         marks[k] &= 1 if values[k] <= limit else 0
 
 
-@njit(cache=True)
+@compiled
 def _count_pairs(rows: Floats, begin: int, end: int, order: Ints, total: Ints) -> None:  # pragma: no cover - compiled
-    """Do the same for two columns and many rows with a Fenwick tree over the second, O(n log n)."""
+    """Add to total the dominators of each row of a group, by a Fenwick tree over the second of two columns.
+
+    O(n log n), for many rows.
+    """
     steps = np.unique(rows[1, begin:end])
     tree = np.zeros(steps.size + 1, dtype=np.int64)
     k = begin

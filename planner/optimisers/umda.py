@@ -1,14 +1,16 @@
 """UMDAc: the univariate marginal distribution algorithm for continuous variables, as ask and tell.
 
-Larrañaga and Lozano 2002; the paper's section IV.  It knows a box, samples and a ranking, and nothing of what
+Larrañaga and Lozano, "Estimation of Distribution Algorithms", Kluwer 2002; section IV of Yang, Tang and Lozano,
+CEC 2014.  It knows a box, samples and a ranking, and nothing of what
 they stand for.
 """
 
 from collections.abc import Callable
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from planner.optimisers.linear_algebra import times_sparse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -18,12 +20,26 @@ REDRAWS = 10
 
 
 class Umda:
-    """One run: keeps the better half of the population, samples the other half from its marginals.
+    """Keeps the better half of a population, and samples the other half from its marginals, in ask and tell.
 
-    lower, upper: (d,) box.  rank: (n, c) scores -> (n,) ranks, smaller is better.  population: even number of
-    rows.  initial: (population, d) first samples; None for uniform.  basis: (d, d) orthogonal matrix whose
-    columns are the directions in which the marginals are independent; None for the variables themselves.
+    >>> def rank(scores):
+    ...     return np.argsort(np.argsort(scores[:, 0]))
+    >>> search = Umda(np.full(3, -2.0), np.full(3, 6.0), rank, 40, np.random.default_rng(1))
+    >>> for generation in range(60):
+    ...     samples = search.ask()
+    ...     search.tell((samples**2).sum(axis=1)[:, None])
+    >>> bool(search.scores.min() < 1e-6)
+    True
+
+    lower, upper: (d,) box.
+    rank: (n, c) scores -> (n,) ranks, smaller is better.
+    population: even number of rows.
+    initial: (population, d) first samples; None for uniform.
+    basis: (d, d) orthogonal matrix whose columns are the directions in which the marginals are independent; None for
+    the variables themselves.
     floor: (d,) smallest standard deviation along each direction, or None.
+
+    samples and scores are the kept half, (n, d) and (n, c), best first; without rows before the first `tell`.
     """
 
     def __init__(
@@ -48,7 +64,7 @@ class Umda:
             initial = rng.uniform(lower, upper, (population, lower.size))
         self._asked = np.clip(initial, lower, upper)
         self.samples: Floats = np.empty((0, lower.size))
-        self.scores: Floats | None = None
+        self.scores: Floats = np.empty((0, 0))
 
     def ask(self) -> Floats:
         """Rows (n, d) inside the box that want scores: the whole population first, then half of it."""
@@ -57,7 +73,7 @@ class Umda:
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of what was asked; keep the better half and sample the next rows."""
         samples = np.concatenate([self.samples, self._asked])
-        known = scores if self.scores is None else np.concatenate([self.scores, scores])
+        known = np.concatenate([self.scores, scores]) if len(self.scores) else scores
         # Equal ranks are ordered by a seeded draw, not by age.
         order = np.lexsort((self._rng.random(len(known)), self._rank(known)))[: self._half]
         self.samples, self.scores = samples[order], known[order]
@@ -89,7 +105,7 @@ class Umda:
         return np.clip(out, self.lower, self.upper)
 
     def _redraw_each(self, drawn: Floats, mean: Floats, deviation: Floats) -> Floats:
-        """Do the same number by number."""
+        """Numbers drawn from independent Gaussians; those outside the box are drawn again, and then clipped."""
         rows, columns = np.nonzero((drawn < self.lower) | (drawn > self.upper))
         for _ in range(REDRAWS):
             if rows.size == 0:
@@ -102,23 +118,4 @@ class Umda:
 
 
 def _project(rows: Floats, basis: Floats) -> Floats:
-    return _product(np.ascontiguousarray(rows), np.ascontiguousarray(basis))
-
-
-@njit(cache=True)
-def _product(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
-    """Rows (n, d) times a basis (d, k) of which most entries are 0."""
-    # In a fixed order: BLAS sums as the machine has it, and the result must not depend on the machine.
-    turned = rows.T.copy()
-    out = np.zeros((basis.shape[1], rows.shape[0]))
-    for k in range(basis.shape[1]):
-        for d in range(basis.shape[0]):
-            if basis[d, k] != 0.0:
-                _add_times(turned[d], basis[d, k], out[k])
-    return out.T.copy()
-
-
-@njit(cache=True)
-def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
-    for n in range(out.size):
-        out[n] += values[n] * factor
+    return times_sparse(np.ascontiguousarray(rows), np.ascontiguousarray(basis))

@@ -10,11 +10,14 @@ Optimiser = Literal["umda", "emna", "chain", "differential"]
 
 @dataclass(frozen=True, slots=True)
 class Algorithm:
-    """One way to search: its encoding and what it adds to the paper's planner.
+    """One way to search: its encoding and what it adds to the planner of Yang, Tang and Lozano (CEC 2014).
 
-    graded: constraints by how far they are missed, along the whole path, and kill exposure ahead of length.
+    name, summary: as commands and their help show them.
+    encoding: a name of `planner.evaluation.encoding.ENCODINGS`.
+    graded: constraints by how far they are violated, along the whole path, and kill exposure ahead of length.
     smooth: first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
-    seeded: starts from grid routes, polished.  optimiser: the file in `planner/` that holds it.
+    seeded: starts from grid routes, improved by a pattern search.
+    optimiser: which of `planner.optimisers` it uses.
     """
 
     name: str
@@ -31,7 +34,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     for item in (
         Algorithm(
             "umda-seeded",
-            "the default: smooth UMDA in the rotated frame, started from polished grid routes over terrain and threats",
+            "the default: smooth UMDA in the rotated frame, started from grid routes over terrain and threats",
             graded=True,
             smooth=True,
             seeded=True,
@@ -50,7 +53,9 @@ ALGORITHMS: dict[str, Algorithm] = {
             seeded=True,
             optimiser="emna",
         ),
-        Algorithm("emna", "the same without seeds", graded=True, smooth=True, optimiser="emna"),
+        Algorithm(
+            "emna", "full covariance of all variables (EMNA), no seeds", graded=True, smooth=True, optimiser="emna"
+        ),
         Algorithm(
             "chain-seeded",
             "each waypoint depends on the one before it (Markov chain), started from grid routes",
@@ -59,7 +64,13 @@ ALGORITHMS: dict[str, Algorithm] = {
             seeded=True,
             optimiser="chain",
         ),
-        Algorithm("chain", "the same without seeds", graded=True, smooth=True, optimiser="chain"),
+        Algorithm(
+            "chain",
+            "each waypoint depends on the one before it (Markov chain), no seeds",
+            graded=True,
+            smooth=True,
+            optimiser="chain",
+        ),
         Algorithm(
             "de-seeded",
             "a classical evolutionary algorithm (differential evolution), started from grid routes",
@@ -68,7 +79,13 @@ ALGORITHMS: dict[str, Algorithm] = {
             seeded=True,
             optimiser="differential",
         ),
-        Algorithm("de", "the same without seeds", graded=True, smooth=True, optimiser="differential"),
+        Algorithm(
+            "de",
+            "a classical evolutionary algorithm (differential evolution), no seeds",
+            graded=True,
+            smooth=True,
+            optimiser="differential",
+        ),
         Algorithm(
             "de-paper",
             "differential evolution in the paper's frame: its encoding, counts and preference",
@@ -84,13 +101,23 @@ DEFAULT = "umda-seeded"
 
 
 def algorithm_lines() -> str:
-    """The algorithms, one line each."""
+    """The algorithms, one line each: name and summary.
+
+    >>> print(algorithm_lines().splitlines()[1])
+      umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
+    """
     width = max(len(name) for name in ALGORITHMS)
     return "\n".join(f"  {item.name:<{width}}  {item.summary}" for item in ALGORITHMS.values())
 
 
 def find_algorithm(name: str | None, source: str) -> Algorithm:
-    """Look up an algorithm by name, the default for None.  Raises ScenarioError for a name that is none."""
+    """The algorithm of this name, the default for None.  Raises ScenarioError for a name that is none.
+
+    source: what asked for it, as the error's first words.
+
+    >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
+    ('umda-seeded', 'polar')
+    """
     found = ALGORITHMS.get(DEFAULT if name is None else name)
     if found is None:
         raise ScenarioError(f"{source}: planner.algorithm: {name!r}: not known; allowed: {', '.join(ALGORITHMS)}")

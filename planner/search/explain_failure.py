@@ -14,13 +14,25 @@ ALONG, ACROSS = 200, 400
 
 
 def what_blocks(plan: Plan) -> list[str]:
-    """Lines that say what is in the way of a plan that is not feasible, and what a search in its encoding cannot do."""
+    """Lines that say what is in the way of a plan that is not feasible, and what a search in its encoding cannot do.
+
+    >>> from dataclasses import replace
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.search.plan_path import plan_path
+    >>> from world.scenario import load_scenario
+    >>> from world.scenario_variants import with_threats
+    >>> scenario = load_scenario("hard-07")
+    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> guarded = with_threats(scenario, [(5000.0, 5000.0, 8000.0, 0.0)], "--add-threat")
+    >>> print(what_blocks(replace(plan, scenario=guarded))[0])
+    terrain and missiles together close the way 65 m from the start, at every height
+    """
     scenario = plan.scenario
     lines = _walls(scenario)
     if not lines:
-        missed = [item.name.lower() for item in Violation if plan.violations[item]]
-        if missed:
-            lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(missed)}")
+        violated = [item.name.lower() for item in Violation if plan.violations[item]]
+        if violated:
+            lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(violated)}")
     chosen = ALGORITHMS.get(plan.algorithm)
     if chosen is not None and chosen.encoding == "rotated":
         lines.append(
@@ -36,8 +48,8 @@ def _walls(scenario: Scenario) -> list[str]:
     if terrain is None:
         return []
     frame = rotated_frame(scenario.start, scenario.destination)
-    reach = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
-    across = np.linspace(-reach, reach, ACROSS)
+    widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
+    across = np.linspace(-widest, widest, ACROSS)
     lines: list[str] = []
     for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
         places = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
@@ -61,16 +73,16 @@ def _walls(scenario: Scenario) -> list[str]:
 
 
 def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bool:
-    """Whether some height at some of the places (n, 2) is in no missile's reach."""
+    """Whether some height at some of the places (n, 2) is outside every kill sphere."""
     threats = scenario.threats
     armed = threats.kill_radius > 0.0
     position, radius = threats.position[armed], threats.kill_radius[armed]
     for share in np.linspace(0.0, 1.0, 9):
         up = lowest + share * (scenario.ceiling - lowest)
         free = np.ones(len(places), dtype=np.bool_)
-        for centre, reach in zip(position, radius, strict=True):
+        for centre, kill_radius in zip(position, radius, strict=True):
             away = (places[:, 0] - centre[0]) ** 2 + (places[:, 1] - centre[1]) ** 2 + (up - centre[2]) ** 2
-            free &= away > reach * reach
+            free &= away > kill_radius * kill_radius
         if free.any():
             return True
     return math.isinf(scenario.ceiling)

@@ -1,4 +1,4 @@
-"""Running an algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
+"""An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
 
@@ -10,28 +10,26 @@ from planner.evaluation.certify import kill_distance
 from planner.evaluation.encoding import ENCODINGS, rotated_frame, rotated_vectors
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
-from planner.optimisers.differential_evolution import Differential
+from planner.optimisers.differential_evolution import DifferentialEvolution
 from planner.optimisers.emna import Emna
-from planner.optimisers.markov_chain import Chain
+from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
-from planner.search.search_state import (
-    ARCHIVE_LEVELS,
+from planner.search.score_table import (
+    CONSTRAINTS,
     DETECTION,
     HEIGHT,
     KILL,
     LENGTH,
-    VIOLATIONS,
-    Archive,
-    Improved,
-    Progress,
-    Run,
-    Stop,
+    best_first,
+    no_scores,
+    safe,
 )
+from planner.search.search_state import Archive, Improved, Progress, Search, StopCondition
 from planner.seeding.first_samples import bridge_basis, first_samples
-from planner.seeding.grid_routes import Route, grid_routes
+from planner.seeding.grid_routes import GridRoute, grid_routes
 from planner.seeding.waypoint_fitting import QUICK, fit_waypoints
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
@@ -47,13 +45,13 @@ ATTEMPTS = (
     (((44, 3), (96, 3), (160, 2)), 3),
 )
 # A seeded search ends when this many generations have shortened its best path by less than this share of the straight
-# line: the polish at the end is faster at the rest.
+# line: the pattern search at the end is faster at the rest.
 PATIENCE, GAIN = 10, 2e-4
 # Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
 # safe path, and once it has.
 SHARE, SAFE_SHARE = 0.3, 0.1
-# Evaluations that a quick path, each seed, and the best path at the end are polished with, at most.
-QUICK_POLISH, SEED_POLISH, LAST_POLISH = 50, 300, 200
+# Evaluations that a quick path, each seed, and the best path at the end are improved with by a pattern search, at most.
+QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 # Numbers a population may hold.
@@ -67,18 +65,28 @@ def plan_path(
     seed: int,
     algorithm: str | None = None,
     progress: Progress | None = None,
-    stop: Stop | None = None,
+    stop: StopCondition | None = None,
     improved: Improved | None = None,
     first_safe: bool = False,
     previous: Floats | None = None,
 ) -> Plan:
     """Plan a path.  The same scenario, limits, algorithm and seed give the same plan.
 
-    algorithm: a name of `planner.search.algorithms`; None takes the scenario's, or the default.  progress: called with
-    generations done, generations in all, and a short text.  stop: asked between generations; a text such as
-    "interrupted" ends the search with the best path yet, and stands in the plan.  improved: called with each path
-    (w, 3) that meets the constraints better than all before it, not yet certified.  first_safe: end with the first
-    safe path.  previous: (w, 3) an older path of the same ends and number of waypoints to start from.
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> plan.safe, plan.waypoints.shape
+    (True, (10, 3))
+
+    algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
+    progress: called with generations done, generations in all, and a short text.
+    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
+    the plan.
+    improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
+    first_safe: end with the first safe path.
+    previous: (w, 3) an older path of the same ends and number of waypoints to start from.
+
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
@@ -88,8 +96,8 @@ def plan_path(
     # No path is further from a missile's sphere than its own ends are.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
     wanted = min(CERTIFIED_KILL_MARGIN, ends - 1e-6)
-    run = Run(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
-    waypoints, certificate = _attempts(run, previous)
+    search = Search(problem, chosen, encoding, stream(seed, PLANNER), progress, stop, first_safe, wanted, improved)
+    waypoints, certificate = _attempts(search, previous)
     counts, objectives = paper_scores(problem.certified, waypoints[None])
     return Plan(
         scenario=scenario,
@@ -99,28 +107,28 @@ def plan_path(
         certificate=certificate,
         seed=seed,
         algorithm=chosen.name,
-        evaluations=run.evaluations,
-        history=np.array(run.history).reshape(-1, 3),
-        ended=run.ended,
+        evaluations=search.evaluations,
+        history=np.array(search.history).reshape(-1, 3),
+        ended=search.ended,
     )
 
 
-def _attempts(run: Run, previous: Floats | None) -> tuple[Floats, Certificate]:
+def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
     """Search, and search again with finer grids and more samples while the certificate says no."""
-    attempts = ATTEMPTS if run.algorithm.seeded else ATTEMPTS[:1]
+    attempts = ATTEMPTS if search.algorithm.seeded else ATTEMPTS[:1]
     best: tuple[Floats, Certificate] | None = None
     for number in range(len(attempts)):
         if number > 0:
-            _retry(run, number)
-        _attempt(run, number, previous)
-        found = run.best_certified()
+            _retry(search, number)
+        _attempt(search, number, previous)
+        found = search.best_certified()
         # An earlier attempt's is kept where a later one has nothing better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = found
-        if run.finished(best[1]) or run.over():
+        if search.finished(best[1]) or search.over():
             break
     if best is None:  # pragma: no cover - the loop always runs
-        raise ScenarioError(f"{run.problem.scenario.name}: planner: nothing was tried")
+        raise ScenarioError(f"{search.problem.scenario.name}: planner: nothing was tried")
     return best
 
 
@@ -146,163 +154,160 @@ def _check_options(scenario: Scenario) -> None:
             )
 
 
-def _levels(run: Run) -> tuple[Level, ...]:
+def _levels(search: Search) -> tuple[Level, ...]:
     """Preference that ranks a population; goals are the scenario's, none by default."""
-    goals = run.problem.scenario.planner.goals
+    goals = search.problem.scenario.planner.goals
     length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
     kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
-    if run.algorithm.graded:
-        return VIOLATIONS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
-    return VIOLATIONS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
+    if search.algorithm.graded:
+        return CONSTRAINTS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
+    return CONSTRAINTS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
 
 
-def _retry(run: Run, number: int) -> None:
-    """Take more reserve, and judge again what the archive holds."""
-    run.problem = make_problem(run.problem.scenario, run.problem.limits, number)
-    vectors = run.archive.vectors
-    run.archive = Archive(vectors[:0], np.empty((0, 8)))
-    run.evaluate(vectors)
+def _retry(search: Search, number: int) -> None:
+    """Take a larger clearance buffer, and evaluate again what the archive holds."""
+    search.problem = make_problem(search.problem.scenario, search.problem.limits, number)
+    vectors = search.archive.vectors
+    search.archive = Archive(vectors[:0], no_scores())
+    search.evaluate(vectors)
 
 
-def _attempt(run: Run, number: int, previous: Floats | None) -> None:
+def _attempt(search: Search, number: int, previous: Floats | None) -> None:
     """One search from its first population to its last generation."""
-    table = run.problem.scenario.planner
+    table = search.problem.scenario.planner
     grids, growth = ATTEMPTS[number]
     population = table.population * growth
-    encoding, algorithm = run.encoding, run.algorithm
-    if algorithm.seeded and number == 0 and _straight(run):
-        run.note()
-        run.report(0)
+    encoding, algorithm = search.encoding, search.algorithm
+    if algorithm.seeded and number == 0 and _straight(search):
+        search.note()
+        search.report(0)
         return
-    starts = _starts(run, grids, previous)
-    if len(run.archive.scores) and (run.safe_already() or run.over()):
-        run.note()
+    starts = _starts(search, grids, previous)
+    if len(search.archive.scores) and (search.safe_already() or search.over()):
+        search.note()
         return
-    levels, before = _levels(run), run.evaluations
-    initial = first_samples(run.problem.space, encoding, population, starts, run.rng) if algorithm.smooth else None
-    search = _optimiser(run, lambda scores: ranks(scores, levels), population, initial)
-    search.tell(run.evaluate(search.ask()))
-    run.note()
-    bests = [_first(search.scores)]
+    levels, before = _levels(search), search.evaluations
+    initial = (
+        first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
+    )
+    optimiser = _make_optimiser(search, lambda scores: ranks(scores, levels), population, initial)
+    optimiser.tell(search.evaluate(optimiser.ask()))
+    search.note()
+    bests = [_best_row(optimiser.scores)]
     whole = population + table.generations * (population // 2)
     for generation in range(table.generations):
-        if run.over() or run.safe_already():
+        if search.over() or search.safe_already():
             break
-        share = SHARE if run.missed() else SAFE_SHARE
-        if algorithm.seeded and (_settled(bests) or run.evaluations >= before + share * whole):
+        share = SAFE_SHARE if search.best_is_safe() else SHARE
+        if algorithm.seeded and (_stagnant(bests) or search.evaluations >= before + share * whole):
             break
-        search.tell(run.evaluate(search.ask()))
-        run.note()
-        bests.append(_first(search.scores))
-        run.done += 1
-        run.report(table.generations - generation - 1)
-    if algorithm.seeded and run.ended == "completed":
-        # What the generations came to, tightened, may be another way than the polished seed's.
-        order = np.argsort(ranks(_known(search.scores), ARCHIVE_LEVELS), kind="stable")
-        run.tighten(search.samples[order[0]], LAST_ROUNDS, 0.5, LAST_POLISH)
+        optimiser.tell(search.evaluate(optimiser.ask()))
+        search.note()
+        bests.append(_best_row(optimiser.scores))
+        search.done += 1
+        search.report(table.generations - generation - 1)
+    if algorithm.seeded and search.ended == "completed":
+        # What the generations came to, tightened, may be another way than the improved seed's.
+        order = best_first(optimiser.scores)
+        search.tighten(optimiser.samples[order[0]], LAST_ROUNDS, 0.5, LAST_SEARCH)
         for scale in LAST_MOVES:
-            if run.over():
+            if search.over():
                 break
-            run.tighten(run.archive.vectors[0], LAST_ROUNDS, scale, LAST_POLISH)
-        run.note()
-        run.report(0)
+            search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
+        search.note()
+        search.report(0)
 
 
-def _straight(run: Run) -> bool:
+def _straight(search: Search) -> bool:
     """Whether the straight line is a safe path: no path is shorter, and there is nothing to search for."""
-    encoding, space = run.encoding, run.problem.space
+    encoding, space = search.encoding, search.problem.space
     if encoding.name != "rotated":
         return False
     edges = encoding.lower[0::3], encoding.upper[0::3]
     share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
     path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
     vectors = rotated_vectors(space, encoding, path[None])
-    scores = run.judge(vectors)
-    if scores[0, :4].any() or scores[0, KILL] > 0.0:
+    scores = search.score(vectors)
+    if not safe(scores[0]):
         return False
-    run.evaluate(vectors)
-    return run.finished(run.best_certified()[1])
+    search.evaluate(vectors)
+    return search.finished(search.best_certified()[1])
 
 
-def _starts(run: Run, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
-    """Vectors (n, d) that a search starts from: the seed that comes out best when polished, and the older path.
+def _starts(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
+    """Vectors (n, d) that a search starts from: the seed that comes out best when improved, and the older path.
 
-    Marginals over several routes at once fit none of them: one leads.  It leads as it was: polished it stands so close
+    Marginals over several routes at once fit none of them: one leads.  It leads as it was: improved it stands so close
     to every limit that hardly a sample near it keeps them.
     """
-    encoding, space, waypoints = run.encoding, run.problem.space, run.encoding.waypoints
-    if encoding.name != "rotated" or (not run.algorithm.seeded and previous is None):
+    encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
+    if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
         return np.empty((0, encoding.lower.size))
-    starts = list(run.archive.vectors[:1])
+    frame, starts = rotated_frame(space.start, space.destination), list(search.archive.vectors[:1])
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += older
-    polished = [run.polish(vector, SEED_POLISH) for vector in starts]
-    for route in _routes(run, grids) if run.algorithm.seeded else ():
-        if run.over() or run.safe_already():
+    improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
+    for route in _routes(search, grids) if search.algorithm.seeded else ():
+        if search.over() or search.safe_already():
             break
-        path = fit_waypoints(run.problem.search, rotated_frame(space.start, space.destination), route.points, waypoints)
+        path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
-        polished.append(run.polish(starts[-1], SEED_POLISH))
+        improved_scores.append(search.improve(starts[-1], SEED_SEARCH))
     if not starts:
         return np.empty((0, encoding.lower.size))
-    order = np.argsort(ranks(np.array(polished), ARCHIVE_LEVELS), kind="stable")
+    order = best_first(np.array(improved_scores))
     return np.array([starts[order[0]], *older])
 
 
-def _routes(run: Run, grids: tuple[tuple[int, int], ...]) -> list[Route]:
-    """Find the grids' routes; the archive sees a path that is quickly fitted to each as soon as it is found.
+def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRoute]:
+    """The grids' routes; the archive takes a path that is quickly fitted to each as soon as it is found.
 
     Those with the best such paths come first.
     """
-    encoding, space, rules = run.encoding, run.problem.space, run.problem.search
-    if run.progress is not None:
-        run.progress(run.done, run.done + run.problem.scenario.planner.generations, "grid routes")
+    encoding, space, data = search.encoding, search.problem.space, search.problem.search
+    if search.progress is not None:
+        search.progress(search.done, search.done + search.problem.scenario.planner.generations, "grid routes")
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     found, scores = [], []
-    for route in grid_routes(rules, frame, span, grids):
+    for route in grid_routes(data, frame, span, grids):
         found.append(route)
-        path = fit_waypoints(rules, frame, route.points, encoding.waypoints, QUICK)
+        path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
         vectors = rotated_vectors(space, encoding, path[None])
-        scores.append(run.evaluate(vectors)[0])
-        if not run.safe_already():
-            scores[-1] = run.polish(vectors[0], QUICK_POLISH)
-        if run.over() or run.safe_already():
+        scores.append(search.evaluate(vectors)[0])
+        if not search.safe_already():
+            scores[-1] = search.improve(vectors[0], QUICK_SEARCH)
+        if search.over() or search.safe_already():
             break
     if not found:
         return []
-    return [found[k] for k in np.argsort(ranks(np.array(scores), ARCHIVE_LEVELS), kind="stable")]
+    return [found[k] for k in best_first(np.array(scores))]
 
 
-def _known(scores: Floats | None) -> Floats:
-    return np.empty((0, 8)) if scores is None else scores
+def _best_row(scores: Floats) -> Floats:
+    """Best of the scores (n, 8), in the archive's order."""
+    return np.asarray(scores[best_first(scores)[0]])
 
 
-def _first(scores: Floats | None) -> Floats:
-    """Best row (8,) of a population's scores, in the archive's order."""
-    known = _known(scores)
-    return np.asarray(known[int(np.argmin(ranks(known, ARCHIVE_LEVELS)))])
+def _make_optimiser(
+    search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
+) -> Umda | DifferentialEvolution:
+    """The optimiser that the algorithm names."""
+    lower, upper = search.encoding.lower, search.encoding.upper
+    if search.algorithm.optimiser == "differential":
+        return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)
+    if search.algorithm.optimiser == "emna":
+        return Emna(lower, upper, rank, population, search.rng, initial=initial)
+    if search.algorithm.optimiser == "chain":
+        return MarkovChain(lower, upper, rank, population, search.rng, initial=initial)
+    basis = bridge_basis(search.encoding.waypoints - 2) if search.algorithm.smooth else None
+    return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
 
 
-def _optimiser(
-    run: Run, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
-) -> Umda | Differential:
-    """Make the optimiser that the algorithm names."""
-    lower, upper = run.encoding.lower, run.encoding.upper
-    if run.algorithm.optimiser == "differential":
-        return Differential(lower, upper, rank, population, run.rng, initial=initial)
-    if run.algorithm.optimiser == "emna":
-        return Emna(lower, upper, rank, population, run.rng, initial=initial)
-    if run.algorithm.optimiser == "chain":
-        return Chain(lower, upper, rank, population, run.rng, initial=initial)
-    basis = bridge_basis(run.encoding.waypoints - 2) if run.algorithm.smooth else None
-    return Umda(lower, upper, rank, population, run.rng, initial=initial, basis=basis)
-
-
-def _settled(bests: list[Floats]) -> bool:
+def _stagnant(bests: list[Floats]) -> bool:
     """Whether the last generations have gained next to nothing."""
     if len(bests) <= PATIENCE:
         return False
     before, after = bests[-1 - PATIENCE], bests[-1]
-    same = np.array_equal(before[:4], after[:4]) and before[KILL] == after[KILL]
+    same = np.array_equal(before[:LENGTH], after[:LENGTH]) and before[KILL] == after[KILL]
     return bool(same and before[LENGTH] - after[LENGTH] < GAIN)

@@ -11,7 +11,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from planner.search.search_state import Progress, Stop
+from planner.search.search_state import Progress, StopCondition
 from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
@@ -31,14 +31,27 @@ def replan(
     seed: int,
     algorithm: str | None = None,
     progress: Progress | None = None,
-    stop: Stop | None = None,
+    stop: StopCondition | None = None,
 ) -> Plan:
     """Plan anew from the waypoint at which leg `leg` of an old plan begins; legs before it are flown and stay.
 
     scenario: with the threats known now (`world.scenario.with_threats`).  The turn at that waypoint counts from the
     course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
     The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
-    Raises MissionError for a leg that the old plan has not or that begins in a missile's reach, and for a plan of
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> from world.scenario_variants import with_threats
+    >>> scenario = load_scenario("hard-07")
+    >>> limits = load_airframe(scenario).limits
+    >>> old = plan_path(scenario, limits, seed=1)
+    >>> east, north, _ = old.waypoints[6]
+    >>> now = with_threats(scenario, [(east, north, 300.0, 0.0)], "--add-threat")
+    >>> new = replan(now, limits, old, 3, seed=1)
+    >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
+    (True, 3, True)
+
+    Raises MissionError for a leg that the old plan has not or that begins in a missile's kill sphere, and for a plan of
     another mission; ScenarioError as `plan_path`.
     """
     count = len(old.waypoints)
@@ -59,7 +72,17 @@ def replan(
 
 
 def same_mission(scenario: Scenario, old: Plan) -> None:
-    """Raise MissionError if a plan has not the scenario's ends."""
+    """Raise MissionError if a plan has not the scenario's ends.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
+    >>> same_mission(scenario, plan)
+    >>> same_mission(load_scenario("tight"), plan)
+    Traceback (most recent call last):
+    world.errors.MissionError: tight: start: 742 m from that of the plan; it is another mission's
+    """
     for name, planned, asked in (
         ("start", old.waypoints[0], scenario.start),
         ("destination", old.waypoints[-1], scenario.destination),
@@ -82,7 +105,7 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:
-    """Split the longest legs of a path (w, 3) until it has `count` waypoints."""
+    """A path (w, 3) whose longest legs are split until it has `count` waypoints."""
     points = [np.asarray(point, dtype=np.float64) for point in path]
     while len(points) < count:
         longest = int(np.argmax(leg_runs(np.array(points))))

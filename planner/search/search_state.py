@@ -12,23 +12,19 @@ from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
-from planner.optimisers.preference import NO_GOAL, Level, ranks
-from planner.plan import Certificate
+from planner.plan import Certificate, Violation
 from planner.search.algorithms import Algorithm
-from planner.seeding.pattern_search import polish
+from planner.search.score_table import KILL, LENGTH, best_first, no_scores, safe, score_table, violated
+from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
 
 Floats = NDArray[np.float64]
 Progress = Callable[[int, int, str], None]
-Stop = Callable[[], str]
+StopCondition = Callable[[], str]
 Improved = Callable[[Floats], None]
 
-# Columns of the scores that a search ranks: four violations, then the four objectives.
-VIOLATIONS = Level((0, 1, 2, 3), (0.0, 0.0, 0.0, 0.0))
-LENGTH, KILL, DETECTION, HEIGHT = 4, 5, 6, 7
-# The order of the archive: what meets the constraints, then least kill exposure, then the shortest.
-ARCHIVE_LEVELS = (VIOLATIONS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
+# Paths that are kept.
 ARCHIVE_SIZE = 24
 
 
@@ -39,13 +35,17 @@ class Archive:
     vectors: Floats
     scores: Floats
 
+    def feasible(self) -> bool:
+        """Whether the best path meets the constraints; not where there is none."""
+        return len(self.scores) > 0 and not violated(self.scores[0])
+
     def take(self, vectors: Floats, scores: Floats) -> None:
         """Let new rows in; equal ranks keep their order, older first.
 
         Once a row meets the constraints, those that do not are let go: there can be thousands of them to rank.
         """
-        fit = ~scores[:, :4].any(axis=1)
-        if len(self.scores) and not self.scores[0, :4].any():
+        fit = ~violated(scores)
+        if self.feasible():
             if len(self.scores) == ARCHIVE_SIZE:
                 last = self.scores[-1]
                 shorter = (scores[:, KILL] == last[KILL]) & (scores[:, LENGTH] < last[LENGTH])
@@ -56,21 +56,27 @@ class Archive:
             self.vectors, self.scores = self.vectors[:0], self.scores[:0]
         every = np.concatenate([self.scores, scores[fit] if fit.any() else scores])
         joined = np.concatenate([self.vectors, vectors[fit] if fit.any() else vectors])
-        if fit.any():
-            # Among rows that meet the constraints the order is by exposure, then by length.
-            order = np.lexsort((every[:, LENGTH], every[:, KILL]))[:ARCHIVE_SIZE]
-        else:
-            order = np.argsort(ranks(every, ARCHIVE_LEVELS), kind="stable")[:ARCHIVE_SIZE]
+        order = best_first(every)[:ARCHIVE_SIZE]
         self.vectors, self.scores = joined[order], every[order]
 
 
 @dataclass(slots=True)
-class Run:
-    """What attempts share: how much was evaluated, and what was seen after each generation.
+class Search:
+    """What attempts share: how much was evaluated, and what was found after each generation.
 
-    stop: asked after each generation and each seed; a text ends the search and says why.  wanted: distance (m) from
-    missiles that the certificate of a finished path has.  improved: called with each path (w, 3) that is the best yet
-    of those that meet the constraints.  ended: why the search ended.  judged: certificates by the path's vector.
+    problem: with the margins of the present attempt.
+    algorithm, encoding, rng: how it searches.
+    progress: called with generations done, generations in all, and a short text.
+    stop: asked after each generation and each start; a text ends the search and says why.
+    first_safe: whether it ends with the first safe path.
+    wanted: distance (m) from missiles that the certificate of a finished path has.
+    improved: called with each path (w, 3) that is the best yet of those that meet the constraints.
+    archive: the best paths of all.
+    evaluations: paths evaluated, or as much work.
+    done: generations done.
+    ended: why the search ended.
+    history: after each generation length ratio, kill exposure and violations of the best path yet.
+    certificates: by the path's vector.
     """
 
     problem: Problem
@@ -78,7 +84,7 @@ class Run:
     encoding: Encoding
     rng: np.random.Generator
     progress: Progress | None
-    stop: Stop | None
+    stop: StopCondition | None
     first_safe: bool
     wanted: float
     improved: Improved | None = None
@@ -87,49 +93,45 @@ class Run:
     done: int = 0
     ended: str = "completed"
     history: list[tuple[float, float, float]] = field(default_factory=list)
-    judged: dict[bytes, Certificate] = field(default_factory=dict)
+    certificates: dict[bytes, Certificate] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Begin with nothing."""
-        self.archive = Archive(np.empty((0, self.encoding.lower.size)), np.empty((0, 8)))
+        self.archive = Archive(np.empty((0, self.encoding.lower.size)), no_scores())
 
-    def judge(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d)."""
+    def score(self, vectors: Floats) -> Floats:
+        """Scores (n, 8) of vectors (n, d), of which neither archive nor budget takes note."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
-        violations: NDArray[np.generic]
-        if self.algorithm.graded:
-            violations, objectives = graded_scores(self.problem.search, paths)
-        else:
-            violations, objectives = paper_scores(self.problem.search, paths)
-        return np.concatenate([violations.astype(np.float64), objectives], axis=1)
+        evaluate = graded_scores if self.algorithm.graded else paper_scores
+        return score_table(*evaluate(self.problem.search, paths))
 
     def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive sees them."""
-        scores = self.judge(vectors)
+        """Scores (n, 8) of vectors (n, d); the archive takes them."""
+        scores = self.score(vectors)
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
         best = self.archive.vectors[:1]
-        if self.improved is not None and not self.archive.scores[0, :4].any() and not np.array_equal(before, best):
+        if self.improved is not None and self.archive.feasible() and not np.array_equal(before, best):
             self.improved(self.encoding.decode(best)[0])
         return scores
 
-    def polish(self, vector: Floats, most: int) -> Floats:
-        """Tighten a vector (d,) by a local search; the archive sees what it finds.  Gives the best scores (8,)."""
+    def improve(self, vector: Floats, most: int) -> Floats:
+        """Tighten a vector (d,) by a pattern search; the archive takes what it finds.  Gives the best scores (8,)."""
         left = min(most, self._budget() - self.evaluations)
         if left < 2:
             return np.asarray(self.evaluate(vector[None])[0])
-        found, made = polish(self.problem.search, self.encoding, vector, int(left))
+        found, made = search_patterns(self.problem.search, self.encoding, vector, int(left))
         scores = self.evaluate(found)
         # What is found was counted when it was found.
         self.evaluations += made - len(found)
         return np.asarray(scores[0])
 
     def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
-        """Move all waypoints of a vector (d,) at once, then polish it.  Gives the best scores (8,)."""
+        """Move all waypoints of a vector (d,) at once, then `improve` it.  Gives the best scores (8,)."""
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += made
-        return self.polish(moved, most)
+        return self.improve(moved, most)
 
     def over(self) -> bool:
         """Whether the search is to end now."""
@@ -139,13 +141,13 @@ class Run:
             self.ended = self.stop() or "completed"
         return self.ended != "completed"
 
-    def missed(self) -> bool:
-        """Whether the best path yet violates something or is in a missile's reach."""
-        return bool(self.archive.scores[0, :4].any() or self.archive.scores[0, KILL] > 0.0)
+    def best_is_safe(self) -> bool:
+        """Whether the best path yet violates nothing and is exposed to no missile."""
+        return bool(safe(self.archive.scores[0]))
 
     def safe_already(self) -> bool:
         """Whether the first safe path was asked for, and is there."""
-        if not self.first_safe or not len(self.archive.scores) or self.archive.scores[0, :4].any():
+        if not self.first_safe or not self.archive.feasible():
             return False
         return self.finished(self.best_certified()[1])
 
@@ -160,30 +162,31 @@ class Run:
     def note(self) -> None:
         """Add the archive's best to the history."""
         best = self.archive.scores[0]
-        missed = np.count_nonzero(best[:4]) if self.algorithm.graded else best[:4].sum()
-        self.history.append((best[LENGTH], best[KILL], float(missed)))
+        violations = best[: len(Violation)]
+        count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
+        self.history.append((best[LENGTH], best[KILL], float(count)))
 
     def report(self, left: int) -> None:
         """Tell how far the search has come; left: generations that may follow."""
         if self.progress is not None:
             best = self.archive.scores[0]
             remark = f"length ratio {best[LENGTH]:.4f}, kill exposure {best[KILL]:.3g}"
-            self.progress(self.done, self.done + left, "no feasible path yet" if best[:4].any() else remark)
+            self.progress(self.done, self.done + left, "no feasible path yet" if violated(best) else remark)
 
     def best_certified(self) -> tuple[Floats, Certificate]:
-        """First of the archive that is certified and out of reach; or certified and farthest; or the first."""
+        """First of the archive that is certified and out of range; or certified and farthest; or the first."""
         first: tuple[Floats, Certificate] | None = None
-        reachable: tuple[Floats, Certificate] | None = None
+        exposed: tuple[Floats, Certificate] | None = None
         for vector in self.archive.vectors:
             path = np.ascontiguousarray(self.encoding.decode(vector[None])[0])
             certificate = self._certificate(vector, path)
             if certificate.ok and certificate.kill_distance >= CERTIFIED_KILL_MARGIN:
                 return path, certificate
             first = first or (path, certificate)
-            least = -math.inf if reachable is None else reachable[1].kill_distance
+            least = -math.inf if exposed is None else exposed[1].kill_distance
             if certificate.ok and certificate.kill_distance > least:
-                reachable = (path, certificate)
-        result = reachable or first
+                exposed = (path, certificate)
+        result = exposed or first
         if result is None:  # pragma: no cover - an archive is never empty after an attempt
             raise ScenarioError(f"{self.problem.scenario.name}: planner: nothing was evaluated")
         return result
@@ -191,7 +194,7 @@ class Run:
     def _certificate(self, vector: Floats, path: Floats) -> Certificate:
         """Certificate of a vector's path: the same in all attempts, so it is made once."""
         key = vector.tobytes()
-        known = self.judged.get(key)
+        known = self.certificates.get(key)
         if known is None:
-            known = self.judged[key] = certify(self.problem, path)
+            known = self.certificates[key] = certify(self.problem, path)
         return known

@@ -42,7 +42,10 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """First population (n, d): the seeds and smooth paths around them; without seeds, about the straight line."""
+    """First population (n, d): the starts and smooth paths around them; without any, about the straight line.
+
+    starts: vectors (s, d) to start from.
+    """
     inner = encoding.waypoints - 2
     modes, deviations = bridge_modes(inner)
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)

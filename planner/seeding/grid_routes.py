@@ -1,8 +1,8 @@
-"""Seeds from coarse grids: a shortest way through terrain and threats in the rotated frame, stage by stage.
+"""Routes over coarse grids: cheapest ways through terrain and threats in the rotated frame, stage by stage.
 
 The grid picks the side of each obstacle; `planner.seeding.waypoint_fitting` then puts the path's waypoints, one an
-interval, where whole legs are judged.  Both are dynamic programmes over forward steps: a path that the rotated encoding
-can hold never turns back.
+interval, where whole legs are evaluated.  Both are dynamic programmes over forward steps: a path that the rotated
+encoding can hold never turns back.
 """
 
 import math
@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.encoding import Frame, rotated_frame
+from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
-from planner.evaluation.problem_arrays import Rules
-from planner.seeding.grid_kernels import cheapest_way
-from planner.seeding.waypoint_fitting import fit_waypoints
+from planner.evaluation.problem_arrays import ProblemArrays
+from planner.seeding.grid_kernels import cheapest_route
+from planner.seeding.grid_prices import Grid
 
 Floats = NDArray[np.float64]
 
@@ -33,45 +33,40 @@ APART, APART_STEPS = 800.0, 3.0
 
 
 @dataclass(frozen=True, slots=True)
-class Grid:
-    """One resolution: stages along, places across (m from the line) and layers of height (m)."""
-
-    stages: int
-    across: Floats
-    layers: Floats
-
-
-@dataclass(frozen=True, slots=True)
-class Route:
+class GridRoute:
     """A way over a grid: points (stages + 1, 3) along, across, up, and its cost in m of path."""
 
     points: Floats
     cost: float
 
 
-def make_grid(rules: Rules, frame: Frame, span: tuple[float, float], stages: int) -> Grid:
-    """Make a grid of this many stages, square in the plane, its layers passing through the start's height.
+def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
+    """A grid of this many stages, square in the plane, its layers passing through the start's height.
 
-    The pitch grows where the grid would get too large.
+    span: lowest and highest place across, m.  The pitch grows where the grid would get too large.
     """
-    low, high = max(rules.floor, float(np.nanmin(rules.heights))), rules.ceiling
-    ends = np.stack([rules.start, rules.destination])
-    share = math.tan(max(0.0, min(slope_limits(rules, ends[0], np.array([*ends[1, :2], ends[0, 2]])))))
+    low, high = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
+    level = np.array([*data.destination[:2], data.start[2]])
+    share = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
     share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_A_STEP))
     while True:
         step = frame.length / stages
         layer = share * step
         below, above = math.floor(-span[0] / step), math.floor(span[1] / step)
         across = np.arange(-below, above + 1) * step
-        up = np.arange(math.ceil((low - rules.start[2]) / layer), math.floor((high - rules.start[2]) / layer) + 1)
+        up = np.arange(math.ceil((low - data.start[2]) / layer), math.floor((high - data.start[2]) / layer) + 1)
         if stages <= 4 or (stages + 1) * across.size * max(1, up.size) <= MOST_CELLS:
-            return Grid(stages, np.asarray(across, np.float64), np.asarray(rules.start[2] + up * layer, np.float64))
+            return Grid(stages, np.asarray(across, np.float64), np.asarray(data.start[2] + up * layer, np.float64))
         stages = max(4, int(stages / 1.2))
 
 
 def grid_route(
-    rules: Rules, frame: Frame, grid: Grid, used: tuple[Route, ...] = (), expected: float = math.inf
-) -> Route | None:
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: Grid,
+    used: tuple[GridRoute, ...] = (),
+    expected: float = math.inf,
+) -> GridRoute | None:
     """Cheapest way over a grid; None where terrain and ceiling close it.
 
     used: earlier routes; keeping near them costs extra, so that the next one takes another side.  expected: a cost
@@ -79,7 +74,6 @@ def grid_route(
     """
     if grid.layers.size == 0:
         return None
-    packed = np.array([*frame.origin, *frame.direction, frame.length])
     along = np.linspace(0.0, frame.length, grid.stages + 1)
     extra = np.zeros((grid.stages + 1, grid.across.size))
     width = max(APART, APART_STEPS * frame.length / grid.stages)
@@ -87,35 +81,29 @@ def grid_route(
         stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
         extra += np.maximum(0.0, 1.0 - np.abs(grid.across[None, :] - stage_across[:, None]) / width)
     for bound in (expected, math.inf):
-        cells, cost = cheapest_way(rules, packed, grid.across, grid.layers, extra, bound)
+        cells, cost = cheapest_route(data, frame, grid, extra, bound)
         if cells.size:
-            return Route(np.column_stack([along, grid.across[cells[:, 0]], grid.layers[cells[:, 1]]]), float(cost))
+            points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
+            return GridRoute(points, float(cost))
         if bound == math.inf:
             break
     return None
 
 
 def grid_routes(
-    rules: Rules, frame: Frame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
-) -> Iterator[Route]:
+    data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
+) -> Iterator[GridRoute]:
     """Routes as found: of each grid's number of stages, up to so many different ones."""
-    expected = EXPECTED * math.dist(rules.start, rules.destination)
+    expected = EXPECTED * math.dist(data.start, data.destination)
     for stages, each in grids:
-        grid = make_grid(rules, frame, span, stages)
-        used: tuple[Route, ...] = ()
+        grid = make_grid(data, frame, span, stages)
+        used: tuple[GridRoute, ...] = ()
         for _ in range(each):
             # A second route costs more than the first.
-            route = grid_route(rules, frame, grid, used, math.inf if used else expected)
+            route = grid_route(data, frame, grid, used, math.inf if used else expected)
             if route is None:
                 break
             if not used:
                 expected = route.cost
             used = (*used, route)
             yield route
-
-
-def seeds(rules: Rules, span: tuple[float, float], waypoints: int, stages: tuple[int, ...], each: int) -> list[Floats]:
-    """Seed paths (w, 3) world m: waypoints fitted to up to `each` routes from a grid of each number of stages."""
-    frame = rotated_frame(rules.start, rules.destination)
-    found = grid_routes(rules, frame, span, tuple((number, each) for number in stages))
-    return [fit_waypoints(rules, frame, route.points, waypoints) for route in found]

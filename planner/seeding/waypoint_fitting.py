@@ -1,4 +1,4 @@
-"""Waypoints along a grid's route: a dynamic programme over places near it, in which whole legs are judged."""
+"""Waypoints along a grid's route: a dynamic programme over places near it, in which whole legs are evaluated."""
 
 import math
 from dataclasses import dataclass
@@ -7,12 +7,12 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.encoding import Encoding, Frame, rotated_frame
-from planner.evaluation.leg_constraints import Gauge, make_gauge, slope_excess
+from planner.evaluation.encoding import Encoding, RotatedFrame, rotated_frame
+from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
 from planner.evaluation.missile_index import kill_density
-from planner.evaluation.problem_arrays import Rules
-from planner.evaluation.terrain_clearance import pixels, terrain_excess
-from planner.seeding.grid_kernels import KILL_COST
+from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.terrain_clearance import segment_pixels, terrain_excess
+from planner.seeding.grid_prices import KILL_COST
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
@@ -24,31 +24,33 @@ SLOPE_COST = 1e6
 
 
 @compiled
-def leg_cost(rules: Rules, gauge: Gauge, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+def leg_cost(
+    data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats
+) -> float:  # pragma: no cover - compiled
     """Cost of one leg, in m of path: its length and what it violates."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
-    steep = slope_excess(rules, gauge, ux, uy, run, a[2], b[2])
-    ends = pixels(rules.to_pixel, a[0], a[1], b[0], b[1])
-    depth = terrain_excess(rules.heights, rules.steep, gauge.clear, ends, a[0], a[1], a[2], b[0], b[1], b[2])
+    steep = slope_excess(data, limits, ux, uy, run, a[2], b[2])
+    ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
+    depth = terrain_excess(data.heights, data.slope_bounds, limits.required, ends, a[0], a[1], a[2], b[0], b[1], b[2])
     total = length + SLOPE_COST * steep + DEPTH_COST * depth
-    kill, _, _ = kill_density(rules.missiles, rules.kill_margin, 0.0, a[0], a[1], a[2], b[0], b[1], b[2], 0.0, 0.0)
+    kill, _, _ = kill_density(data.missiles, data.kill_margin, 0.0, a[0], a[1], a[2], b[0], b[1], b[2], 0.0, 0.0)
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
     return total
 
 
 @compiled
-def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no cover - compiled
-    """Which of the candidates (w, c, 3) world m to take at each waypoint, so that the legs cost least; legs judged."""
+def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pragma: no cover - compiled
+    """Which of the candidates (w, c, 3) to take at each waypoint, so that the legs cost least; legs evaluated."""
     count, width, _ = candidates.shape
     came = np.zeros((count, width), dtype=np.int64)
     cost = np.full(width, np.inf)
     cost[0] = 0.0
-    gauge = make_gauge(rules)
-    least, judged = np.empty(width), 0
+    limits = precompute_limits(data)
+    least, evaluated = np.empty(width), 0
     for i in range(1, count):
         after = np.full(width, np.inf)
         for k in range(width if i < count - 1 else 1):
@@ -63,8 +65,8 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
                 if least[j] >= after[k]:
                     break
                 least[j] = np.inf
-                judged += 1
-                total = cost[j] + leg_cost(rules, gauge, candidates[i - 1, j], b)
+                evaluated += 1
+                total = cost[j] + leg_cost(data, limits, candidates[i - 1, j], b)
                 if total < after[k]:
                     after[k] = total
                     came[i, k] = j
@@ -72,15 +74,17 @@ def _choose(rules: Rules, candidates: Floats) -> tuple[Ints, int]:  # pragma: no
     out = np.zeros(count, dtype=np.int64)
     for i in range(count - 1, 0, -1):
         out[i - 1] = came[i, out[i]]
-    return out, judged
+    return out, evaluated
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class WaypointFit:
     """How closely waypoints are fitted to a route.
 
-    places: along each interval.  lifts: m above the route.  rounds: of moves of each waypoint.  diagonal: to the 26
-    places around it, not the 6 beside it.
+    places: along each interval.
+    lifts: m above the route.
+    rounds: of moves of each waypoint.
+    diagonal: whether moves are to the 26 places around it, not the 6 beside it.
     """
 
     places: int
@@ -90,14 +94,16 @@ class Fit:
 
 
 # First moves of a waypoint: shares of the interval along and across, and m up; and what is left of them each round.
-REACH, SHRINK, LAST_SHRINK = (0.25, 0.2, 40.0), 0.7, 0.6
-CLOSE, QUICK = Fit(9, (0.0, 20.0, 60.0), 2, diagonal=True), Fit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
+FIRST_MOVES, SHRINK, LAST_SHRINK = (0.25, 0.2, 40.0), 0.7, 0.6
+CLOSE, QUICK = WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True), WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
 # Steps to the places around a place, and to itself, along, across and up.
 _AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _BESIDE = _AROUND[np.abs(_AROUND).sum(axis=1) <= 1.0]
 
 
-def fit_waypoints(rules: Rules, frame: Frame, route: Floats, waypoints: int, fit: Fit = CLOSE) -> Floats:
+def fit_waypoints(
+    data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE
+) -> Floats:
     """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one an interval, tight as whole legs allow."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     span = edges[1] - edges[0]
@@ -107,51 +113,51 @@ def fit_waypoints(rules: Rules, frame: Frame, route: Floats, waypoints: int, fit
     candidates = np.zeros((waypoints, fit.places * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
     candidates[1:-1, :, 2] += np.repeat(fit.lifts, fit.places)
-    chosen, _ = _pick(rules, frame, candidates)
+    chosen, _ = _pick(data, frame, candidates)
     steps = _AROUND if fit.diagonal else _BESIDE
-    return frame.restore(_moved(rules, frame, edges, chosen, steps, fit.rounds, np.array(REACH), SHRINK)[0])
+    return frame.restore(_moved(data, frame, edges, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)[0])
 
 
-def tighten(rules: Rules, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
-    """Shorten a path of the rotated encoding by moves of all its waypoints at once, legs judged one by one.
+def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
+    """Shorten a path of the rotated encoding by moves of all its waypoints at once, legs evaluated one by one.
 
-    vector: (d,).  scale: of the first moves, to `REACH`.  Turns are not judged.  Returns the new vector, and as many
-    evaluations as its judged legs would make paths.
+    vector: (d,).  scale: of the first moves, to `FIRST_MOVES`.  Turns are not evaluated.  Returns the new vector, and
+    as many evaluations as its evaluated legs would make paths.
     """
-    frame = rotated_frame(rules.start, rules.destination)
+    frame = rotated_frame(data.start, data.destination)
     edges = np.linspace(0.0, frame.length, encoding.waypoints - 1)
     path = frame.rotate(encoding.decode(vector[None])[0])
-    chosen, legs = _moved(rules, frame, edges, path, _AROUND, rounds, scale * np.array(REACH), LAST_SHRINK)
+    chosen, legs = _moved(data, frame, edges, path, _AROUND, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
     return np.clip(chosen[1:-1].ravel(), encoding.lower, encoding.upper), math.ceil(legs / (encoding.waypoints - 1))
 
 
 def _moved(
-    rules: Rules,
-    frame: Frame,
+    data: ProblemArrays,
+    frame: RotatedFrame,
     edges: Floats,
     chosen: Floats,
     steps: Floats,
     rounds: int,
-    reach: Floats,
+    moves: Floats,
     shrink: float,
 ) -> tuple[Floats, int]:
-    """Waypoints (w, 3) in rotated axes after rounds of moves of up to `reach` along, across and up; legs judged."""
+    """Waypoints (w, 3) in rotated axes after rounds of moves of up to `moves` along, across and up; legs evaluated."""
     legs = 0
     low, high = edges[:-1, None], edges[1:, None]
-    reach = reach * [high[0, 0] - low[0, 0], high[0, 0] - low[0, 0], 1.0]
+    moves = moves * [high[0, 0] - low[0, 0], high[0, 0] - low[0, 0], 1.0]
     for _ in range(rounds):
         candidates = np.repeat(chosen[:, None, :], len(steps), axis=1)
-        candidates[1:-1] += steps * reach
+        candidates[1:-1] += steps * moves
         candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
-        candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], rules.floor, rules.ceiling)
-        chosen, more = _pick(rules, frame, candidates)
+        candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], data.floor, data.ceiling)
+        chosen, more = _pick(data, frame, candidates)
         legs += more
-        reach = reach * shrink
+        moves = moves * shrink
     return chosen, legs
 
 
-def _pick(rules: Rules, frame: Frame, candidates: Floats) -> tuple[Floats, int]:
-    """Chosen candidates (w, 3), in rotated axes, the ends fixed; and how many legs were judged."""
-    candidates[0], candidates[-1] = frame.rotate(rules.start), frame.rotate(rules.destination)
-    chosen, legs = _choose(rules, np.ascontiguousarray(frame.restore(candidates)))
+def _pick(data: ProblemArrays, frame: RotatedFrame, candidates: Floats) -> tuple[Floats, int]:
+    """Chosen candidates (w, 3), in rotated axes, the ends fixed; and how many legs were evaluated."""
+    candidates[0], candidates[-1] = frame.rotate(data.start), frame.rotate(data.destination)
+    chosen, legs = _choose(data, np.ascontiguousarray(frame.restore(candidates)))
     return candidates[np.arange(len(candidates)), chosen], int(legs)

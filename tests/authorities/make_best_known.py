@@ -10,13 +10,12 @@ import json
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from planfly.pipeline import make_plan
 from planner.plan import Objective
-from tests.bench.peers import run_cmaes, run_ompl
+from tests.bench.peers import Found, solve_with_cmaes, solve_with_ompl
 from tests.bench.task import PROBLEMS, Task, is_safe, make_task, with_planner
 
 FILE = Path(__file__).with_name("best_known.json")
@@ -32,16 +31,16 @@ def candidates(task: Task, methods: Sequence[str]) -> Iterator[tuple[str, list[l
         how = f"planfly {plan.algorithm}, population x {MORE}, seed {seed}, {plan.evaluations} evaluations"
         yield how, plan.waypoints.tolist(), float(plan.objectives[Objective.LENGTH_RATIO]), plan.safe
     for seed in SEEDS if "cmaes" in methods else ():
-        run = run_cmaes(task, seed, 5 * task.evaluations)
-        yield f"cmaes in the smooth basis, seeded, seed {seed}, {run.checks} evaluations", *run_of(run)
+        found = solve_with_cmaes(task, seed, 5 * task.evaluations)
+        yield f"cmaes in the smooth basis, seeded, seed {seed}, {found.checks} evaluations", *_path_of(found)
     if "ompl" in methods:
-        run = run_ompl(task, 1, RRT_SECONDS)
-        yield f"ompl InformedRRTstar, seed 1, {run.seconds:.0f} s, {run.checks} motions checked", *run_of(run)
+        found = solve_with_ompl(task, 1, RRT_SECONDS)
+        yield f"ompl InformedRRTstar, seed 1, {found.seconds:.0f} s, {found.checks} motions checked", *_path_of(found)
 
 
-def run_of(run: Any) -> tuple[list[list[float]], float, bool]:
+def _path_of(found: Found) -> tuple[list[list[float]], float, bool]:
     """Path, ratio and whether it is safe."""
-    return run.path, run.length_ratio, run.safe
+    return found.path, found.length_ratio, found.safe
 
 
 def main() -> None:
@@ -59,7 +58,7 @@ def main() -> None:
             sys.stdout.write(f"{name}: {how}: {tried[how]}\n")
             sys.stdout.flush()
             if how == entry.get("how") and ratio != entry["length_ratio"]:
-                # The same run of an older revision, from other coarse seeds.
+                # The same search of an older revision, from other coarse seeds.
                 entry["how"] = f"{how}, at an earlier revision"
             if safe and is_safe(certificate) and ratio < entry["length_ratio"]:
                 entry = {"length_ratio": ratio, "how": how, "waypoints_east_north_amsl_m": path}

@@ -37,8 +37,8 @@ def main() -> None:
     record |= {"machine": platform.machine(), "python": platform.python_version(), "cores": os.cpu_count()}
     work = {
         "chain": chain.run,
-        "planner": lambda: planner.run(args.runs),
-        "peers": lambda: peers.run(args.seconds),
+        "planner": lambda: planner.measure(args.runs),
+        "peers": lambda: peers.measure(args.seconds),
         "flight": lambda: flight.run(args.seeds),
         "aircraft": aircraft.run,
     }

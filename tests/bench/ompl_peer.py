@@ -1,7 +1,7 @@
 """OMPL's Informed RRT* on a scenario: ``python -m tests.bench.ompl_peer NAME SEED SECONDS [RATIO]`` prints JSON.
 
 States are points of the map between floor and ceiling; a motion is valid if its leg meets slope, terrain and map and
-no missile reaches it, by the same compiled judge and margins that our search uses.  A tree of straight motions
+no missile reaches it, by the same compiled evaluation and margins that our search uses.  A tree of straight motions
 knows no turns: each path that is shorter than the last is certified, and the last that passes is reported.
 
 The planner is asked after each of its steps whether its best cost has fallen; if it has, the path is certified, and
@@ -29,11 +29,11 @@ STEPS = 20
 
 
 class Motions(ob.MotionValidator):
-    """Judges motions in the direction of the mission; counts them, and the time they take."""
+    """Checks motions in the direction of the mission; counts them, and the time they take."""
 
     def __init__(self, information: object, task: Task) -> None:
         super().__init__(information)
-        self.rules = task.problem.search
+        self.data = task.problem.search
         step = task.scenario.destination - task.scenario.start
         self.east, self.north = float(step[0]), float(step[1])
         self.leg = np.zeros((1, 2, 3))
@@ -42,19 +42,19 @@ class Motions(ob.MotionValidator):
     def checkMotion(self, one: list[float], two: list[float]) -> bool:
         """The library's callback."""
         began = time.process_time_ns()
-        # Climb and dive limits differ, and rewiring turns motions round: all are judged as they would be flown.
+        # Climb and dive limits differ, and rewiring turns motions round: all are evaluated as they would be flown.
         forward = (two[0] - one[0]) * self.east + (two[1] - one[1]) * self.north >= 0.0
-        valid = self.judge(one, two) if forward else self.judge(two, one)
+        valid = self.is_valid(one, two) if forward else self.is_valid(two, one)
         self.count += 1
         self.nanoseconds += time.process_time_ns() - began
         return valid
 
-    def judge(self, one: list[float], two: list[float]) -> bool:
+    def is_valid(self, one: list[float], two: list[float]) -> bool:
         """Whether the leg violates nothing and no missile reaches it."""
         for row, state in enumerate((one, two)):
             for axis in range(3):
                 self.leg[0, row, axis] = state[axis]
-        violations, objectives = graded_scores(self.rules, self.leg)
+        violations, objectives = graded_scores(self.data, self.leg)
         return not violations.any() and float(objectives[0, 1]) == 0.0
 
 
@@ -81,7 +81,7 @@ class Watch:
 
 
 class Anywhere(ob.StateValidityChecker):
-    """States need no check of their own: every motion is judged whole."""
+    """States need no check of their own: every motion is checked whole."""
 
     def isValid(self, _state: object) -> bool:
         """The library's callback."""
@@ -97,8 +97,8 @@ def plan(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
     ou.RNG.setSeed(seed)
     space = ob.RealVectorStateSpace(3)
     box = ob.RealVectorBounds(3)
-    rules = task.problem.search
-    low, high = [*rules.bounds[:, 0], rules.floor], [*rules.bounds[:, 1], rules.ceiling]
+    data = task.problem.search
+    low, high = [*data.bounds[:, 0], data.floor], [*data.bounds[:, 1], data.ceiling]
     for axis in range(3):
         box.setLow(axis, float(low[axis]))
         box.setHigh(axis, float(high[axis]))
@@ -117,7 +117,7 @@ def plan(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
     planner = og.InformedRRTstar(information)
     setup.setPlanner(planner)
     setup.setup()
-    motions.judge(ends[0], ends[1])
+    motions.is_valid(ends[0], ends[1])
     path, shortest = np.stack([task.scenario.start, task.scenario.destination]), math.inf
     is_safe(task.certificate(path))
     motions.count, motions.nanoseconds = 0, 0

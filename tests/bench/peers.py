@@ -36,11 +36,13 @@ WITHIN, RACES = 0.02, 5
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What one run of a peer came to.
+    """What one search by a peer came to.
 
-    path: (w, 3) world m as lists.  safe: re-certified under all four constraints, and out of every missile's reach.
-    checks: paths evaluated, or motions checked.  callback_share: of the time, what was spent in our judge as called
-    from the peer.  trace: (seconds, length ratio) each time its best got shorter; of OMPL and ours, certified paths.
+    path: (w, 3) world m as lists.
+    safe: whether it meets all four constraints, certified again, and no missile reaches it.
+    checks: paths evaluated, or motions checked.
+    callback_share: of the time, what was spent in our evaluation as called from the peer.
+    trace: (seconds, length ratio) each time its best got shorter; of OMPL and ours, certified paths.
     """
 
     path: list[list[float]]
@@ -72,12 +74,12 @@ def best_path(task: Task, vectors: Floats) -> Floats:
     return next((path for path in paths if is_safe(task.certificate(path))), paths[0])
 
 
-def run_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
+def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
     """CMA-ES in the smooth basis, from our best coarse seed or from the straight line; it restarts."""
     from cmaes import CMA
 
     started, inside = time.process_time(), 0.0
-    basis, reach = smooth_axes(task)
+    basis, spread = smooth_axes(task)
     low, high = task.encoding.lower, task.encoding.upper
     if seeded:
         home = seed_vectors(task)[0]
@@ -91,7 +93,7 @@ def run_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, s
     search = CMA(mean=np.zeros(home.size), sigma=sigma, seed=seed, population_size=size)
     while done < evaluations:
         asked = np.array([search.ask() for _ in range(size)])
-        vectors = home + np.einsum("nk,dk->nd", asked * reach, basis)
+        vectors = home + np.einsum("nk,dk->nd", asked * spread, basis)
         clipped = np.clip(vectors, low, high)
         before = time.process_time()
         costs = scalar(*task.scores(clipped))
@@ -116,7 +118,7 @@ def run_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, s
     return found(task, path, time.process_time() - started, done, inside, trace)
 
 
-def run_nsga2(task: Task, seed: int, evaluations: int) -> Found:
+def solve_with_nsga2(task: Task, seed: int, evaluations: int) -> Found:
     """NSGA-II as pymoo ships it: length and kill exposure, four constraints, the paper's population."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.core.problem import Problem as PymooProblem
@@ -143,7 +145,7 @@ def run_nsga2(task: Task, seed: int, evaluations: int) -> Found:
     return found(task, best_path(task, vectors), time.process_time() - started, int(spent[1]), spent[0])
 
 
-def run_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
+def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
     """Informed RRT* for so many seconds or to this length ratio, in a process of its own: its bindings talk at exit."""
     command = [sys.executable, "-m", "tests.bench.ompl_peer", task.scenario.name]
     command += [str(number) for number in (seed, seconds, ratio)]
@@ -151,21 +153,21 @@ def run_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found
     return Found(**json.loads(result.stdout.splitlines()[-1]))
 
 
-def run(seconds: float) -> dict[str, Any]:
+def measure(seconds: float) -> dict[str, Any]:
     """Every peer once on each problem, seed 1, the paper's budget; OMPL so many seconds of CPU.  Prints a table."""
     print("\nPeers on the hard set, seed 1: same problem, evaluation function and certificate; one core, CPU s, warm")
-    print(f"  {'problem':<9}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in judge':>9}")
+    print(f"  {'problem':<9}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
     record: dict[str, Any] = {}
     for number in PROBLEMS:
         task = make_task(f"hard-{number:02d}")
         known = best_known(task.scenario.name)
         task.scores(task.encoding.lower[None])
         rows: dict[str, Callable[[], Found]] = {
-            "planfly, default": partial(run_ours, task, 1),
-            "cmaes, our seeds and basis": partial(run_cmaes, task, 1, task.evaluations),
-            "cmaes, our basis, no seeds": partial(run_cmaes, task, 1, task.evaluations, seeded=False),
-            "pymoo NSGA-II": partial(run_nsga2, task, 1, task.evaluations),
-            "ompl InformedRRTstar": partial(run_ompl, task, 1, seconds),
+            "planfly, default": partial(solve_with_planfly, task, 1),
+            "cmaes, our seeds and basis": partial(solve_with_cmaes, task, 1, task.evaluations),
+            "cmaes, our basis, no seeds": partial(solve_with_cmaes, task, 1, task.evaluations, seeded=False),
+            "pymoo NSGA-II": partial(solve_with_nsga2, task, 1, task.evaluations),
+            "ompl InformedRRTstar": partial(solve_with_ompl, task, 1, seconds),
         }
         for name, work in rows.items():
             package = name.split()[0].rstrip(",")
@@ -188,30 +190,30 @@ def race(seconds: float) -> dict[str, Any]:
     """CPU time to a certified path within 2 % of best known, OMPL's Informed RRT* and ours.  Prints a table.
 
     Ours counts from the call of the planner, scenario and envelope loaded: problem, grids, certificates.  OMPL's counts
-    from its first step, without certificates.  A run that does not come there within `seconds` counts as that long.
+    from its first step, without certificates.  One that does not come there within `seconds` counts as that long.
     """
     print(f"\nTo a certified path within {100 * WITHIN:.0f} % of best known, CPU ms; median of seeds 1..{RACES}")
-    print(f"  {'problem':<9}{'ours':>9}{'OMPL':>11}{'ratio':>10}{'in judge':>10}{'ratio without it':>19}")
+    print(f"  {'problem':<9}{'ours':>9}{'OMPL':>11}{'ratio':>10}{'in evaluation':>10}{'ratio without it':>19}")
     record: dict[str, Any] = {}
     for name in all_known():
         task, goal = make_task(name), (1.0 + WITHIN) * best_known(name)
-        run_ours(task, 1)
-        ours = [_time_to(run_ours(task, seed), goal, math.inf) for seed in range(1, RACES + 1)]
-        runs = [run_ompl(task, seed, seconds, goal) for seed in range(1, RACES + 1)]
-        theirs = [_time_to(item, goal, seconds) for item in runs]
+        solve_with_planfly(task, 1)
+        ours = [_time_to(solve_with_planfly(task, seed), goal, math.inf) for seed in range(1, RACES + 1)]
+        searches = [solve_with_ompl(task, seed, seconds, goal) for seed in range(1, RACES + 1)]
+        theirs = [_time_to(item, goal, seconds) for item in searches]
         mine, other = float(np.median(ours)), float(np.median(theirs))
         more = ">=" if sum(spent >= seconds for spent in theirs) > RACES // 2 else ""
-        share = float(np.median([item.callback_share for item in runs]))
+        share = float(np.median([item.callback_share for item in searches]))
         without = other * (1.0 - share) / mine
         print(
             f"  {name:<9}{1e3 * mine:>9.1f}{more + f'{1e3 * other:.0f}':>11}{more + f'{other / mine:.1f}':>10}"
             f"{100 * share:>9.0f}%{more + f'{without:.1f}':>19}"
         )
         record[name] = {
-            "ours_s": ours, "ompl_s": theirs, "cap_s": seconds, "ratio": other / mine, "share_in_judge": share,
-            "ratio_without_judge": without,
+            "ours_s": ours, "ompl_s": theirs, "cap_s": seconds, "ratio": other / mine, "share_in_evaluation": share,
+            "ratio_without_evaluation": without,
         }  # fmt: skip
-    for key, text in (("ratio", "ratio"), ("ratio_without_judge", "ratio without the time in the judge")):
+    for key, text in (("ratio", "ratio"), ("ratio_without_evaluation", "ratio without the time in our evaluation")):
         record[f"median_{key}"] = float(np.median([row[key] for row in record.values() if isinstance(row, dict)]))
         print(f"  median of the problems, {text}: {record[f'median_{key}']:.1f}")
     return record
@@ -231,7 +233,7 @@ def _print_row(problem: str, name: str, item: Found, known: float) -> None:
         print(f"  {'':<9}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
 
 
-def run_ours(task: Task, seed: int) -> Found:
+def solve_with_planfly(task: Task, seed: int) -> Found:
     """The default planner; its trace is of certified paths, and their certificates count."""
     trace: list[tuple[float, float]] = []
 
@@ -247,5 +249,5 @@ def run_ours(task: Task, seed: int) -> Found:
 
 
 def as_json(item: Found) -> str:
-    """The run as one line of JSON."""
+    """What was found as one line of JSON."""
     return json.dumps(asdict(item))

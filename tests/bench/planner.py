@@ -1,4 +1,4 @@
-"""The planner: its judge against NumPy and brute force, its ranking, whole runs, scale, and a cold start."""
+"""The planner: its evaluation against NumPy and brute force, its ranking, whole searches, scale, and a cold start."""
 
 import json
 import os
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from planfly.airframe import load_airframe
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem_arrays import Rules
+from planner.evaluation.problem_arrays import ProblemArrays
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
-from tests.bench.reference import brute_scores, compiled_generic_ranks, numpy_scores
+from tests.bench.reference import brute_scores, numpy_scores, ranks_by_definition
 from tests.bench.task import PROBLEMS, Task, best_known, graded_scores, make_task
 from tests.bench.timing import best_cpu
 from world.scenario import Scenario, from_spec, load_scenario
@@ -27,17 +27,17 @@ from world.scenario import Scenario, from_spec, load_scenario
 Floats = NDArray[np.float64]
 
 EQUAL = 1e-12
-LEVELS = (((0, 1, 2, 3), (0.0,) * 4), ((4, 5), (NO_GOAL,) * 2), ((6, 7), (NO_GOAL,) * 2))
+LEVELS = (Level((0, 1, 2, 3), (0.0,) * 4), Level((4, 5), (NO_GOAL,) * 2), Level((6, 7), (NO_GOAL,) * 2))
 MANY = 10_000
 
 
-def run(runs: int) -> dict[str, Any]:
+def measure(seeds: int) -> dict[str, Any]:
     """Measure everything, print tables, and return them."""
     return {
         "evaluation": evaluation(),
         "ranking": ranking(),
         "scale": scale(),
-        "runs": whole_runs(runs),
+        "runs": whole_searches(seeds),
         "cold_start": cold_start(),
     }
 
@@ -49,10 +49,10 @@ def random_paths(task: Task, count: int) -> Floats:
     return np.ascontiguousarray(task.encoding.decode(rng.uniform(task.encoding.lower, task.encoding.upper, shape)))
 
 
-def repeated(judge: Callable[..., object], rules: Rules, paths: Floats, times: int) -> None:
-    """Judge the same paths so many times."""
+def repeated(evaluate: Callable[..., object], data: ProblemArrays, paths: Floats, times: int) -> None:
+    """Evaluate the same paths so many times."""
     for _ in range(times):
-        judge(rules, paths)
+        evaluate(data, paths)
 
 
 def evaluation() -> dict[str, Any]:
@@ -62,20 +62,20 @@ def evaluation() -> dict[str, Any]:
     record = {}
     for name in ("paper-07", "paper-60", "hard-60"):
         task = make_task(name)
-        paths, rules = random_paths(task, task.scenario.planner.population), task.problem.search
-        counts, objectives = paper_scores(rules, paths)
+        paths, data = random_paths(task, task.scenario.planner.population), task.problem.search
+        counts, objectives = paper_scores(data, paths)
         equal = []
         for other in (brute_scores, numpy_scores):
-            again, values = other(rules, paths)
+            again, values = other(data, paths)
             scale = np.maximum(1.0, np.abs(objectives))
             equal.append(bool(np.array_equal(counts, again) and (np.abs(values - objectives) <= EQUAL * scale).all()))
-        graded_scores(rules, paths)
-        judges: tuple[Callable[..., object], ...] = (paper_scores, graded_scores, brute_scores, numpy_scores)
+        graded_scores(data, paths)
+        evaluators: tuple[Callable[..., object], ...] = (paper_scores, graded_scores, brute_scores, numpy_scores)
         micro = []
-        for judge in judges:
+        for evaluate in evaluators:
             # Short work is repeated until a clock tick is nothing to it.
-            repeat = 1 if judge is numpy_scores else 20
-            spent = best_cpu(partial(repeated, judge, rules, paths, repeat))
+            repeat = 1 if evaluate is numpy_scores else 20
+            spent = best_cpu(partial(repeated, evaluate, data, paths, repeat))
             micro.append(1e6 * spent / repeat / len(paths))
         ours, graded, brute, batch = micro
         print(
@@ -96,10 +96,9 @@ def ranking() -> dict[str, Any]:
     scores = np.concatenate([counts.astype(np.float64), objectives], axis=1)
     # As in a late generation: half of the paths meet the constraints, and level 2 decides.
     scores[:250, :4] = 0.0
-    levels = tuple(Level(columns, goals) for columns, goals in LEVELS)
-    same = bool(np.array_equal(ranks(scores, levels), compiled_generic_ranks(scores, LEVELS)))
-    split = best_cpu(lambda: [ranks(scores, levels) for _ in range(20)]) / 20
-    generic = best_cpu(lambda: [compiled_generic_ranks(scores, LEVELS) for _ in range(5)]) / 5
+    same = bool(np.array_equal(ranks(scores, LEVELS), ranks_by_definition(scores, LEVELS)))
+    split = best_cpu(lambda: [ranks(scores, LEVELS) for _ in range(20)]) / 20
+    generic = best_cpu(lambda: [ranks_by_definition(scores, LEVELS) for _ in range(5)]) / 5
     print("\nExact ranking of 500 paths, ms; best of 5")
     print(
         f"  split by level {1e3 * split:.2f}, generic relation {1e3 * generic:.2f}, ratio {generic / split:.1f}, ",
@@ -137,10 +136,10 @@ def scale() -> dict[str, Any]:
     for threats in (60, MANY):
         scenario = scaled(threats)
         airframe = load_airframe(scenario)
-        rules = make_problem(scenario, airframe.limits).search
-        for name, judge in (("paper", paper_scores), ("graded", graded_scores)):
-            judge(rules, paths)
-            spent = best_cpu(partial(repeated, judge, rules, paths, 5))
+        data = make_problem(scenario, airframe.limits).search
+        for name, evaluate in (("paper", paper_scores), ("graded", graded_scores)):
+            evaluate(data, paths)
+            spent = best_cpu(partial(repeated, evaluate, data, paths, 5))
             micro[name][threats] = 1e6 * spent / 5 / len(paths)
     print(f"\n{MANY:,} threats at the coverage of 60, us a path; best of 5")
     for name, pair in micro.items():
@@ -148,9 +147,9 @@ def scale() -> dict[str, Any]:
     return {f"{name}_ratio": pair[MANY] / pair[60] for name, pair in micro.items()}
 
 
-def whole_runs(runs: int) -> dict[str, Any]:
-    """Seeded runs of the default planner and of the paper's on every problem."""
-    print(f"\nWhole runs, seeds 1..{runs}, one core, warm, CPU s (first safe: default planner, ended by it)")
+def whole_searches(seeds: int) -> dict[str, Any]:
+    """Seeded searches of the default planner and of the paper's on every problem."""
+    print(f"\nWhole searches, seeds 1..{seeds}, one core, warm, CPU s (first safe: default planner, ended by it)")
     print(
         f"  {'problem':<10}{'algorithm':<14}{'safe':>7}{'PLR median':>12}{'worst':>8}{'/ best known':>14}{'worst':>8}"
         f"{'CPU s':>8}{'first safe':>12}{'evaluations':>13}"
@@ -160,10 +159,10 @@ def whole_runs(runs: int) -> dict[str, Any]:
         for number in PROBLEMS:
             for algorithm in (DEFAULT, "umda"):
                 name = f"{family}-{number:02d}"
-                row = _runs_of(make_task(name), algorithm, runs)
+                row = _searches_of(make_task(name), algorithm, seeds)
                 record[f"{name} {algorithm}"] = row
                 print(
-                    f"  {name:<10}{algorithm:<14}{row['safe']:>4}/{runs}"
+                    f"  {name:<10}{algorithm:<14}{row['safe']:>4}/{seeds}"
                     f"{row['length_median']:>12.4f}{row['length_worst']:>8.4f}{row['median_over_best']:>14.4f}"
                     f"{row['worst_over_best']:>8.4f}{row['cpu_s_median']:>8.2f}{row['first_safe_s_median']:>12.3f}"
                     f"{row['evaluations_most']:>13}"
@@ -171,11 +170,11 @@ def whole_runs(runs: int) -> dict[str, Any]:
     return record
 
 
-def _runs_of(task: Task, algorithm: str, runs: int) -> dict[str, Any]:
+def _searches_of(task: Task, algorithm: str, seeds: int) -> dict[str, Any]:
     limits = task.problem.limits
     plan_path(task.scenario, limits, seed=1, algorithm=algorithm)
     safe, seconds, first, most = [], [], [], 0
-    for seed in range(1, runs + 1):
+    for seed in range(1, seeds + 1):
         began = time.process_time()
         plan = plan_path(task.scenario, limits, seed=seed, algorithm=algorithm)
         seconds.append(time.process_time() - began)

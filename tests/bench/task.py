@@ -1,4 +1,4 @@
-"""One planning problem as every optimiser in the benchmarks sees it: a box, one judge, one certificate."""
+"""One planning problem as every optimiser in the benchmarks sees it: a box, one evaluation, one certificate."""
 
 import json
 from dataclasses import dataclass
@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 
 from planfly.airframe import Airframe, load_airframe
 from planner.evaluation.certify import certify
-from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_vectors
+from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rotated_vectors
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Certificate
 from planner.seeding.first_samples import bridge_basis, bridge_modes
-from planner.seeding.grid_routes import seeds
+from planner.seeding.grid_routes import grid_routes
+from planner.seeding.waypoint_fitting import fit_waypoints
 from world.scenario import Scenario, from_spec, load_scenario
 
 Floats = NDArray[np.float64]
@@ -28,7 +29,7 @@ BEST_KNOWN = Path(__file__).parents[1] / "authorities" / "best_known.json"
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """A scenario in the form of the compiled judges, in the rotated encoding."""
+    """A scenario in the form of compiled code, in the rotated encoding."""
 
     scenario: Scenario
     airframe: Airframe
@@ -56,7 +57,7 @@ class Task:
 
 
 def is_safe(certificate: Certificate) -> bool:
-    """Whether all four constraints hold everywhere and no missile reaches the path."""
+    """Whether all four constraints hold everywhere and no missile spreades the path."""
     return certificate.ok and certificate.kill_distance > 0.0
 
 
@@ -90,7 +91,10 @@ def seed_vectors(task: Task) -> Floats:
     """Our coarse seeds as vectors (n, d), best first: no violation, then least kill exposure, then the shortest."""
     low, high = task.encoding.lower, task.encoding.upper
     span = (float(low[1::3].min()), float(high[1::3].max()))
-    paths = seeds(task.problem.search, span, task.encoding.waypoints, GRIDS, ROUTES)
+    data = task.problem.search
+    frame = rotated_frame(data.start, data.destination)
+    routes = grid_routes(data, frame, span, tuple((stages, ROUTES) for stages in GRIDS))
+    paths = [fit_waypoints(data, frame, route.points, task.encoding.waypoints) for route in routes]
     vectors = rotated_vectors(task.problem.space, task.encoding, np.array(paths))
     return np.asarray(vectors[np.argsort(scalar(*task.scores(vectors)), kind="stable")])
 
@@ -100,20 +104,20 @@ def scalar(violations: Floats, objectives: Floats) -> Floats:
 
     Below 100: no violation; below 10: no kill exposure either, and the number is the length ratio.
     """
-    missed = (violations * np.array([1.0, 1.0, 1.0, 0.01])).sum(axis=1)
+    violated = (violations * np.array([1.0, 1.0, 1.0, 0.01])).sum(axis=1)
     kill, length = objectives[:, 1], objectives[:, 0]
     safe = np.where(kill > 0.0, 10.0 + 80.0 * kill / (1.0 + kill), np.minimum(length, 9.9))
-    return np.where((violations > 0.0).any(axis=1), 100.0 + missed, safe)
+    return np.where((violations > 0.0).any(axis=1), 100.0 + violated, safe)
 
 
 def smooth_axes(task: Task) -> tuple[Floats, Floats]:
-    """Directions (d, d) of the smooth basis and how far paths reach along each (d,), m."""
+    """Directions (d, d) of the smooth basis and how far paths spread along each (d,), m."""
     inner = task.encoding.waypoints - 2
     _, deviations = bridge_modes(inner)
     low, high = task.encoding.lower.reshape(inner, 3), task.encoding.upper.reshape(inner, 3)
-    reach = np.empty((inner, 3))
-    reach[:, 0] = 0.3 * (high[:, 0] - low[:, 0])
+    spread = np.empty((inner, 3))
+    spread[:, 0] = 0.3 * (high[:, 0] - low[:, 0])
     grow = np.sqrt((inner + 1) / 2.0)
-    reach[:, 1] = deviations * grow * 0.25 * np.median(high[:, 1] - low[:, 1])
-    reach[:, 2] = deviations * grow * 0.25 * np.median(high[:, 2] - low[:, 2])
-    return bridge_basis(inner), reach.ravel()
+    spread[:, 1] = deviations * grow * 0.25 * np.median(high[:, 1] - low[:, 1])
+    spread[:, 2] = deviations * grow * 0.25 * np.median(high[:, 2] - low[:, 2])
+    return bridge_basis(inner), spread.ravel()

@@ -1,4 +1,4 @@
-"""A served vehicle, as a person starts it."""
+"""A served vehicle, as a person starts it, and a flight whose log commands read."""
 
 import os
 import signal
@@ -10,6 +10,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+
+from planfly.cli import main
 
 FIELD = """name = "field"
 [terrain]
@@ -124,3 +126,20 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
     for one in started:
         if one.process.poll() is None:
             one.kill()
+
+
+@pytest.fixture(scope="session")
+def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a short flight: plan.json and flight.mcap of the scenario `tight`."""
+    folder = tmp_path_factory.mktemp("flight") / "tight"
+    assert main(["run", "tight", "--out", str(folder)]) == 4
+    return folder
+
+
+@pytest.fixture(scope="session")
+def broken(flight: Path) -> Path:
+    """Its log, cut off after three quarters."""
+    data = (flight / "flight.mcap").read_bytes()
+    path = flight.parent / "broken.mcap"
+    path.write_bytes(data[: len(data) * 3 // 4])
+    return path

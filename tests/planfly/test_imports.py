@@ -8,7 +8,7 @@ import pytest
 
 _PLANNING = """
 import json, sys
-import planfly.commands.plan_options
+import planfly.commands.plan
 print(json.dumps([name for name in sys.argv[1:] if name in sys.modules]))
 """
 _DOT = """

@@ -7,6 +7,7 @@ import pytest
 
 from aircraft.path_limits import Limits
 from flight.simulation.flight_setup import make_limits as limits_with
+from planner.evaluation.problem import Problem, make_problem
 from tests.setups import falling_envelope, small_scenario
 from world.scenario import Scenario
 
@@ -24,6 +25,11 @@ def scenario() -> Scenario:
 @pytest.fixture(scope="session")
 def limits(scenario: Scenario) -> Limits:
     return _limits_of(scenario)
+
+
+@pytest.fixture(scope="session")
+def problem(scenario: Scenario, limits: Limits) -> Problem:
+    return make_problem(scenario, limits)
 
 
 @pytest.fixture(scope="session")

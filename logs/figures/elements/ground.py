@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: float, top: float) -> list[Any]:
-    """Shaded heights with labelled contours and a colour bar, or a word where there is no terrain.
+    """Shaded heights with labelled contours and a colour bar, or a note where there is no terrain.
 
     column: left edge (inches) of the column beside the map.  top: inches above it.  Returns what the legend shows.
     """
@@ -66,8 +66,8 @@ def _shade(heights: Floats, pitch: float, span: float) -> Floats:
 def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
     total = float(figure.get_figheight())
     tall = min(2.6, total - 3.4)
-    place = (column / style.WIDTH, (total - top - tall - 0.25) / total, 0.16 / style.WIDTH, tall / total)
-    bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(place))
+    frame = (column / style.WIDTH, (total - top - tall - 0.25) / total, 0.16 / style.WIDTH, tall / total)
+    bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(frame))
     bar.set_ticks(levels[:: max(1, len(levels) // 8)].tolist())
     bar.set_label("ground height (m AMSL)", fontsize=8)
     bar.ax.tick_params(labelsize=7.5)

@@ -1,4 +1,4 @@
-"""Places small labels near their points so that they cover neither each other nor the lines."""
+"""Small labels near their points, placed so that they cover neither each other nor the lines."""
 
 import math
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1,
 
 @dataclass(slots=True)
 class LabelPlacer:
-    """Greedy placement in pixels on one axes, whose limits and place must be final.
+    """Greedy placement in pixels on one axes, whose limits and position must be final.
 
     lines: (n, 2) pixel positions that labels should not cover.  boxes: what labels already cover.
     """
@@ -35,9 +35,9 @@ class LabelPlacer:
         if len(points) < 2:
             self.lines = np.vstack([self.lines, points])
             return
-        run = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
-        at = np.arange(0.0, run[-1] + spacing, spacing)
-        sampled = np.column_stack([np.interp(at, run, points[:, axis]) for axis in (0, 1)])
+        along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
+        at = np.arange(0.0, along[-1] + spacing, spacing)
+        sampled = np.column_stack([np.interp(at, along, points[:, axis]) for axis in (0, 1)])
         self.lines = np.vstack([self.lines, sampled])
 
     def place(
@@ -54,8 +54,11 @@ class LabelPlacer:
     ) -> None:
         """Write the text beside data position (x, y), where it disturbs least.
 
-        gap: pixels.  prefer: the direction tried first; (0, 0) centres the text on the position.  optional: left out
-        where it would cover another label.  style: of the text; one with a box gets a line to its point.
+        size: of the font, points.
+        gap: pixels between text and position.
+        prefer: the direction tried first; (0, 0) centres the text on the position.
+        optional: left out where it would cover another label.
+        style: of the text; one with a box gets a line to its point.
         """
         (px, py) = self._pixels([x], [y])[0]
         if not (math.isfinite(px) and math.isfinite(py)):
@@ -64,18 +67,18 @@ class LabelPlacer:
         width = 0.62 * size * len(text) * DPI / 72.0 + 2 * pad
         height = 1.25 * size * DPI / 72.0 + 2 * pad
         best, best_cost = self._box(px, py, width, height, gap, prefer), math.inf
-        for ring, reach in enumerate((gap, gap + height, gap + 2.2 * height)):
+        for ring, distance in enumerate((gap, gap + height, gap + 2.2 * height)):
             for rank, direction in enumerate((prefer, *_DIRECTIONS)):
-                box = self._box(px, py, width, height, reach, direction)
+                box = self._box(px, py, width, height, distance, direction)
                 cost = self._cost(box) + 0.05 * rank + 1.5 * ring
                 if cost < best_cost:
                     best, best_cost = box, cost
         if optional and any(_overlap(best, other) for other in self.boxes):
             return
         self.boxes.append(best)
-        where = self.axes.transData.inverted().transform((0.5 * (best[0] + best[2]), 0.5 * (best[1] + best[3])))
+        middle = self.axes.transData.inverted().transform((0.5 * (best[0] + best[2]), 0.5 * (best[1] + best[3])))
         artist = self.axes.text(
-            where[0], where[1], text, fontsize=size, ha="center", va="center", **{"color": INK, "zorder": 9, **style}
+            middle[0], middle[1], text, fontsize=size, ha="center", va="center", **{"color": INK, "zorder": 9, **style}
         )
         if "bbox" in style:
             self._lead(best, px, py, style["bbox"]["edgecolor"])
@@ -93,10 +96,10 @@ class LabelPlacer:
         return np.asarray(self.axes.transData.transform(points), dtype=np.float64)
 
     @staticmethod
-    def _box(x: float, y: float, width: float, height: float, reach: float, direction: tuple[int, int]) -> Box:
+    def _box(x: float, y: float, width: float, height: float, distance: float, direction: tuple[int, int]) -> Box:
         dx, dy = direction
         # A diagonal label touches the point's surroundings with its corner, so it may come closer.
-        near = reach * (0.7 if dx and dy else 1.0)
+        near = distance * (0.7 if dx and dy else 1.0)
         middle_x = x + dx * (near + 0.5 * width)
         middle_y = y + dy * (near + 0.5 * height)
         return (

@@ -57,16 +57,16 @@ def draw_compass(figure: Figure, scenario: Scenario, column: float) -> None:
         east, north = np.sin(wind.from_course), np.cos(wind.from_course)
         arrow: dict[str, Any] = {"arrowstyle": "-|>", "color": style.BLUE, "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
         dial.annotate("", (-0.8 * east, -0.8 * north), (0.8 * east, 0.8 * north), arrowprops=arrow)
-        words = f"wind {wind.speed:.1f} m/s\nfrom {np.degrees(wind.from_course) % 360:03.0f}°"
+        note = f"wind {wind.speed:.1f} m/s\nfrom {np.degrees(wind.from_course) % 360:03.0f}°"
     else:
         dial.text(0, 0, "calm", ha="center", va="center", fontsize=7.5, color=style.QUIET)
-        words = "no mean wind"
+        note = "no mean wind"
     if wind.turbulence != "none":
-        words += f"\n{wind.turbulence} turbulence"
+        note += f"\n{wind.turbulence} turbulence"
     figure.text(
         (column + 0.4) / style.WIDTH,
         (base - 0.02) / total,
-        words,
+        note,
         ha="center",
         va="top",
         fontsize=7.5,

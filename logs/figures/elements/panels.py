@@ -15,13 +15,19 @@ from logs.figures.elements import style
 Floats = NDArray[np.float64]
 
 _LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 2.15, 0.72, 0.55, 1.12, 0.2
-# Runs that a line is thinned to; each keeps its lowest and highest row.
-_RUNS = 700
+# Blocks that a series is thinned to; each keeps its lowest and highest row.
+_BLOCKS = 700
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """One series of a panel: values (t,), and how it looks in panel and legend; filled: down to zero."""
+class Series:
+    """One series of a panel.
+
+    label: in the legend.
+    values: (t,) in the panel's unit.
+    color, width, dashes: how its line looks, in matplotlib's terms.
+    filled: from the line down to zero.
+    """
 
     label: str
     values: Floats
@@ -33,13 +39,17 @@ class Line:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One quantity: its axis label with unit, its lines, level limits (label, value), and the least span it shows.
+    """One quantity.
 
+    title: the axis label, with the unit.
+    series: its lines.
+    limits: level lines, label and value.
+    least_span: the least range of values that it shows.
     held: (t,) rows that are shaded, where a control stands at its limit.
     """
 
     title: str
-    lines: Sequence[Line]
+    series: Sequence[Series]
     limits: Sequence[tuple[str, float]] = ()
     least_span: float = 1.0
     held: NDArray[np.bool_] | None = None
@@ -47,7 +57,7 @@ class Panel:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """What the panels run along: its label and values (t,), which never fall."""
+    """The common axis of the panels: its label and values (t,), which never fall."""
 
     label: str
     values: Floats
@@ -58,8 +68,8 @@ def time_axis(track: Track) -> Axis:
     return Axis("time since the start (s)", track.time)
 
 
-def singles(values: NDArray[np.float32]) -> Floats:
-    """Widen a column, so that what is computed from it is not rounded again."""
+def doubles(values: NDArray[np.float32]) -> Floats:
+    """Widen a column of the track to float64, so that what is computed from it is not rounded again."""
     return values.astype(np.float64)
 
 
@@ -73,8 +83,8 @@ def draw_panels(title: str, panels: Sequence[Panel], axis: Axis, track: Track | 
         figure = style.new_figure(total)
         for row, panel in enumerate(panels):
             base = _BOTTOM + (len(panels) - 1 - row) * (_PANEL + _GAP)
-            place = (_LEFT / style.WIDTH, base / total, 1 - (_LEFT + _RIGHT) / style.WIDTH, _PANEL / total)
-            axes = figure.add_axes(place)
+            frame = (_LEFT / style.WIDTH, base / total, 1 - (_LEFT + _RIGHT) / style.WIDTH, _PANEL / total)
+            axes = figure.add_axes(frame)
             _draw(axes, panel, axis.values)
             if track is not None:
                 _legs(axes, axis.values, track, numbered=row == 0)
@@ -82,8 +92,7 @@ def draw_panels(title: str, panels: Sequence[Panel], axis: Axis, track: Track | 
                 axes.tick_params(labelbottom=False)
             else:
                 axes.set_xlabel(axis.label)
-        where = (_LEFT / style.WIDTH, 1 - 0.3 / total)
-        figure.text(*where, title, fontsize=11, fontweight="bold", va="center")
+        figure.text(_LEFT / style.WIDTH, 1 - 0.3 / total, title, fontsize=11, fontweight="bold", va="center")
     return figure
 
 
@@ -94,9 +103,9 @@ def _draw(axes: Any, panel: Panel, along: Floats) -> None:
         frame = axes.get_xaxis_transform()
         look: dict[str, Any] = {"color": style.FAIL, "alpha": 0.25, "linewidth": 0, "zorder": 0.5}
         axes.fill_between(along, 0.0, 1.0, where=panel.held, transform=frame, label="held at its limit", **look)
-    seen = [value for _, value in panel.limits]
-    for line in panel.lines:
-        rows = style.outline_rows(line.values, _RUNS)
+    extremes = [value for _, value in panel.limits]
+    for line in panel.series:
+        rows = style.outline_rows(line.values, _BLOCKS)
         axes.plot(
             along[rows],
             line.values[rows],
@@ -108,11 +117,11 @@ def _draw(axes: Any, panel: Panel, along: Floats) -> None:
         if line.filled:
             axes.fill_between(along[rows], 0.0, line.values[rows], color=line.color, alpha=0.25, linewidth=0)
         finite = line.values[np.isfinite(line.values)]
-        seen += [float(finite.min()), float(finite.max())] if finite.size else []
-    low, high = (min(seen), max(seen)) if seen else (0.0, 1.0)
-    spare = max(0.0, panel.least_span - (high - low)) / 2
-    rim = 0.08 * (high - low + 2 * spare)
-    axes.set_ylim(low - spare - rim, high + spare + rim)
+        extremes += [float(finite.min()), float(finite.max())] if finite.size else []
+    low, high = (min(extremes), max(extremes)) if extremes else (0.0, 1.0)
+    widening = max(0.0, panel.least_span - (high - low)) / 2
+    padding = 0.08 * (high - low + 2 * widening)
+    axes.set_ylim(low - widening - padding, high + widening + padding)
     axes.set_xlim(float(along[0]), float(max(along[-1], along[0] + 1e-3)))
     axes.xaxis.set_major_locator(MultipleLocator(style.nice_step(float(np.ptp(axes.get_xlim())), 14)))
     axes.set_ylabel(panel.title)
@@ -123,7 +132,7 @@ def _draw(axes: Any, panel: Panel, along: Floats) -> None:
 
 
 def _legs(axes: Any, along: Floats, track: Track, *, numbered: bool) -> None:
-    """Part the legs by thin lines; number them above the topmost panel, as far as the numbers have room."""
+    """Part the legs by thin lines; number them above the topmost panel, as far as the numbers fit."""
     changes = np.flatnonzero(np.diff(track.leg)) + 1
     for row in changes:
         axes.axvline(float(along[row]), color="#b5b5b5", linewidth=0.6, zorder=1)
@@ -138,11 +147,11 @@ def _legs(axes: Any, along: Floats, track: Track, *, numbered: bool) -> None:
         if middle - last < 0.022 * span:
             continue
         text = f"leg {track.leg[start]}" if last == -np.inf else str(track.leg[start])
-        place: dict[str, Any] = {
+        anchor: dict[str, Any] = {
             "xycoords": ("data", "axes fraction"),
             "textcoords": "offset points",
             "ha": "center",
             "fontsize": 7,
         }
-        axes.annotate(text, (middle, 1.0), (0, 3), color=style.QUIET, annotation_clip=False, **place)
+        axes.annotate(text, (middle, 1.0), (0, 3), color=style.QUIET, annotation_clip=False, **anchor)
         last = middle

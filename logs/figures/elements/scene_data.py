@@ -1,4 +1,4 @@
-"""What the report's 3-D view shows: ground, threats, plan and flight as a small JSON text."""
+"""Ground, threats, plan and flight as the data of the 3-D pictures; for the report's 3-D view as a small JSON text."""
 
 import base64
 import json
@@ -52,13 +52,13 @@ def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGri
 
 
 def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
-    """How many times heights are stretched to be seen: 1, 1.5, 2 or 3."""
+    """How many times heights are stretched, so that they show: 1, 1.5, 2 or 3."""
     up = setup.route.waypoints[:, 2]
     low, high = float(up.min()), float(up.max())
     if grid is not None:
         low, high = min(low, float(np.nanmin(grid.heights))), max(high, float(np.nanmax(grid.heights)))
-    wished = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(high - low, 50.0)
-    return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wished, 1.0))
+    wanted = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(high - low, 50.0)
+    return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wanted, 1.0))
 
 
 def track_rows(track: Track, most: int = MOST_TRACK) -> Floats:

@@ -1,7 +1,7 @@
 """What all figures share: colours, sizes, the clean matplotlib settings they are drawn under, and their bytes.
 
 Colours are those of Okabe and Ito, "Color Universal Design" (2008), which people with any of the common colour
-vision deficiencies tell apart; line style, marker or fill tell the same things a second time.
+vision deficiencies tell apart; line style, marker or fill make the same distinction a second time.
 """
 
 import io
@@ -63,7 +63,7 @@ _SETTINGS: Any = {
 
 @contextmanager
 def clean_style() -> Iterator[None]:
-    """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc says.
+    """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc holds.
 
     The settings in force before come back at the end.
     """
@@ -81,7 +81,13 @@ def new_figure(height: float) -> Figure:
 
 
 def png_bytes(figure: Figure) -> bytes:
-    """Render the figure as a PNG; the same figure gives the same bytes (no date, no version inside)."""
+    """Render the figure as a PNG; the same figure gives the same bytes (no date, no version inside).
+
+    >>> figure = new_figure(2.0)
+    >>> data = png_bytes(figure)
+    >>> int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
+    (1500, 300)
+    """
     return _rendered(figure, "png", {"Software": None})
 
 
@@ -115,9 +121,9 @@ def nice_step(span: float, parts: int) -> float:
 
 
 def outline_rows(values: ArrayLike, count: int) -> Indices:
-    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal runs, in order.
+    """Rows that keep the outline of a long series: lowest and highest of each of `count` equal blocks, in order.
 
-    values: (t,); not-a-number rows are kept out unless a run has nothing else.  Short series come back whole.
+    values: (t,); not-a-number rows are kept out unless a block has nothing else.  Short series come back whole.
     """
     series = np.asarray(values, dtype=np.float64)
     if series.size <= 2 * count:
@@ -125,10 +131,10 @@ def outline_rows(values: ArrayLike, count: int) -> Indices:
     edges = np.linspace(0, series.size, count + 1).astype(int)
     kept = {0, series.size - 1}
     for low, high in itertools.pairwise(edges):
-        run = series[low:high]
-        good = np.flatnonzero(np.isfinite(run))
+        block = series[low:high]
+        good = np.flatnonzero(np.isfinite(block))
         if good.size == 0:
             kept.add(int(low))
             continue
-        kept.update((int(low + good[np.argmin(run[good])]), int(low + good[np.argmax(run[good])])))
+        kept.update((int(low + good[np.argmin(block[good])]), int(low + good[np.argmax(block[good])])))
     return np.array(sorted(kept), dtype=np.intp)

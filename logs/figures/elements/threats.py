@@ -18,16 +18,16 @@ _DASHES = (0, (4, 2.5))
 
 
 def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> list[Any]:
-    """Circles of missiles and radars, and what the legend says of them."""
+    """Draw circles of missiles and radars; returns what the legend shows of them."""
     handles: list[Any] = []
     missiles = np.flatnonzero(threats.kill_radius > 0.0)
     radars = np.flatnonzero(threats.detection_radius > 0.0)
-    where = threats.position[:, :2]
+    centres = threats.position[:, :2]
     if missiles.size:
-        reach = _reach_at_path(threats, missiles, route)
+        radii = _kill_radius_at_path(threats, missiles, route)
         axes.add_collection(
             PatchCollection(
-                [Circle(tuple(where[k]), float(r)) for k, r in zip(missiles, reach, strict=True) if r > 0.0],
+                [Circle(tuple(centres[k]), float(r)) for k, r in zip(missiles, radii, strict=True) if r > 0.0],
                 facecolor=style.MISSILE,
                 alpha=0.3,
                 edgecolor="none",
@@ -36,7 +36,7 @@ def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> li
         )
         axes.add_collection(
             PatchCollection(
-                [Circle(tuple(where[k]), float(threats.kill_radius[k])) for k in missiles],
+                [Circle(tuple(centres[k]), float(threats.kill_radius[k])) for k in missiles],
                 facecolor="none",
                 edgecolor=style.MISSILE,
                 linewidth=1.1,
@@ -53,7 +53,7 @@ def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> li
     if radars.size:
         axes.add_collection(
             PatchCollection(
-                [Circle(tuple(where[k]), float(threats.detection_radius[k])) for k in radars],
+                [Circle(tuple(centres[k]), float(threats.detection_radius[k])) for k in radars],
                 facecolor="none",
                 edgecolor=style.RADAR,
                 linewidth=1.1,
@@ -64,23 +64,23 @@ def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> li
         label = "radar: sphere's radius\n(at altitude the reach is smaller)"
         handles.append(Line2D([], [], color=style.RADAR, linewidth=1.1, linestyle=_DASHES, label=label))
     if len(threats):
-        axes.plot(*where.T, "x", color="#333333", markersize=3.0, markeredgewidth=0.8, zorder=3.3)
+        axes.plot(*centres.T, "x", color="#333333", markersize=3.0, markeredgewidth=0.8, zorder=3.3)
     return handles
 
 
-def _reach_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
+def _kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
     """Radius (m) of each chosen missile sphere's cut at the height of the path where it passes nearest."""
     radius = threats.kill_radius[chosen]
     if route is None:
         return radius
     _, points = route_samples(route, max(50.0, float(radius.min()) / 20.0))
     points = points[:: max(1, len(points) // 2000)]
-    reach = np.zeros(len(chosen))
+    found = np.zeros(len(chosen))
     for row, k in enumerate(chosen):
         nearest = points[np.argmin(((points[:, :2] - threats.position[k, :2]) ** 2).sum(axis=1))]
         above = float(nearest[2] - threats.position[k, 2])
-        reach[row] = np.sqrt(max(0.0, float(radius[row]) ** 2 - above**2))
-    return reach
+        found[row] = np.sqrt(max(0.0, float(radius[row]) ** 2 - above**2))
+    return found
 
 
 def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, Floats]:

@@ -11,7 +11,7 @@ from logs.verdict.judge_flight import judge_flight
 from world.errors import LogError
 
 
-def test_a_whole_log_needs_nothing(log_file: Path) -> None:
+def test_a_complete_log_needs_no_recovery(log_file: Path) -> None:
     assert recover_log(log_file) is None
 
 

@@ -1,4 +1,4 @@
-"""The instruments: one moment as text, always the same, within its width, and with the numbers of the row."""
+"""A frame of the instruments is always the same, within its width, and has the numbers of its row."""
 
 import math
 from dataclasses import replace
@@ -26,7 +26,7 @@ def test_replaying_twice_gives_the_same_frames(log_file: Path) -> None:
 
 
 @pytest.mark.parametrize("width", [10, LEAST_WIDTH, 80, 200])
-def test_frames_keep_their_width_and_height(log_file: Path, width: int) -> None:
+def test_frames_fit_their_width_and_24_lines(log_file: Path, width: int) -> None:
     show = make_instruments(read_log(log_file))
     frames = [show.frame(float(time), width=width) for time in TIMES]
     assert all(len(line) <= max(width, LEAST_WIDTH) for frame in frames for line in frame)
@@ -36,7 +36,7 @@ def test_frames_keep_their_width_and_height(log_file: Path, width: int) -> None:
 def test_the_numbers_are_those_of_the_row(log_file: Path, track: Track) -> None:
     show = make_instruments(read_log(log_file))
     k = 200
-    # The newest row at or before the moment.
+    # The newest row at or before that time.
     text = "\n".join(show.frame(float(track.time[k]) + 0.5 / 60.0))
     assert f"{track.time[k]:.1f} of {track.time[-1]:.1f} s" in text
     assert f"airspeed     {track.airspeed[k]:.1f} m/s" in text

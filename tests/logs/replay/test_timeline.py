@@ -1,4 +1,4 @@
-"""The timeline against numbers got in another way."""
+"""The timeline's entries against numbers got in another way."""
 
 import dataclasses
 import math
@@ -6,17 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.replay.instruments import make_instruments
 from logs.replay.timeline import TimelineEntry, entry_lines, timeline
-from logs.verdict.measures.along_track import passages, segment_clearances
 from logs.verdict.measures.leg_numbers import with_legs
 from tests.logs.made_flight import make_setup, make_track
-from world.terrain import flat_terrain
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +24,7 @@ def texts(entries: list[TimelineEntry], kind: str) -> list[str]:
     return [entry.text for entry in entries if entry.kind == kind]
 
 
-def test_the_timeline_tells_legs_turns_and_ends_in_order(log: FlightLog) -> None:
+def test_legs_turns_and_the_end_stand_in_order_of_time(log: FlightLog) -> None:
     entries = timeline(log)
     assert entries == timeline(log)
     assert [entry.time for entry in entries] == sorted(entry.time for entry in entries)
@@ -44,13 +40,13 @@ def test_the_timeline_tells_legs_turns_and_ends_in_order(log: FlightLog) -> None
     assert texts(entries, "end")[0].startswith("completed; 8.0 s, 2.72 km, 9.0 Wh")
 
 
-def test_the_lowest_clearance_of_each_leg(log: FlightLog) -> None:
+def test_the_lowest_clearance_of_each_leg_is_that_of_a_fine_sampling(log: FlightLog) -> None:
     entries = [entry for entry in timeline(log) if entry.kind == "ground"]
     terrain = log.setup.scenario.terrain
     assert terrain is not None
     fine = np.linspace(0.0, log.end_time, 40_001)
-    place = np.stack([np.interp(fine, log.track.time, log.track.position[:, k]) for k in range(3)], axis=1)
-    height = place[:, 2] - terrain.height(place[:, 0], place[:, 1])
+    position = np.stack([np.interp(fine, log.track.time, log.track.position[:, k]) for k in range(3)], axis=1)
+    height = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
     legs = with_legs(log.setup, log.track).leg
     leg = legs[np.searchsorted(log.track.time, fine, side="right") - 1]
     for k, entry in enumerate(sorted(entries, key=lambda item: item.text)):
@@ -60,50 +56,10 @@ def test_the_lowest_clearance_of_each_leg(log: FlightLog) -> None:
     assert not any("999" in entry.text for entry in entries)
 
 
-def test_a_low_flight_is_said_to_be_low(log: FlightLog) -> None:
+def test_a_leg_below_the_required_clearance_is_marked(log: FlightLog) -> None:
     lowered = dataclasses.replace(log.track, position=log.track.position - np.array([0.0, 0.0, 60.0]))
     found = texts(timeline(dataclasses.replace(log, track=lowered)), "ground")
     assert any("49.4 m above ground, under the required 60 m" in text for text in found)
-
-
-@given(
-    speed=st.floats(10.0, 60.0),
-    offset=st.floats(0.0, 390.0),
-    rate=st.sampled_from([1.0, 7.0, 60.0]),
-)
-@settings(max_examples=40, deadline=None)
-def test_passage_times_are_the_spheres_chord(speed: float, offset: float, rate: float) -> None:
-    time = np.arange(round(3000.0 / speed * rate) + 2) / rate
-    position = np.stack([-1500.0 + speed * time, np.full(time.size, offset), np.full(time.size, 100.0)], axis=1)
-    (stay,) = passages(time, position, np.array([0.0, 0.0, 100.0]), 400.0)
-    half = math.sqrt(400.0**2 - offset**2)
-    assert stay.start == pytest.approx((1500.0 - half) / speed, abs=1e-6)
-    assert stay.end == pytest.approx((1500.0 + half) / speed, abs=1e-6)
-    assert stay.closest == pytest.approx(offset, abs=1e-6)
-    assert stay.whole
-
-
-def test_a_flight_that_starts_and_ends_inside() -> None:
-    time = np.array([0.0, 1.0, 2.0, 3.0])
-    position = np.array([[0.0, 0.0, 0.0], [200.0, 0.0, 0.0], [200.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    first, last = passages(time, position, np.zeros(3), 100.0)
-    assert (first.start, first.end, first.whole) == (0.0, 0.5, True)
-    assert (last.start, last.end, last.whole) == (2.5, 3.0, False)
-    assert passages(time, position, np.array([0.0, 0.0, 500.0]), 100.0) == []
-    assert passages(time, position, np.zeros(3), 0.0) == []
-
-
-def test_garbage_positions_meet_nothing() -> None:
-    ground = flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
-    position = np.array(
-        [[0.0, 0.0, 50.0], [10.0, 0.0, 40.0], [math.nan, 0.0, 0.0], [1e300, 0.0, 0.0], [0.0, 0.0, 20.0]]
-    )
-    low, at = segment_clearances(ground, position)
-    assert low[0] == pytest.approx(35.0)
-    assert at[0] == pytest.approx(1.0)
-    assert np.isnan(low[1:]).all()
-    stays = passages(np.arange(5.0), position, np.zeros(3), 60.0)
-    assert [(stay.start, stay.end) for stay in stays] == [(0.0, 1.0)]
 
 
 def test_a_threat_is_entered_and_left(log: FlightLog) -> None:
@@ -121,7 +77,7 @@ def test_a_threat_is_entered_and_left(log: FlightLog) -> None:
     assert f"closest {near.min():.0f} m" in found[1].text
 
 
-def test_what_is_not_known_is_said(log: FlightLog) -> None:
+def test_missing_terrain_and_a_missing_end_have_entries(log: FlightLog) -> None:
     bare = dataclasses.replace(make_setup(with_plan=False).scenario, terrain=None, external=True)
     cut = dataclasses.replace(
         log,
@@ -144,7 +100,7 @@ def test_lines_fit_a_terminal_and_cannot_steer_it(log: FlightLog) -> None:
     assert lines[0].startswith("     0.00 s  start    aerosonde, scenario synthetic, seed 7")
 
 
-def test_one_row_and_unknown_numbers_are_told_too(log: FlightLog) -> None:
+def test_one_row_and_unknown_numbers_have_a_timeline_too(log: FlightLog) -> None:
     single = dataclasses.replace(log, track=log.track.rows(0, 1), events=(), end_time=0.0)
     assert {entry.kind for entry in timeline(single)} >= {"start", "leg", "end"}
     terrain = log.setup.scenario.terrain

@@ -1,4 +1,4 @@
-"""The report as people open it: in a browser, wide and narrow, with mouse and keys, without a script, on paper."""
+"""The page works in a browser: wide and narrow, with mouse and keys, without a script, on paper."""
 
 import io
 import re
@@ -17,7 +17,7 @@ from tests.browser import Browser
 
 pytestmark = [pytest.mark.client, pytest.mark.xdist_group("browser")]
 
-# What a software renderer says of a screenshot; of the page it says nothing.
+# Messages of a software renderer about a screenshot, not about the page.
 _RENDERER = re.compile(r"GL Driver Message|GPU stall|swiftshader", re.IGNORECASE)
 
 
@@ -57,21 +57,21 @@ def test_wide_page_draws_the_view_and_fills_the_tables(page: Path, tmp_path: Pat
         first = browser.picture("#view3d")
         assert spread(first) > 60
         assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "none"
-        _try_the_hands(browser, first)
+        _try_the_controls(browser, first)
         assert len(browser.printed()) > 50_000
         assert own_problems(browser) == []
         assert browser.requests == []
 
 
-def _try_the_hands(browser: Browser, first: bytes) -> None:
+def _try_the_controls(browser: Browser, first: bytes) -> None:
     """Mouse, wheel, keys and buttons change the picture; Back brings it back."""
     browser.value("document.querySelector('#view3d').scrollIntoView()")
     x, y = 600.0, 250.0
     browser.mouse("mousePressed", x, y, button="left", clickCount=1)
     browser.mouse("mouseMoved", x + 120, y + 40, button="left", buttons=1)
     browser.mouse("mouseReleased", x + 120, y + 40, button="left", clickCount=1)
-    seen = [first]
-    for deed in (
+    pictures = [first]
+    for act in (
         lambda: None,
         lambda: browser.mouse("mouseWheel", x, y, deltaX=0, deltaY=-240),
         lambda: browser.key("ArrowLeft"),
@@ -79,11 +79,11 @@ def _try_the_hands(browser: Browser, first: bytes) -> None:
         lambda: browser.value("document.querySelector('[data-do=top]').click()"),
         lambda: browser.value("document.querySelector('[data-do=stretch]').click()"),
     ):
-        deed()
+        act()
         browser.settle()
-        seen.append(browser.picture("#view3d"))
-        difference = np.abs(pixels(seen[-1]) - pixels(seen[-2])).max(axis=-1) > 0.1
-        assert difference.mean() > 0.005, len(seen)
+        pictures.append(browser.picture("#view3d"))
+        difference = np.abs(pixels(pictures[-1]) - pixels(pictures[-2])).max(axis=-1) > 0.1
+        assert difference.mean() > 0.005, len(pictures)
     browser.value("document.querySelector('[data-do=home]').click()")
     browser.settle()
     assert np.abs(pixels(browser.picture("#view3d")) - pixels(first)).mean() < 0.01

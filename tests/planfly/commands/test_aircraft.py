@@ -30,7 +30,7 @@ def _rows(text: str, title: str) -> list[list[str]]:
     return [line.split() for line in block.splitlines()[1:] if line.split()[0].replace(".", "").isdigit()]
 
 
-def test_the_aerosonde(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_aerosonde_is_printed_and_drawn_as_it_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["aircraft", "aerosonde", "--out", "shown"]) == 0
     text = capsys.readouterr().out
     assert sorted(path.name for path in Path("shown").iterdir()) == PICTURES
@@ -60,7 +60,7 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("argv", "said"),
+    ("argv", "printed"),
     [
         (["zeppelin"], "no aircraft called 'zeppelin'"),
         (["./nowhere"], "nowhere.toml: No such file"),
@@ -68,12 +68,14 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
         (["aerosonde", "--out", "full"], "exists and is not empty"),
     ],
 )
-def test_bad_input(argv: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_name_or_folder_is_one_line(
+    argv: list[str], printed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "mine.txt").write_text("keep", encoding="utf-8")
     assert main(["aircraft", *argv]) == 2
     error = capsys.readouterr().err.splitlines()
-    assert said in error[-1]
+    assert printed in error[-1]
     assert error[-1].startswith("planfly: ")
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["full", "mine.txt"]
 

@@ -1,6 +1,5 @@
-"""``planfly export``, and the options of ``fly`` and ``check``, from the command line."""
+"""``planfly export``: plans, missions and logs in every form."""
 
-import json
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -35,9 +34,9 @@ def log_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     targets = [tmp_path / f"a.{kind}" for kind in ("waypoints", "plan", "fence", "rally", "kml", "gpx")]
     assert main(["export", str(plan_file), *map(str, targets)]) == 0
-    said = capsys.readouterr()
-    assert "a fence has no height" in said.err
-    assert said.out.count("\n") == len(targets)
+    printed = capsys.readouterr()
+    assert "a fence has no height" in printed.err
+    assert printed.out.count("\n") == len(targets)
     waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
     assert waypoints.items == plan.items
     assert plan.fences == fence.fences
@@ -90,39 +89,9 @@ def test_a_mission_from_form_to_form(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.parametrize("name", ["a.kmz", "a.json", "a"])
-def test_unknown_suffixes(plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
+def test_an_unknown_suffix_is_refused_with_the_known_ones(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / name)]) == 2
     assert "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx" in capsys.readouterr().err
     assert not (tmp_path / "a.plan").exists()
-
-
-def test_aircraft_and_airspeed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    name = str(MISSIONS / "by_hand.waypoints")
-    log = tmp_path / "f.mcap"
-    assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
-    assert (read_log(log).setup.route.airspeed == 21.0).all()
-    capsys.readouterr()
-    for options, words in (
-        (["--aircraft", "boeing"], "flight.aircraft: no aircraft called 'boeing'"),
-        (["--airspeed", "70"], "airspeed_mps: 70"),
-        (["--airspeed", "28"], None),
-        (["--airspeed", "-3"], "a number above 0"),
-    ):
-        try:
-            code = main(["check", name, *options])
-        except SystemExit as stop:
-            code = int(str(stop.code))
-        said = capsys.readouterr().err
-        assert (code == 2) == (words is not None)
-        assert words is None or words in said
-    assert main(["check", str(log), "--airspeed", "20"]) == 2
-    assert "--airspeed: a log is judged" in capsys.readouterr().err
-
-
-def test_check_names_px4s_rules(tmp_path: Path) -> None:
-    target = tmp_path / "v.json"
-    assert main(["check", str(MISSIONS / "mission_planner_land.waypoints"), "--json", str(target)]) == 4
-    findings = json.loads(target.read_text())["findings"]
-    reasons = [finding["reason"] for finding in findings if finding["rule"] == "mission" and finding["ok"] is False]
-    assert any("(PX4 checkFixedWindLandApproach)" in reason for reason in reasons)
-    assert any("(PX4 checkMissionItemValidity)" in reason for reason in reasons)

@@ -22,8 +22,8 @@ MAGIC = b"\x89MCAP0\r\n"
 # Runs one command under the limits; imports stand before them, since it is the file that is limited, not Python.
 CHILD = """
 import json, resource, sys, time
-import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.dispatch, planfly.commands.log_commands
-import planfly.open_mission, world.raster
+import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.check
+import planfly.commands.recover, planfly.commands.replay, planfly.commands.report, world.raster
 from planfly.cli import main
 def kib(name):
     with open("/proc/self/status") as file:
@@ -37,7 +37,7 @@ print(json.dumps({"code": code, "seconds": time.process_time() - spent}))
 
 
 def judge(folder: Path, *argv: str) -> tuple[int, float, str]:
-    """Run planfly in a folder: exit code, seconds of work, what it said on standard error."""
+    """Run planfly in a folder: exit code, seconds of work, what it printed on standard error."""
     before = {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")}
     result = subprocess.run(
         [sys.executable, "-c", CHILD, *argv], cwd=folder, capture_output=True, text=True, check=False, timeout=120,
@@ -45,8 +45,8 @@ def judge(folder: Path, *argv: str) -> tuple[int, float, str]:
     )  # fmt: skip
     assert result.returncode == 0, result.stderr[-2000:]
     assert {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")} == before, "a file was written"
-    told = json.loads(result.stdout.splitlines()[-1])
-    return told["code"], told["seconds"], result.stderr
+    report = json.loads(result.stdout.splitlines()[-1])
+    return report["code"], report["seconds"], result.stderr
 
 
 def mcap_record(opcode: int, content: bytes) -> bytes:
@@ -83,11 +83,11 @@ def test_hostile_logs(make: Callable[[], bytes], command: str, tmp_path: Path) -
     folder = tmp_path / "a" / "b"
     folder.mkdir(parents=True)
     (folder / "x.mcap").write_bytes(make())
-    code, seconds, said = judge(folder, command, "x.mcap")
+    code, seconds, printed = judge(folder, command, "x.mcap")
     assert code == 2
     assert seconds < 1.0
-    assert len(said.strip().splitlines()) == 1
-    assert said.startswith("planfly: x.mcap: ")
+    assert len(printed.strip().splitlines()) == 1
+    assert printed.startswith("planfly: x.mcap: ")
 
 
 def test_an_attachment_with_a_climbing_name_in_a_whole_log(tmp_path: Path) -> None:
@@ -98,10 +98,10 @@ def test_an_attachment_with_a_climbing_name_in_a_whole_log(tmp_path: Path) -> No
     header = len(MAGIC) + 9 + struct.unpack_from("<Q", log, len(MAGIC) + 1)[0]
     evil = climber()[len(MAGIC) + 17 :]
     (folder / "x.mcap").write_bytes(log[:header] + evil + log[header:])
-    code, seconds, said = judge(folder, "check", "x.mcap")
+    code, seconds, printed = judge(folder, "check", "x.mcap")
     assert code == 3
     assert seconds < 1.0
-    assert "incomplete" in said
+    assert "incomplete" in printed
 
 
 def sparse_tiff(path: Path, side: int, **blocks: Any) -> None:
@@ -143,8 +143,8 @@ def test_hostile_terrain(name: str, make: Callable[[Path], None] | None, tmp_pat
     (folder / "m.waypoints").write_text(MISSION, encoding="utf-8")
     if make is not None:
         make(folder / name)
-    code, seconds, said = judge(folder, "check", "m.waypoints", "--terrain", name)
-    assert code == 2, said
+    code, seconds, printed = judge(folder, "check", "m.waypoints", "--terrain", name)
+    assert code == 2, printed
     assert seconds < 1.0
-    assert name in said
-    assert len([line for line in said.strip().splitlines() if not line.startswith("warning: ")]) == 1
+    assert name in printed
+    assert len([line for line in printed.strip().splitlines() if not line.startswith("warning: ")]) == 1

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from planfly.cli import main
-from planfly.commands.paper import PaperRun, exposure_probability, problem_name, run_section, table
-from planfly.commands.paper_files import file_names, table_text
+from planfly.paper.files import file_names, table_text
+from planfly.paper.seeded_plans import SeededPlan, exposure_probability, plan_section, problem_name, table
 from planfly.terminal.targets import prepare_folder
 from tests.setups import small_scenario
 from world.scenario import load_scenario
@@ -69,7 +69,7 @@ def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    ("options", "printed"),
     [
         (["--problems", "8"], "7,15,30,60"),
         (["--problems", ""], "7,15,30,60"),
@@ -78,12 +78,12 @@ def test_overwriting_clears_only_what_a_run_writes(tmp_path: Path) -> None:
         (["--jobs", "-1"], "1 to 1,000"),
     ],
 )
-def test_bad_options_get_one_line(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_options_get_one_line(options: list[str], printed: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         main(["paper", *options])
     assert stopped.value.code == 2
     line = capsys.readouterr().err
-    assert said in line
+    assert printed in line
     assert line.count("\n") == 1
 
 
@@ -95,10 +95,10 @@ def test_an_unknown_algorithm_is_refused_before_anything_is_written(
     assert not (tmp_path / "out").exists()
 
 
-def test_rows_count_and_order() -> None:
-    def run(algorithm: str, seed: int, length: float, kill: float, bad: int = 0) -> PaperRun:
+def test_the_table_counts_plans_in_the_order_they_were_made() -> None:
+    def run(algorithm: str, seed: int, length: float, kill: float, bad: int = 0) -> SeededPlan:
         numbers = ((bad, 0, 0, 0), (length, kill, 2.0 * seed, 5.0), kill == 0.0, 0.1 * (kill > 0), 0.2)
-        return PaperRun(7, algorithm, seed, np.zeros((3, 3)), *numbers, 100, np.zeros((2, 3)), float(seed))
+        return SeededPlan(7, algorithm, seed, np.zeros((3, 3)), *numbers, 100, np.zeros((2, 3)), float(seed))
 
     rows = table([run("a", 1, 1.2, 0.0), run("a", 2, 1.1, 0.0), run("a", 3, 1.0, 0.5), run("b", 1, 1.0, 0.0, bad=1)])
     assert [(row.algorithm, row.runs, row.safe, row.certified) for row in rows] == [("a", 3, 2, 2), ("b", 1, 0, 1)]
@@ -123,6 +123,6 @@ def test_probability_of_one_unit_by_hand() -> None:
 
 
 def test_runs_of_another_algorithm_stand_beside_the_baselines() -> None:
-    done = run_section([7], 1, "umda-polar", jobs=1)
+    done = plan_section([7], 1, "umda-polar", jobs=1)
     assert [item.algorithm for item in done] == ["umda-polar", "umda-cartesian"]
     assert load_scenario(problem_name(7)).planner.algorithm == "umda"

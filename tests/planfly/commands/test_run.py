@@ -45,7 +45,7 @@ def test_a_run_leaves_every_file(demo: Path) -> None:
     assert not re.search(r"(src|href)=.https?:", page)
 
 
-def test_the_verdict_file(demo: Path) -> None:
+def test_the_verdict_file_has_findings_of_every_rule(demo: Path) -> None:
     verdict = json.loads((demo / "verdict.json").read_text(encoding="utf-8"))
     assert verdict["flyable"] is True
     assert verdict["complete"] is True

@@ -18,7 +18,7 @@ def judge(plan: Plan, airframe: Airframe, first: int, last: int) -> Verdict:
     # Item 0 sets the speed; item k + 1 is waypoint k.
     part = dataclasses.replace(mission, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
     setup = make_setup(plan.scenario, airframe, part, 1)
-    return fly(setup, airframe, None)[2]
+    return fly(setup, airframe, None).verdict
 
 
 def failing_legs(verdict: Verdict, legs: int) -> set[int]:

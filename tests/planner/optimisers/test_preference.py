@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.optimisers.preference import NO_GOAL, Level, generic_ranks, preferred, ranks
+from planner.optimisers.preference import NO_GOAL, Level, ranks
+from tests.bench.reference import preferred, ranks_by_definition
 
 PAPER = (
     Level((0, 1, 2, 3), (0.0, 0.0, 0.0, 0.0)),
@@ -32,15 +33,15 @@ def row(*values: float) -> np.ndarray:
 @pytest.mark.parametrize(
     ("u", "v", "expected"),
     [
-        # Meeting all constraints beats missing one, whatever the length.
+        # Meeting all constraints beats violating one, whatever the length.
         (row(0, 0, 0, 0, 9, 9, 9, 9), row(1, 0, 0, 0, 1, 0, 0, 0), True),
         (row(1, 0, 0, 0, 1, 0, 0, 0), row(0, 0, 0, 0, 9, 9, 9, 9), False),
-        # Misses are compared one by one, not by their sum: 1 turn is not preferred to 5 slopes.
+        # Violations are compared one by one, not by their sum: 1 turn is not preferred to 5 slopes.
         (row(1, 0, 0, 0, 1, 0, 0, 0), row(0, 5, 0, 0, 1, 0, 0, 0), False),
         (row(0, 5, 0, 0, 1, 0, 0, 0), row(1, 0, 0, 0, 1, 0, 0, 0), False),
-        # Equal where u misses, and v misses elsewhere as well.
+        # Equal where u violates a goal, and v violates another as well.
         (row(2, 0, 0, 0, 9, 9, 9, 9), row(2, 1, 0, 0, 1, 0, 0, 0), True),
-        # Equal misses: the next level decides, by dominance on both.
+        # Equal violations: the next level decides, by dominance on both.
         (row(2, 0, 0, 0, 1, 1, 9, 9), row(2, 0, 0, 0, 1, 2, 0, 0), True),
         (row(0, 0, 0, 0, 1.2, 0.0, 0, 0), row(0, 0, 0, 0, 1.1, 0.5, 0, 0), False),
         # Exact ties on both levels: the third.
@@ -67,9 +68,9 @@ tables = st.integers(1, 40).flatmap(
 
 @settings(max_examples=60)
 @given(tables, st.sampled_from([PAPER, GOALS, SINGLE]))
-def test_fast_ranks_are_the_generic_ones(table: list[list[int]], levels: tuple[Level, ...]) -> None:
+def test_fast_ranks_are_those_of_the_definition(table: list[list[int]], levels: tuple[Level, ...]) -> None:
     scores = np.array(table, dtype=np.float64)
-    np.testing.assert_array_equal(ranks(scores, levels), generic_ranks(scores, levels))
+    np.testing.assert_array_equal(ranks(scores, levels), ranks_by_definition(scores, levels))
 
 
 @pytest.mark.parametrize("levels", [PAPER, GOALS, SINGLE])
@@ -78,7 +79,7 @@ def test_fast_ranks_on_many_rows(levels: tuple[Level, ...], few: int) -> None:
     rng = np.random.default_rng(few)
     scores = rng.integers(0, few + 1, (120, 8)).astype(np.float64)
     scores[:, :4] *= rng.random((120, 4)) < 0.4
-    np.testing.assert_array_equal(ranks(scores, levels), generic_ranks(scores, levels))
+    np.testing.assert_array_equal(ranks(scores, levels), ranks_by_definition(scores, levels))
 
 
 @settings(max_examples=40)

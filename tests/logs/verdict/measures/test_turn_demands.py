@@ -8,7 +8,7 @@ import pytest
 from aircraft.path_limits import ROLL_TIME
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_demands import route_demands
-from planner.evaluation.certify import turn_needs
+from planner.evaluation.certify_kernels import turn_and_roll_lengths
 from planner.evaluation.problem import make_problem
 from tests.logs.verdict.judging import of, waypoint
 from tests.synthetic import (
@@ -42,7 +42,7 @@ def test_planner_and_check_need_the_same(turn: float, wind: float, same_way: boo
         scenario = make_scenario(points, wind={"speed_mps": wind, "from_deg": from_deg})
         setup = make_setup(points, scenario=scenario)
         demands = route_demands(setup)
-        needs, rolls = turn_needs(make_problem(scenario, setup.limits).certified, points)
+        needs, rolls = turn_and_roll_lengths(make_problem(scenario, setup.limits).certified, points)
         np.testing.assert_allclose(needs, demands.after[:-1] + demands.before[1:], atol=1e-6)
         np.testing.assert_allclose(rolls, demands.reversal, atol=1e-6)
         assert (rolls.max() == 0.0) or not same_way

@@ -1,0 +1,32 @@
+"""The attachments of a flight log: their names and media types.
+
+`setup.json` lists those that make up the setup; a verdict, a result and a recovery note come after the flight.
+"""
+
+from pathlib import PurePath
+from typing import Final
+
+SETUP: Final = "setup.json"
+SCENARIO: Final = "scenario.json"
+PLAN: Final = "plan.json"
+MISSION: Final = "mission.waypoints"
+TERRAIN: Final = "terrain.json"
+VERDICT: Final = "verdict.json"
+RESULT: Final = "result.json"
+RECOVERY: Final = "recovery.json"
+
+_MEDIA_TYPES: Final = {
+    ".json": "application/json",
+    ".waypoints": "text/plain",
+    ".heights": "application/octet-stream",
+}
+
+
+def heights_name(part: int) -> str:
+    """Name of a part of the terrain's heights; parts count from 0."""
+    return f"terrain-{part:03d}.heights"
+
+
+def media_type(name: str) -> str:
+    """Media type of an attachment, by its name's suffix."""
+    return _MEDIA_TYPES[PurePath(name).suffix]

@@ -1,0 +1,56 @@
+"""``planfly check``: a log judged from what it holds, or a mission by its geometry alone."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from logs.recording.reader import FlightLog, read_log
+from logs.verdict.judge_flight import judge_geometry
+from planfly.open_mission import is_log, open_mission
+from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.results import print_verdict, print_warnings, write_verdict
+from planfly.terminal.scenario_options import scenario_change
+from planfly.terminal.stored_logs import judge_log, warn_of_loss
+from planfly.terminal.targets import refuse_existing
+from world.errors import ScenarioError
+from world.scenario_variants import over_terrain
+
+
+def check(args: argparse.Namespace) -> int:
+    """Judge without flying; the exit code is the verdict's, or 3 for a log that is cut short."""
+    source = Path(args.file)
+    target = Path(args.json) if args.json else None
+    if target:
+        refuse_existing(target, args.overwrite, source)
+    if is_log(source):
+        log = _open_log(source, args)
+        setup, verdict, loss = log.setup, judge_log(log), not log.complete
+    else:
+        setup = open_mission(source, args.scenario, args.terrain, change=scenario_change(args)).setup
+        print_warnings(setup.mission.warnings)
+        verdict, loss = judge_geometry(setup), False
+    if target:
+        write_verdict(target, verdict)
+    if loss:
+        warn_of_loss(log)
+    print_verdict(verdict, setup.route.notes)
+    if loss:
+        return LOSS
+    return FLYABLE if verdict.flyable else NOT_FLYABLE
+
+
+def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
+    """Read a log, over another terrain where one is named.  Raises ScenarioError for options that it cannot take."""
+    given = [name for name in ("aircraft", "airspeed") if getattr(args, name) is not None]
+    if given:
+        raise ScenarioError(
+            f"{source}: --{given[0]}: a log is judged with the aircraft and the speeds it was flown with"
+        )
+    if args.scenario:
+        raise ScenarioError(
+            f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces it"
+        )
+    log = read_log(source)
+    if not args.terrain:
+        return log
+    return replace(log, setup=replace(log.setup, scenario=over_terrain(log.setup.scenario, args.terrain)))

@@ -1,0 +1,36 @@
+"""``planfly compare``: two flights laid over each other, as a table and as pictures."""
+
+import argparse
+from pathlib import Path
+
+from logs.recording.reader import read_log
+from logs.report.compare import Comparison, compare_logs, difference_lines
+from planfly.terminal.exit_codes import FLYABLE, LOSS
+from planfly.terminal.progress import progress
+from planfly.terminal.stored_logs import warn_of_loss
+from planfly.terminal.targets import COMPARE_FILES, prepare_folder, refuse_folder
+
+
+def compare(args: argparse.Namespace) -> int:
+    """Print the differences, and draw them where a folder is named; 3 if either log is cut short."""
+    first, second = Path(args.first), Path(args.second)
+    logs = [read_log(first), read_log(second)]
+    comparison = compare_logs(*logs, names=(first.name, second.name))
+    files = _draw(comparison, Path(args.out), args) if args.out else []
+    print("\n".join(difference_lines(comparison)))
+    for file in files:
+        print(f"compare   {file}")
+    cut_short = [log for log in logs if not log.complete]
+    for log in cut_short:
+        warn_of_loss(log)
+    return LOSS if cut_short else FLYABLE
+
+
+def _draw(comparison: Comparison, folder: Path, args: argparse.Namespace) -> list[Path]:
+    # matplotlib loads for pictures alone.
+    from logs.report.compare_page import write_comparison
+
+    refuse_folder(folder, args.overwrite)
+    prepare_folder(folder, COMPARE_FILES)
+    with progress("drawing"):
+        return write_comparison(folder, comparison, svg=args.svg)

@@ -1,0 +1,27 @@
+"""``planfly fly``: a plan or any mission file, flown and logged."""
+
+import argparse
+from pathlib import Path
+
+from planfly import pipeline
+from planfly.open_mission import open_mission
+from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
+from planfly.terminal.progress import progress
+from planfly.terminal.results import print_verdict, print_warnings
+from planfly.terminal.scenario_options import scenario_change
+from planfly.terminal.targets import default_folder, named_or_default
+
+
+def fly(args: argparse.Namespace) -> int:
+    """Fly a mission into a log; the exit code is the verdict's."""
+    source = Path(args.mission)
+    opened = open_mission(source, args.scenario, args.terrain, seed=args.seed, change=scenario_change(args))
+    default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
+    target = named_or_default(args.log, default, args.overwrite, source)
+    print_warnings(opened.setup.mission.warnings)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with progress("flying") as advance:
+        flown = pipeline.fly(opened.setup, opened.airframe, target, advance, every=60 // args.log_hz)
+    print_verdict(flown.verdict, opened.setup.route.notes)
+    print(f"log       {target}")
+    return FLYABLE if flown.verdict.flyable else NOT_FLYABLE

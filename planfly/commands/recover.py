@@ -1,0 +1,29 @@
+"""``planfly recover``: an unfinished or damaged log made whole, as far as it can be read."""
+
+import argparse
+from pathlib import Path
+
+from logs.recording.recover import recover_log
+from planfly.terminal.exit_codes import FLYABLE, LOSS
+from planfly.terminal.stored_logs import warn_of_loss
+from planfly.terminal.targets import refuse_existing
+from world.atomic_files import write_whole
+from world.errors import PlanflyError
+
+
+def recover(args: argparse.Namespace) -> int:
+    """Write what can be read as a new log; nothing is written for a log that is whole."""
+    source = Path(args.log)
+    target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
+    if args.out is None and target.exists() and not args.overwrite:
+        raise PlanflyError(f"{target}: exists; --overwrite replaces it, --out names another")
+    refuse_existing(target, args.overwrite)
+    recovered = recover_log(source)
+    if recovered is None:
+        print(f"{source}: complete: there is nothing to recover, and nothing was written")
+        return FLYABLE
+    write_whole(target, recovered.data)
+    log = recovered.log
+    print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
+    warn_of_loss(log)
+    return LOSS

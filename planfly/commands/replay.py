@@ -1,0 +1,93 @@
+"""``planfly replay``: a flight from its log, on the terminal, as a film, or to other programs."""
+
+import argparse
+import shutil
+import sys
+import time
+from pathlib import Path
+
+from logs.recording.reader import FlightLog, read_log
+from planfly.terminal.exit_codes import FLYABLE, LOSS
+from planfly.terminal.stored_logs import warn_of_loss
+from world.errors import LogError, PlanflyError
+
+# Frames a second on a terminal.
+_RATE = 10.0
+_ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
+_HOME, _TO_LINE_END, _TO_END = "\x1b[H", "\x1b[K", "\x1b[J"
+
+
+def replay(args: argparse.Namespace) -> int:
+    """Instruments on a terminal, the timeline elsewhere, or what the options name; 3 for a log that is cut short."""
+    if bool(args.foxglove) + bool(args.movie) + isinstance(args.to, str) > 1:
+        raise PlanflyError("--foxglove, --movie, --to IP:PORT: one of them is expected")
+    log = read_log(Path(args.log))
+    # Each target loads what it alone needs.
+    if isinstance(args.to, str):
+        from planfly.commands.replay_to.ground_stations import play
+
+        play(log, args)
+    else:
+        start, end = _part(log, args)
+        if args.movie:
+            from planfly.commands.replay_to.movie import write_movie
+
+            for file in write_movie(log, args, start, end)[:3]:
+                print(f"movie     {file}")
+        elif args.foxglove:
+            from planfly.commands.replay_to.foxglove_server import serve_log
+
+            serve_log(args, start, end)
+        elif sys.stdout.isatty() and not args.at_once:
+            _show_instruments(log, start, end, args.speed or 1.0)
+        else:
+            _print_timeline(log, start, end, args.speed)
+    if log.complete:
+        return FLYABLE
+    warn_of_loss(log)
+    return LOSS
+
+
+def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
+    """Start and end of what is replayed, s of the flight.  Raises LogError where there is nothing between them."""
+    start = args.start if args.start is not None else float(log.track.time[0])
+    end = log.end_time if args.to is None else min(args.to, log.end_time)
+    if start > log.end_time:
+        raise LogError(f"{args.log}: --from {start:g}: the log ends at {log.end_time:.1f} s")
+    if end < start:
+        raise LogError(f"{args.log}: --to {end:g}: at or after --from, {start:g} s, is expected")
+    return start, end
+
+
+def _print_timeline(log: FlightLog, start: float, end: float, speed: float | None) -> None:
+    """Print the timeline, at ``speed`` times real time or at once."""
+    from logs.replay.timeline import entry_lines, timeline
+
+    began = time.monotonic()
+    for entry in timeline(log):
+        if start <= entry.time <= end:
+            if speed:
+                time.sleep(max(0.0, (entry.time - start) / speed - (time.monotonic() - began)))
+            print("\n".join(entry_lines(entry)), flush=bool(speed))
+
+
+def _show_instruments(log: FlightLog, start: float, end: float, speed: float) -> None:
+    """Show frames until the end or an interruption; the last one stays on the terminal."""
+    from logs.replay.instruments import make_instruments
+
+    instruments = make_instruments(log)
+    began = time.monotonic()
+    now = start
+    print(_ENTER, end="")
+    try:
+        while now < end:
+            now = min(end, start + speed * (time.monotonic() - began))
+            size = shutil.get_terminal_size()
+            lines = instruments.frame(now, width=size.columns)[: max(1, size.lines - 2)]
+            lines.append(f"x {speed:g}, Ctrl-C stops")
+            text = "".join(line + _TO_LINE_END + "\n" for line in lines)
+            print(_HOME + text + _TO_END, end="", flush=True)
+            time.sleep(1.0 / _RATE)
+    finally:
+        print(_LEAVE, end="", flush=True)
+    print("\n".join(instruments.frame(now, width=shutil.get_terminal_size().columns)))

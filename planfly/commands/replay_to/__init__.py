@@ -1,0 +1,1 @@
+"""Where a log is replayed to beside the terminal: a film, ground stations, Foxglove."""

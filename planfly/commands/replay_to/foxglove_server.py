@@ -1,0 +1,143 @@
+"""``planfly replay --foxglove``: a log played to Foxglove over a WebSocket that only this machine reaches."""
+
+import argparse
+import itertools
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from queue import SimpleQueue
+from typing import Any
+
+from logs.recording.messages import LogChannel, LogMessage, log_channels, log_messages
+from logs.recording.state_channel import EPOCH_NS
+from planfly.terminal.link_options import Stopped, stop_signals
+from world.errors import FlightError, PlanflyError
+
+_HOST = "127.0.0.1"
+# Time between looks at the clock and at who is listening, s, and until a new subscription is active, s.
+_POLL, _SUBSCRIBING = 0.005, 0.05
+
+
+def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
+    """Play a log's messages from ``start`` to ``end`` (s) to the clients of a Foxglove server.
+
+    It waits for the first client that subscribes.  Who subscribes later is sent the scenes as they are then.
+    Raises PlanflyError where foxglove-sdk is not installed, FlightError where nobody comes in time, OSError for a
+    port in use.
+    """
+    try:
+        import foxglove
+    except ImportError as error:
+        raise PlanflyError(
+            "--foxglove: the package foxglove-sdk is not installed (extra: planfly[foxglove])"
+        ) from error
+    log = Path(args.log)
+    broadcast = _Broadcast(foxglove, log_channels(log))
+    try:
+        server = foxglove.start_server(
+            name=f"planfly {Path(args.log).name}", host=_HOST, port=args.port, server_listener=broadcast,
+            capabilities=[foxglove.Capability.Time], context=broadcast.context,
+        )  # fmt: skip
+    except RuntimeError as error:
+        raise OSError(0, str(error), f"{_HOST}:{args.port}") from error
+    print(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket)", flush=True)
+    try:
+        with stop_signals() as stopped:
+            messages = broadcast.up_to(log_messages(log), round(start * 1e9) + EPOCH_NS)
+            _wait(broadcast, args.wait, stopped)
+            _play(broadcast, server, messages, round(end * 1e9) + EPOCH_NS, args.speed or 1.0, stopped)
+    finally:
+        server.stop()
+
+
+def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
+    begun = time.monotonic()
+    while not broadcast.listeners and not stopped():
+        if timeout is not None and time.monotonic() - begun > timeout:
+            raise FlightError(f"--foxglove: nobody has subscribed within {timeout:g} s")
+        time.sleep(_POLL)
+
+
+def _play(
+    broadcast: "_Broadcast", server: Any, messages: Iterator[LogMessage], end_ns: int, speed: float, stopped: Stopped
+) -> None:
+    begun, first, newest = time.monotonic(), None, 0
+    for message in messages:
+        if message.log_time > end_ns:
+            break
+        first = message.log_time if first is None else first
+        while (ahead := (message.log_time - first) / 1e9 / speed - (time.monotonic() - begun)) > 0.0 and not stopped():
+            broadcast.catch_up()
+            time.sleep(min(ahead, _POLL))
+        if stopped():
+            return
+        # An event that was noted afterwards stands later in the file than its time.
+        if message.log_time > newest:
+            newest = message.log_time
+            server.broadcast_time(newest)
+        broadcast.show(message)
+    # What is under way, and who came last, is served before the server goes.
+    time.sleep(2.0 * _SUBSCRIBING)
+    broadcast.catch_up()
+    time.sleep(_SUBSCRIBING)
+
+
+class _Broadcast:
+    """The log's topics, the newest message of each scene, and who listens: a listener in Foxglove's sense."""
+
+    def __init__(self, foxglove: Any, channels: list[LogChannel]) -> None:
+        self.context = foxglove.Context()
+        self.listeners = 0
+        self._channels = {
+            kind.topic: foxglove.Channel(
+                kind.topic,
+                schema=foxglove.Schema(name=kind.schema, encoding=kind.schema_encoding, data=kind.schema_data),
+                message_encoding=kind.encoding,
+                context=self.context,
+            )
+            for kind in channels
+        }
+        self._scenes: dict[str, LogMessage] = {}
+        # Filled by the server's thread: when, and which topic.
+        self._arrivals: SimpleQueue[tuple[float, str]] = SimpleQueue()
+        self._waiting: list[tuple[float, str]] = []
+
+    def up_to(self, messages: Iterator[LogMessage], start_ns: int) -> Iterator[LogMessage]:
+        """Take what was before ``start_ns`` as known, and give the rest."""
+        for message in messages:
+            if message.log_time >= start_ns:
+                return itertools.chain([message], messages)
+            self._note(message)
+        return iter(())
+
+    def show(self, message: LogMessage) -> None:
+        """Send a message to those who listen."""
+        self.catch_up()
+        self._note(message)
+        channel = self._channels.get(message.channel.topic)
+        if channel is not None:
+            channel.log(message.data, log_time=message.log_time)
+
+    def catch_up(self) -> None:
+        """Send those who have just subscribed the scenes as they are."""
+        while not self._arrivals.empty():
+            self._waiting.append(self._arrivals.get())
+        now = time.monotonic()
+        for came, topic in self._waiting:
+            scene = self._scenes.get(topic)
+            if scene is not None and now - came >= _SUBSCRIBING:
+                self._channels[topic].log(scene.data, log_time=scene.log_time)
+        self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIBING]
+
+    def _note(self, message: LogMessage) -> None:
+        if message.channel.topic.startswith("/scene/"):
+            self._scenes[message.channel.topic] = message
+
+    def on_subscribe(self, client: Any, channel: Any) -> None:
+        """Note that somebody has come for a topic."""
+        self._arrivals.put((time.monotonic(), channel.topic))
+        self.listeners += 1
+
+    def on_unsubscribe(self, client: Any, channel: Any) -> None:
+        """Count a listener less."""
+        self.listeners -= 1

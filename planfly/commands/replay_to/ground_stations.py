@@ -1,0 +1,103 @@
+"""``planfly replay --to``: a log played into a ground station, as if it were flown now."""
+
+import argparse
+import time
+
+import numpy as np
+
+from flight.live.link import Link
+from flight.live.snapshot import SnapshotMaker
+from flight.live.status_text import INFO, status_texts
+from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, telemetry_message
+from flight.mission.items import Home
+from flight.simulation.track import track_rows
+from logs.recording.reader import FlightLog
+from planfly.terminal.link_options import Stopped, link_access, stop_signals
+from planfly.terminal.stored_logs import CUT_SHORT
+from world.errors import FlightError
+
+# Seconds to wait for a ground station unless told otherwise.
+_TIMEOUT = 10.0
+
+
+def play(log: FlightLog, args: argparse.Namespace) -> None:
+    """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
+    link, wait = Link(link_access(args)), _TIMEOUT if args.wait is None else args.wait
+    snapshots = SnapshotMaker(log.setup)
+    track = log.track
+    rows = track_rows(track)
+    start = snapshots.before_start(log.setup)
+    home = log.setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
+    status = Status(start, home, battery=log.setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
+    items = log.setup.route.items
+    status.total = int(max(items.max(), 0))
+    player = _Player(link, status)
+    try:
+        with stop_signals() as stopped:
+            player.wait(wait, stopped)
+            if not link.peers:
+                raise FlightError(f"--to {args.to}: no ground station has answered within {wait:g} s")
+            begun, k = time.monotonic(), 0
+            player.announce(f"replay of {args.log} at {args.speed or 1.0:g}x")
+            while k < len(rows) - 1 and not stopped():
+                k = min(
+                    len(rows) - 1,
+                    int(np.searchsorted(track.time, (time.monotonic() - begun) * (args.speed or 1.0), side="right")),
+                )
+                snapshot = snapshots.snapshot(rows[k])
+                if snapshot.finite:
+                    status.snapshot = snapshot
+                    status.current = max(0, int(items[min(int(snapshot.leg) + 1, len(items) - 1)]))
+                player.step(0.01)
+            if log.ended == "completed" and k == len(rows) - 1:
+                status.mission_state = COMPLETE
+            status.armed = status.flying = False
+            player.announce(f"replay over: {log.ended or CUT_SHORT}")
+            player.rest(1.5, stopped)
+    finally:
+        link.close()
+
+
+class _Player:
+    """Telemetry of a log, without a vehicle behind it."""
+
+    def __init__(self, link: Link, status: Status) -> None:
+        self._link, self._status = link, status
+        self._born = time.monotonic()
+        self._hello = 0.0
+        self._texts = 0
+
+    def announce(self, text: str) -> None:
+        """Send a text to the stations, and print it."""
+        print(text, flush=True)
+        self._texts += 1
+        for peer in self._link.peers.values():
+            for piece in status_texts(text, INFO, self._texts):
+                self._link.send(piece, peer)
+
+    def wait(self, timeout: float, stopped: Stopped) -> None:
+        """Call stations until one answers, or ``timeout`` seconds are over."""
+        end = time.monotonic() + timeout
+        while not self._link.peers and time.monotonic() < end and not stopped():
+            self.step(0.05)
+
+    def rest(self, seconds: float, stopped: Stopped) -> None:
+        """Go on sending the last snapshot."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end and not stopped():
+            self.step(0.02)
+
+    def step(self, pause: float) -> None:
+        """Read what stations send, send them what is due, and pause, s."""
+        now = time.monotonic()
+        self._status.boot, self._status.wall = now - self._born, time.time()
+        self._link.receive()
+        if now >= self._hello:
+            self._hello = now + 1.0
+            self._link.send_heartbeat(heartbeat(self._status))
+        for peer in self._link.peers.values():
+            for name, due in peer.due.items():
+                if now >= due:
+                    self._link.send(telemetry_message(name, self._status), peer)
+                    peer.due[name] = max(due + PERIODS[name], now - PERIODS[name])
+        time.sleep(pause)

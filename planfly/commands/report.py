@@ -1,0 +1,51 @@
+"""``planfly report``: figures and report.html from a log alone, or the layout file for Foxglove."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from logs.recording.foxglove_layout import layout_text
+from logs.recording.reader import read_log
+from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.progress import progress
+from planfly.terminal.results import write_pictures
+from planfly.terminal.stored_logs import judge_log, warn_of_loss
+from planfly.terminal.targets import LOG_FIGURES, prepare_folder, refuse_existing, refuse_folder
+from world.atomic_files import write_whole
+from world.errors import PlanflyError
+
+
+def report(args: argparse.Namespace) -> int:
+    """Draw and write; the exit code is the verdict's, or 3 for a log that is cut short."""
+    if args.layout:
+        return _write_layout(Path(args.layout), args)
+    if args.log is None:
+        print("planfly report: a log, or --layout FILE, is expected (see planfly report --help)", file=sys.stderr)
+        return BAD_INPUT
+    source = Path(args.log)
+    log = read_log(source)
+    folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-report")
+    verdict = judge_log(log)
+    if args.out:
+        refuse_folder(folder, args.overwrite)
+    prepare_folder(folder, LOG_FIGURES)
+    with progress("drawing"):
+        files = write_pictures(
+            folder, log.setup, log.track, verdict, log.ended, f"planfly report {args.log}", log.versions, log.events,
+            svg=args.svg,
+        )  # fmt: skip
+    for file in files:
+        print(f"report    {file}")
+    if not log.complete:
+        warn_of_loss(log)
+        return LOSS
+    return FLYABLE if verdict.flyable else NOT_FLYABLE
+
+
+def _write_layout(target: Path, args: argparse.Namespace) -> int:
+    if args.log is not None:
+        raise PlanflyError(f"{args.log}: --layout writes the layout alone; name no log with it")
+    refuse_existing(target, args.overwrite)
+    write_whole(target, layout_text())
+    print(f"layout    {target}")
+    return FLYABLE

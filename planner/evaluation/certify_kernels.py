@@ -1,0 +1,156 @@
+"""What the certificate measures along the whole path: the compiled part of `planner.evaluation.certify`."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import downwind
+from planner.evaluation.clearance_buffer import BUFFER_GROWTH
+from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_radii, fly_by_vertices
+from planner.evaluation.leg_constraints import slope_limits
+from planner.evaluation.leg_geometry import (
+    CORNER,
+    LEG,
+    measure_corners,
+    measure_legs,
+    roll_length,
+    turn_length,
+)
+from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
+from world.kernels import compiled
+from world.terrain import segment_clearance
+
+Floats = NDArray[np.float64]
+
+# A straight piece of a leg, or of the arc at a waypoint, by its number; its least height above ground (m, NaN off the
+# terrain) and the buffer wanted there (m).
+PIECE = np.dtype(
+    [("of_arc", np.bool_), ("number", np.int64), ("height", np.float64), ("buffer", np.float64)], align=True
+)
+# Pieces of one arc, at most: its chords, and one on either leg.
+_MOST_PIECES = math.ceil(math.pi / ARC_STEP) + 2
+
+
+@compiled
+def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma: no cover - compiled
+    """Distance from the legs and arcs of a path (w, 3) to the nearest missile sphere's surface, m; inf without any."""
+    nearest = math.inf
+    last = waypoints.shape[0] - 1
+    for i in range(last):
+        nearest = _segment_distance(data.threats, waypoints[i], waypoints[i + 1], nearest)
+    radii = fly_by_radii(data, waypoints)
+    for i in range(1, last):
+        arc = fly_by_vertices(data.aircraft, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        for k in range(max(1, arc.shape[0] - 1)):
+            nearest = _segment_distance(data.threats, arc[k], arc[min(k + 1, arc.shape[0] - 1)], nearest)
+    return nearest
+
+
+@compiled
+def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
+    """Distance from a-b to the nearest missile sphere's surface, or `nearest` if that is less."""
+    dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    length2 = dx * dx + dy * dy + dz * dz
+    for k in range(threats.shape[0]):
+        threat = threats[k]
+        if threat.kill_radius <= 0.0:
+            continue
+        x, y, z = a[0] - threat.east, a[1] - threat.north, a[2] - threat.up
+        along = dx * x + dy * y + dz * z
+        f = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
+        # From the point itself: differences of squares lose digits.
+        x, y, z = x + f * dx, y + f * dy, z + f * dz
+        nearest = min(nearest, math.sqrt(x * x + y * y + z * z) - threat.kill_radius)
+    return nearest
+
+
+@compiled
+def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
+    """Path with a far point before the start and after the destination, on the courses asked for there.
+
+    Without such a course the point lies on the leg's own line, and the turn at the end is none.
+    """
+    count = path.shape[0]
+    out = np.empty((count + 2, 3))
+    out[1:-1] = path
+    for end, at, other, course, sign in (
+        (0, 0, 1, data.start_course, -1.0),
+        (count + 1, count - 1, count - 2, data.destination_course, 1.0),
+    ):
+        out[end] = path[at]
+        if math.isnan(course):
+            out[end, :2] = 2.0 * path[at, :2] - path[other, :2]
+        else:
+            out[end, 0] += sign * 1e4 * math.sin(course)
+            out[end, 1] += sign * 1e4 * math.cos(course)
+    return out
+
+
+@compiled
+def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
+    """Length of each leg (w - 1,) that its turns use, and that the roll from one to the other uses, m."""
+    count = waypoints.shape[0]
+    legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
+    turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
+    wind = downwind(data.aircraft)
+    measure_legs(waypoints, legs)
+    measure_corners(data, wind, waypoints, legs, corners)
+    for i in range(count - 1):
+        turns[i] = turn_length(data.fly_over, corners, i)
+        if not data.fly_over:
+            up = min(waypoints[i, 2], waypoints[i + 1, 2])
+            rolls[i] = roll_length(data.aircraft, legs, corners, i, up, wind)
+    return turns, rolls
+
+
+@compiled
+def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+    """Steepest climb and dive of each leg (w - 1,), rad."""
+    count = waypoints.shape[0] - 1
+    climbs, dives = np.empty(count), np.empty(count)
+    for i in range(count):
+        climbs[i], dives[i] = slope_limits(data, waypoints[i], waypoints[i + 1])
+    return climbs, dives
+
+
+@compiled
+def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
+    """`PIECE` records of the legs of a path (w, 3), and then of its fly-by arcs."""
+    last = waypoints.shape[0] - 1
+    radii = fly_by_radii(data, waypoints)
+    out = np.zeros(last + last * _MOST_PIECES, dtype=PIECE)
+    for i in range(last):
+        _measure_piece(data, waypoints[i], waypoints[i + 1], False, i, out[i])
+    count = last
+    for i in range(1, last):
+        arc = fly_by_vertices(data.aircraft, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
+        for k in range(max(1, arc.shape[0] - 1)):
+            _measure_piece(data, arc[k], arc[min(k + 1, arc.shape[0] - 1)], True, i, out[count])
+            count += 1
+    return out[:count]
+
+
+@compiled
+def _measure_piece(
+    data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, number: int, out: Record
+) -> None:  # pragma: no cover - compiled
+    height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
+    out.of_arc, out.number, out.height, out.buffer = of_arc, number, height, _buffer_on(data, a, b)
+
+
+@compiled
+def _buffer_on(data: ProblemArrays, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+    """Buffer wanted on a piece: fixed ends may have less, and it grows from where the piece is nearest to them.
+
+    It grows half as fast as a search asks, for what lies between the search's samples.
+    """
+    buffer = data.buffer
+    for end, end_buffer in ((data.start, data.start_buffer), (data.destination, data.destination_buffer)):
+        if end_buffer < buffer:
+            dx, dy, x, y = b[0] - a[0], b[1] - a[1], a[0] - end[0], a[1] - end[1]
+            run2 = dx * dx + dy * dy
+            f = min(1.0, max(0.0, -(dx * x + dy * y) / run2)) if run2 > 0.0 else 0.0
+            away = math.sqrt((x + f * dx) ** 2 + (y + f * dy) ** 2)
+            buffer = min(buffer, end_buffer + 0.5 * BUFFER_GROWTH * away)
+    return buffer

@@ -1,0 +1,110 @@
+"""Legs and corners of a path as they are measured once, and the length of leg that turns take."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, roll_reversal_length
+from planner.evaluation.problem_arrays import ProblemArrays, Records
+from world.kernels import compiled, compiled_views, inlined
+
+Floats = NDArray[np.float64]
+# East and north of the unit vector that the wind blows towards.
+Wind = tuple[float, float]
+
+# A leg: its unit course (0, 0 for none), its horizontal length and its length, m.
+LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64), ("length", np.float64)])
+# A corner: length of leg that its fly-by arc takes on either side, and the arc's radius, m.
+CORNER = np.dtype([("tangent", np.float64), ("radius", np.float64)])
+
+# Leg left over between its two turns: this share of the leg, and this length (m) or what small turns use of it.
+SETTLING_SHARE = 0.05
+SETTLING_LENGTH = 20.0
+
+
+@compiled_views
+def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - compiled
+    """Fill `LEG` records (w - 1,) of a path (w, 3)."""
+    for i in range(legs.shape[0]):
+        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        dz = path[i + 1, 2] - path[i, 2]
+        run = math.sqrt(dx * dx + dy * dy)
+        legs[i].east = dx / run if run > 0.0 else 0.0
+        legs[i].north = dy / run if run > 0.0 else 0.0
+        legs[i].run = run
+        legs[i].length = math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compiled_views
+def measure_corners(
+    data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
+) -> None:  # pragma: no cover - compiled
+    """Fill `CORNER` records (w,) of a path (w, 3) whose legs are measured."""
+    aircraft = data.aircraft
+    wx, wy = wind
+    last: int = legs.shape[0]
+    for i in range(1, last):
+        ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
+        corners[i].tangent, corners[i].radius = 0.0, 0.0
+        if (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0):
+            tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, path[i, 2], wx, wy)
+            corners[i].tangent, corners[i].radius = tangent, radius
+    for i, asked in ((0, data.start_course), (last, data.destination_course)):
+        corners[i].tangent, corners[i].radius = 0.0, 0.0
+        if not math.isnan(asked) and legs[min(i, last - 1)].run > 0.0:
+            ux, uy, vx, vy = courses_at(data, legs, i)
+            tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, path[i, 2], wx, wy)
+            corners[i].tangent, corners[i].radius = tangent, radius
+
+
+@compiled_views
+def courses_at(
+    data: ProblemArrays, legs: Records, i: int
+) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
+    """Unit courses before and after waypoint i; at the ends those asked for, else the leg's own."""
+    last = legs.shape[0]
+    after, before = min(i, last - 1), max(i - 1, 0)
+    ux, uy, vx, vy = legs[before].east, legs[before].north, legs[after].east, legs[after].north
+    if i == 0 and not math.isnan(data.start_course):
+        ux, uy = math.sin(data.start_course), math.cos(data.start_course)
+    if i == last and not math.isnan(data.destination_course):
+        vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
+    return ux, uy, vx, vy
+
+
+@inlined
+def settling_length(need: float, run: float) -> float:  # pragma: no cover - compiled
+    """Length of a leg (m) that stays straight between its turns, so that the first has settled; need: what they use."""
+    return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
+
+
+@compiled_views
+def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
+    """Length of leg i that its two turns use, m: of a fly-over only the one at its beginning, on the way back to it."""
+    if not fly_over:
+        need: float = corners[i].tangent + corners[i + 1].tangent
+        return need
+    if corners[i].tangent <= 0.0:
+        return 0.0
+    if math.isinf(corners[i].tangent):
+        return math.inf
+    back: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
+    return back
+
+
+@compiled
+def roll_length(
+    aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
+) -> float:  # pragma: no cover - compiled
+    """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side."""
+    if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
+        return 0.0
+    ux, uy = legs[i].east, legs[i].north
+    into, onward = legs[i - 1].east * uy - legs[i - 1].north * ux, ux * legs[i + 1].north - uy * legs[i + 1].east
+    if into * onward >= 0.0 or math.isinf(corners[i].tangent + corners[i + 1].tangent):
+        return 0.0
+    length: float = roll_reversal_length(
+        aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1]
+    )
+    return length

@@ -1,0 +1,74 @@
+"""Products and factors of matrices with their sums in a fixed order.
+
+BLAS and LAPACK sum and round as the machine has it; a search must give the same samples on every machine.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from world.kernels import compiled
+
+Floats = NDArray[np.float64]
+
+
+@compiled
+def covariance(rows: Floats, first: int, second: int, size: int) -> Floats:  # pragma: no cover - compiled
+    """Covariance (size, size) of two groups of columns of centred rows (n, d), by where the groups begin."""
+    out = np.zeros((size, size))
+    for n in range(rows.shape[0]):
+        for i in range(size):
+            for j in range(size):
+                out[i, j] += rows[n, first + i] * rows[n, second + j]
+    out /= rows.shape[0]
+    return out
+
+
+@compiled
+def cholesky(matrix: Floats, ridge: float) -> Floats:  # pragma: no cover - compiled
+    """Lower factor (d, d) of a covariance (d, d), ridge x mean variance added to its diagonal."""
+    size = matrix.shape[0]
+    trace = 0.0
+    for i in range(size):
+        trace += matrix[i, i]
+    extra = ridge * trace / size + 1e-300
+    out = np.zeros((size, size))
+    for j in range(size):
+        pivot = matrix[j, j] + extra
+        for k in range(j):
+            pivot -= out[j, k] * out[j, k]
+        out[j, j] = np.sqrt(max(pivot, extra))
+        for i in range(j + 1, size):
+            total = matrix[i, j]
+            for k in range(j):
+                total -= out[i, k] * out[j, k]
+            out[i, j] = total / out[j, j]
+    return out
+
+
+@compiled
+def times_lower(rows: Floats, factor: Floats) -> Floats:  # pragma: no cover - compiled
+    """Rows (n, d) times the transpose of a lower triangle (d, d)."""
+    out = np.zeros(rows.shape)
+    for n in range(rows.shape[0]):
+        for i in range(factor.shape[0]):
+            for k in range(i + 1):
+                out[n, i] += factor[i, k] * rows[n, k]
+    return out
+
+
+@compiled
+def times_sparse(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - compiled
+    """Rows (n, d) times a basis (d, k) of which most entries are 0."""
+    turned = rows.T.copy()
+    out = np.zeros((basis.shape[1], rows.shape[0]))
+    for k in range(basis.shape[1]):
+        for d in range(basis.shape[0]):
+            if basis[d, k] != 0.0:
+                _add_times(turned[d], basis[d, k], out[k])
+    return out.T.copy()
+
+
+@compiled
+def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
+    for n in range(out.size):
+        out[n] += values[n] * factor

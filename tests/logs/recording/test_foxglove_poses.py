@@ -1,0 +1,50 @@
+"""Pose, fix and track messages show the recorded rows, at their own rates."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.foxglove_scene import body_rotation
+from logs.recording.state_channel import EPOCH_NS, SECOND_NS
+from tests.logs.recording.mcap_messages import messages
+from world.frames import to_geo
+
+
+def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
+    log_file: Path, setup: FlightSetup, track: Track
+) -> None:
+    found = messages(log_file)
+    assert sorted(found) == sorted(
+        ["/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/plan", "/scene/track"]
+    )
+    seconds = track.time[-1] - track.time[0]
+    for topic, rate in (("/tf", 5), ("/fix", 1)):
+        assert rate * seconds - 1 <= len(found[topic]) <= rate * seconds + 1
+    for message, pose in found["/tf"]:
+        row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
+        assert (pose.parent_frame_id, pose.child_frame_id) == ("map", "aircraft")
+        assert pose.timestamp.seconds * SECOND_NS + pose.timestamp.nanos == message.log_time
+        position = (pose.translation.x, pose.translation.y, pose.translation.z)
+        np.testing.assert_allclose(position, track.position[row], atol=2**-11 + 1e-12)
+        turn = (pose.rotation.x, pose.rotation.y, pose.rotation.z, pose.rotation.w)
+        np.testing.assert_allclose(turn, body_rotation(track.attitude[row]), atol=2**-21 + 1e-12)
+    message, fix = found["/fix"][5]
+    row = round((message.log_time - EPOCH_NS) / 1e9 * 60)
+    lat, lon = to_geo(setup.scenario.origin, track.position[row, 0], track.position[row, 1])
+    assert (fix.latitude, fix.longitude, fix.altitude) == (float(lat), float(lon), track.position[row, 2])
+    mesh = found["/scene/terrain"][0][1].entities[0].triangles[0]
+    assert len(mesh.indices) % 3 == 0
+    assert max(mesh.indices) < len(mesh.points) == len(mesh.colors)
+    terrain = setup.scenario.terrain
+    assert terrain is not None
+    for point in list(mesh.points)[::501]:
+        # Points are rounded to 1/16 m, along the ground too; the steepest of this one rises 0.3 m a metre.
+        assert point.z == pytest.approx(float(terrain.height(point.x, point.y)), abs=0.05)
+    threats = found["/scene/threats"][0][1].entities[0]
+    assert [sphere.size.x for sphere in threats.spheres] == [800.0, 1600.0]
+    line = found["/scene/track"][-1][1].entities[0].lines[0]
+    assert (line.points[-1].x, line.points[-1].y) == tuple(track.position[-1, :2])
+    assert [(item.level, item.message) for _, item in found["/log"]] == [(3, "half way up"), (2, "arrived")]

@@ -1,0 +1,47 @@
+"""Recording, checking and reporting stay within their bounds of time and bytes; `make bench` prints the figures."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from flight.mission.from_plan import plan_mission
+from logs.recording.reader import read_log
+from planfly.airframe import load_airframe
+from planfly.pipeline import make_plan, make_setup
+from tests.bench.chain import in_child, long_flight, recording
+from world.scenario import load_scenario
+
+SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+
+
+def test_recording_costs_a_fraction_of_the_flight(tmp_path: Path) -> None:
+    scenario = load_scenario("jacksboro")
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, 1)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+    setup = make_setup(scenario, airframe, mission, 1, plan=plan)
+    # The first round compiles what is not compiled yet.
+    spent = recording(setup, airframe, tmp_path, rounds=10 if SOAK else 3)
+    assert spent["flight, recorded at 20 Hz"] < 1.20 * spent["flight"]
+    assert spent["flight, recorded at 60 Hz"] < 1.60 * spent["flight"]
+
+
+@pytest.fixture(scope="module")
+def hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
+    """An hour in wind and turbulence, and how many hours it is."""
+    return long_flight(tmp_path_factory.mktemp("hour"))
+
+
+def test_an_hour_takes_less_than_45_megabytes(hour: tuple[Path, float]) -> None:
+    log, hours = hour
+    assert hours > 1.0
+    assert log.stat().st_size < 45e6 * hours
+    assert read_log(log).complete
+
+
+def test_an_hour_is_checked_in_5_seconds_and_reported_in_15(hour: tuple[Path, float], tmp_path: Path) -> None:
+    log, _ = hour
+    assert in_child("check", str(log), rounds=1) < 5.0
+    assert in_child("report", str(log), "--out", str(tmp_path / "out"), rounds=1) < 15.0
+    assert (tmp_path / "out" / "report.html").stat().st_size < 8e6

@@ -1,0 +1,102 @@
+"""A setup comes back whole from its attachments, and one that does not fit is refused."""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.envelope import Envelope
+from aircraft.path_limits import Limits
+from flight.mission.items import Mission, MissionItem
+from flight.mission.route import Route
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.reader import read_log
+from logs.recording.setup_attachments import pack_setup, unpack_setup
+from tests.logs.made_flight import make_setup, record
+from tests.logs.recording.log_copies import Attachments, same
+from world import scenario as scenario_module
+from world.errors import LogError
+from world.scenario import from_spec
+
+
+@pytest.mark.parametrize("with_plan", [True, False])
+def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: bool) -> None:
+    setup = make_setup(with_plan=with_plan)
+    log = read_log(record(tmp_path / "a.mcap", setup, track))
+    same(log.setup, setup)
+    assert log.versions["numpy"] == np.__version__
+
+
+def test_no_field_of_a_setup_is_left_behind() -> None:
+    # A field with a default could be forgotten in silence: these are all that the log knows of.
+    kinds = (FlightSetup, Limits, Mission, Route, Envelope)
+    names = {kind: [item.name for item in dataclasses.fields(kind)] for kind in kinds}
+    assert len(names[FlightSetup]) == 12
+    assert len(names[Limits]) == 8
+    assert len(names[Mission]) == 7
+    assert len(names[Route]) == 8
+    assert len(names[Envelope]) == 14
+    assert len(dataclasses.fields(MissionItem)) == 8
+
+
+def test_an_external_mission_without_terrain_comes_back(tmp_path: Path, track: Track) -> None:
+    spec = make_setup().scenario.to_json() | {"terrain": {"kind": "none"}, "threats": []}
+    setup = dataclasses.replace(make_setup(with_plan=False), scenario=from_spec(spec, "t", external=True))
+    log = read_log(record(tmp_path / "a.mcap", setup, track))
+    assert log.setup.scenario.terrain is None
+    assert log.setup.scenario.external
+    same(log.setup, setup)
+
+
+def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Attachments:
+    attachments = pack_setup(setup)
+    data = json.loads(attachments["setup.json"])
+    change(data)
+    return attachments | {"setup.json": json.dumps(data).encode()}
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda data: data["route"]["items"].append(3), r"route\.items: 5 values: 4 are expected"),
+        (lambda data: data["envelope"]["climb_rad"].pop(), r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\]"),
+        (lambda data: data["envelope"]["climb_rad"][0].pop(), r"envelope\.climb_rad: shape"),
+        (lambda data: data["envelope"]["amsl_m"].reverse(), r"envelope\.amsl_m: not increasing"),
+        (lambda data: data.pop("seed"), "seed"),
+        (lambda data: data.update(surprise=1), "surprise: unknown key"),
+        (lambda data: data.update(schema="planfly.log/9"), "schema"),
+        (lambda data: data.update(airspeed_mps="nan"), "airspeed_mps"),
+        (lambda data: data["route"]["waypoints_east_north_amsl_m"][0].__setitem__(0, "inf"), "waypoints"),
+        (lambda data: data["sha256"].update({"plan.json": "0"}), r"plan\.json: altered"),
+        (lambda data: data["sha256"].pop("scenario.json"), r"scenario\.json: missing"),
+        (lambda data: data["sha256"].pop("terrain.json"), r"terrain\.kind: 'peaks': the log holds no terrain\.json"),
+        (lambda data: data["sha256"].pop("terrain-000.heights"), r"terrain\.json: parts"),
+    ],
+)
+def test_a_setup_that_does_not_fit_is_refused(change: Callable[[dict[str, Any]], None], message: str) -> None:
+    with pytest.raises(LogError, match=message) as caught:
+        unpack_setup(altered(make_setup(), change), "x.mcap")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_log_does_not_make_its_reader_open_files(track: Track, monkeypatch: pytest.MonkeyPatch) -> None:
+    def trap(*_: object) -> None:
+        raise AssertionError("a file was opened")
+
+    setup = make_setup(with_plan=False)
+    attachments = pack_setup(setup)
+    spec = json.loads(attachments["scenario.json"]) | {"terrain": {"kind": "dem", "path": "/etc/passwd"}}
+    attachments["scenario.json"] = json.dumps(spec).encode()
+    data = json.loads(attachments["setup.json"])
+    data["sha256"]["scenario.json"] = hashlib.sha256(attachments["scenario.json"]).hexdigest()
+    del data["sha256"]["terrain.json"]
+    attachments["setup.json"] = json.dumps(data).encode()
+    monkeypatch.setattr(scenario_module, "open_raster", trap)
+    with pytest.raises(LogError, match=r"terrain\.kind: 'dem'"):
+        unpack_setup(attachments, "x.mcap")

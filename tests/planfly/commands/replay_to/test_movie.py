@@ -1,0 +1,128 @@
+"""``planfly replay --movie``: frames that show the flight, the same each time, and refusals in a line."""
+
+import itertools
+import json
+import os
+import stat
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from logs.figures.movie_frames import RATE, MovieFrames
+from logs.recording.reader import FlightLog, read_log
+from planfly.cli import main
+from tests.logs.made_flight import make_setup, make_track, record
+
+
+@pytest.fixture(scope="module")
+def log_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("movie") / "a.mcap", make_setup(), make_track())
+
+
+@pytest.fixture(scope="module")
+def log(log_path: Path) -> FlightLog:
+    return read_log(log_path)
+
+
+def test_the_aircraft_moves_over_a_map_that_stands_still(log: FlightLog) -> None:
+    film = MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0)
+    frames = list(film.frames())
+    assert len(frames) == len(film) == 5
+    np.testing.assert_allclose(film.times(), [0.0, 2.0, 4.0, 6.0, log.end_time])
+    assert {frame.shape for frame in frames} == {frames[0].shape}
+    assert frames[0].shape[0] % 2 == frames[0].shape[1] % 2 == 0
+    changed = [(a != b).any(axis=2) for a, b in itertools.pairwise(frames)]
+    assert all(100 < part.sum() < 0.1 * part.size for part in changed)
+    # The aircraft's colour moves from the lower left to the upper right, as the waypoints do.
+    middles = []
+    for frame in frames:
+        rows, columns = np.nonzero(np.abs(frame.astype(int) - [0xB0, 0x40, 0x8A]).max(axis=2) < 8)
+        middles.append((columns.mean(), -rows.mean()))
+    assert all(a[0] < b[0] and a[1] < b[1] for a, b in itertools.pairwise(middles))
+    again = list(film.frames())
+    assert all((a == b).all() for a, b in zip(frames, again, strict=True))
+
+
+def test_a_gif_holds_the_frames(
+    log: FlightLog, log_path: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    target = tmp_path / "film.gif"
+    command = ["replay", str(log_path), "--movie", str(target), "--speed", "24"]
+    assert main(command) == 0
+    assert f"movie     {target}" in capsys.readouterr().out
+    wanted = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
+    with Image.open(target) as film:
+        assert film.n_frames == len(wanted)
+        film.seek(len(wanted) - 1)
+        last = np.asarray(film.convert("RGB")).astype(int)
+    # 255 colours instead of all: near everywhere, and the trail is where it was.
+    assert np.abs(last - wanted[-1]).mean() < 4.0
+    first = target.read_bytes()
+    assert main(command) == 2
+    assert "exists; --overwrite replaces it" in capsys.readouterr().err
+    assert main([*command, "--overwrite"]) == 0
+    assert target.read_bytes() == first
+
+
+def test_a_folder_takes_the_frames(log_path: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "frames"
+    command = ["replay", str(log_path), "--movie", str(folder), "--speed", "24", "--from", "2"]
+    assert main([*command, "--to", "6"]) == 0
+    assert sorted(file.name for file in folder.iterdir()) == ["frame-0000.png", "frame-0001.png", "frame-0002.png"]
+    assert main([*command, "--to", "4", "--overwrite"]) == 0
+    assert len(list(folder.iterdir())) == 2
+    (folder / "mine.txt").write_text("kept", encoding="utf-8")
+    assert main([*command, "--to", "6"]) == 2
+    assert (folder / "mine.txt").exists()
+
+
+@pytest.mark.parametrize(
+    ("target", "more", "message"),
+    [
+        ("film.avi", (), ".gif, .mp4 or a folder is expected"),
+        ("film.mp4", (), "needs ffmpeg, which is not installed"),
+        ("none/film.gif", (), "does not exist"),
+        ("film.gif", ("--speed", "0.001"), "frames: at most 5,000; raise --speed"),
+        ("film.gif", ("--foxglove",), "one of them is expected"),
+        ("film.gif", ("--to", "127.0.0.1:9"), "one of them is expected"),
+    ],
+)
+def test_what_cannot_be_filmed(
+    target: str, more: tuple[str, ...], message: str, log_path: Path, tmp_path: Path,
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert main(["replay", str(log_path), "--movie", target, *more]) == 2
+    printed = capsys.readouterr().err.strip().splitlines()
+    assert message in printed[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_mp4_is_what_ffmpeg_makes_of_the_frames(
+    log: FlightLog, log_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program in ffmpeg's place keeps its arguments and its input."""
+    fake = tmp_path / "ffmpeg"
+    fake.write_text(
+        f"#!{sys.executable}\nimport json, pathlib, sys\n"
+        f"pathlib.Path({str(tmp_path / 'told.json')!r}).write_text(json.dumps(sys.argv[1:]))\n"
+        "pathlib.Path(sys.argv[-1]).write_bytes(sys.stdin.buffer.read())\n",
+        encoding="utf-8",
+    )
+    fake.chmod(fake.stat().st_mode | stat.S_IXUSR)
+    monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
+    target = tmp_path / "film.mp4"
+    assert main(["replay", str(log_path), "--movie", str(target), "--speed", "24"]) == 0
+    frames = list(MovieFrames(log.setup, log.track, 0.0, log.end_time, 24.0).frames())
+    assert target.read_bytes() == b"".join(frame.tobytes() for frame in frames)
+    told = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
+    assert f"{frames[0].shape[1]}x{frames[0].shape[0]}" in told
+    assert told[told.index("-r") + 1] == str(RATE)
+    fake.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('Unknown encoder')\n", encoding="utf-8")
+    assert main(["replay", str(log_path), "--movie", str(target), "--speed", "24", "--overwrite"]) == 1
+    assert "ffmpeg: status 1: Unknown encoder" in capsys.readouterr().err
+    assert target.stat().st_size > 1000

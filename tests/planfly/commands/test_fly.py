@@ -1,0 +1,73 @@
+"""``planfly fly``: its options, a thinner log, and a disk that is full."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from logs.recording.reader import read_log
+from planfly.cli import main
+
+ROOT = Path(__file__).parents[3]
+MISSIONS = Path(__file__).parents[2] / "flight" / "missions"
+
+
+def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    name = str(MISSIONS / "by_hand.waypoints")
+    log = tmp_path / "f.mcap"
+    assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
+    assert (read_log(log).setup.route.airspeed == 21.0).all()
+    capsys.readouterr()
+    for options, message in (
+        (["--aircraft", "boeing"], "flight.aircraft: no aircraft called 'boeing'"),
+        (["--airspeed", "70"], "airspeed_mps: 70"),
+        (["--airspeed", "28"], None),
+        (["--airspeed", "-3"], "a number above 0"),
+    ):
+        try:
+            code = main(["check", name, *options])
+        except SystemExit as stop:
+            code = int(str(stop.code))
+        printed = capsys.readouterr().err
+        assert (code == 2) == (message is not None)
+        assert message is None or message in printed
+    assert main(["check", str(log), "--airspeed", "20"]) == 2
+    assert "--airspeed: a log is judged" in capsys.readouterr().err
+
+
+def test_a_thinner_log_is_judged_as_it_is(flight: Path, tmp_path: Path) -> None:
+    log = tmp_path / "thin.mcap"
+    code = main(["fly", str(flight / "plan.json"), "--log", str(log), "--log-hz", "20"])
+    thin, full = read_log(log), read_log(flight / "flight.mcap")
+    assert len(thin.track) in (len(full.track) // 3 + 1, len(full.track) // 3 + 2)
+    assert thin.track.time[-1] == full.track.time[-1]
+    assert main(["check", str(log), "--json", str(tmp_path / "v.json")]) == code
+    assert json.loads((tmp_path / "v.json").read_text(encoding="utf-8")) == thin.recorded_verdict
+
+
+def test_a_full_disk_is_one_line_and_leaves_a_readable_log(flight: Path, tmp_path: Path) -> None:
+    log = tmp_path / "full.mcap"
+    most = (flight / "flight.mcap").stat().st_size // 2
+
+    def limit() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+
+    result = subprocess.run(
+        [sys.executable, "-m", "planfly", "fly", str(flight / "plan.json"), "--log", str(log)],
+        cwd=tmp_path, capture_output=True, text=True, check=False, preexec_fn=limit,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert result.returncode == 1, result.stderr
+    printed = [line for line in result.stderr.splitlines() if line.startswith("planfly: ")]
+    assert len(printed) == 1
+    assert str(log) in printed[0]
+    assert "Traceback" not in result.stderr
+    read = read_log(log)
+    assert not read.complete
+    full = read_log(flight / "flight.mcap").track
+    assert 10 < len(read.track) < len(full)
+    assert read.track.position.tobytes() == full.position[: len(read.track)].tobytes()

@@ -1,0 +1,63 @@
+"""``planfly replay``: instruments on a terminal, the timeline of a whole flight or a part elsewhere."""
+
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from planfly.cli import main
+
+ROOT = Path(__file__).parents[3]
+
+
+def on_a_terminal(*argv: str, cwd: Path) -> tuple[int, str]:
+    """Run planfly with its output on a pseudo-terminal: exit code and what it wrote."""
+    ours, theirs = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "planfly", *argv], cwd=cwd, stdout=theirs, stderr=subprocess.DEVNULL,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "90", "LINES": "40"},
+    )  # fmt: skip
+    os.close(theirs)
+    printed = b""
+    while True:
+        try:
+            data = os.read(ours, 65536)
+        except OSError:  # the other end has closed
+            break
+        if not data:
+            break
+        printed += data
+    os.close(ours)
+    return process.wait(), printed.decode()
+
+
+def test_replay_on_a_terminal_shows_instruments(flight: Path, tmp_path: Path) -> None:
+    log = flight / "flight.mcap"
+    code, printed = on_a_terminal("replay", str(log), "--speed", "40", "--from", "10", "--to", "50", cwd=tmp_path)
+    assert code == 0
+    assert printed.count("\x1b[H") >= 4
+    # The terminal is as it was, and the last moment stays on it.
+    assert printed.index("\x1b[?1049h") < printed.index("\x1b[H") < printed.index("\x1b[?25h\x1b[?1049l")
+    last = printed.rpartition("\x1b[?1049l")[2]
+    assert "\x1b" not in last
+    assert "50.0 of" in last
+    assert "airspeed" in last
+    code, printed = on_a_terminal("replay", str(log), "--at-once", cwd=tmp_path)
+    assert "\x1b" not in printed
+    assert "leg 0 to waypoint 1" in printed
+
+
+def test_a_part_is_printed_as_in_the_whole(flight: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = str(flight / "flight.mcap")
+    assert main(["replay", log]) == 0
+    whole = capsys.readouterr().out.splitlines()
+    assert main(["replay", log, "--from", "20", "--to", "60"]) == 0
+    part = capsys.readouterr().out.splitlines()
+    assert 0 < len(part) < len(whole)
+    first = whole.index(part[0])
+    assert whole[first : first + len(part)] == part
+    assert main(["replay", log, "--from", "60", "--to", "20"]) == 2
+    assert main(["replay", log, "--from", "5000"]) == 2

@@ -1,0 +1,43 @@
+"""Corners as flown: tangent arcs on one circle, and none where they cannot be flown."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from planner.evaluation.fly_by_corners import fly_by_radii, fly_by_vertices
+from planner.evaluation.problem import Problem
+
+
+@settings(max_examples=60)
+@given(st.floats(5, 140), st.floats(-0.2, 0.2), st.floats(-0.2, 0.2), st.booleans())
+def test_corner_arc(problem: Problem, degrees: float, slope_in: float, slope_out: float, left: bool) -> None:
+    """Tangent to both legs, on one circle, R(1/cos(theta/2) - 1) inside the corner, never above the path's crest."""
+    turn = math.radians(degrees) * (1 if left else -1)
+    before, at = np.array([-900.0, 0.0, 300.0 - 900.0 * slope_in]), np.array([0.0, 0.0, 300.0])
+    after = np.array([900.0 * math.cos(turn), 900.0 * math.sin(turn), 300.0 + 900.0 * slope_out])
+    radius = 110.0
+    vertices = fly_by_vertices(problem.search.aircraft, before, at, after, radius)
+    arc = vertices[1:-1]
+    tangent = radius * math.tan(abs(turn) / 2)
+    np.testing.assert_allclose(arc[0, :2], [-tangent, 0.0], atol=1e-9)
+    np.testing.assert_allclose(arc[-1, :2], tangent * np.array([math.cos(turn), math.sin(turn)]), atol=1e-9)
+    centre = np.array([-tangent, radius * (1 if left else -1)])
+    np.testing.assert_allclose(np.hypot(*(arc[:, :2] - centre).T), radius, atol=1e-9)
+    assert np.hypot(*centre) - radius == pytest.approx(radius * (1 / math.cos(turn / 2) - 1))
+    # Entry and exit lie on the legs.
+    for point, end in ((vertices[0], before), (vertices[-1], after)):
+        np.testing.assert_allclose(np.cross(point - at, end - at), 0.0, atol=1e-4)
+    if slope_in > 0.0 > slope_out:
+        assert arc[:, 2].max() <= 300.0 + 1e-9
+
+
+def test_no_arcs_where_a_number_alone_limits_turns_and_a_leg_is_short(problem: Problem) -> None:
+    path = np.array([[0, 0, 200], [1000, 0, 200], [1050, 120, 200], [1100, 0, 200], [3000, 0, 200]], dtype=np.float64)
+    loose = problem.search._replace(legs_hold_turns=False)
+    assert not fly_by_radii(loose, path).any()
+    path[2, 1], path[2, 0], path[3, 0] = 800.0, 1500.0, 2000.0
+    radius = 25.0**2 / (9.80665 * math.tan(math.radians(30)))
+    np.testing.assert_allclose(fly_by_radii(loose, path)[1:-1], radius, rtol=1e-6)

@@ -1,0 +1,37 @@
+"""The share of climb and descent that turbulence leaves to a plan."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from aircraft.path_limits import Limits
+from planner.evaluation.problem import ANGLE_MARGIN, TURBULENCE_SHARE, make_problem
+from planner.plan import Violation
+from tests.planner.evaluation.violations import violations_of
+from world.scenario import Scenario
+
+Make = Callable[[Scenario], Limits]
+Small = Callable[..., Scenario]
+
+
+@pytest.mark.parametrize(("turbulence", "count"), [("none", 0), ("light", 0), ("moderate", 1)])
+def test_turbulence_leaves_a_share_of_climb_and_descent(
+    make_limits: Make, small: Small, turbulence: str, count: int
+) -> None:
+    scenario = small(wind={"speed_mps": 0, "from_deg": 0, "turbulence": turbulence})
+    limits = make_limits(scenario)
+    data = make_problem(scenario, limits).search
+    assert TURBULENCE_SHARE == {"none": 1.0, "light": 0.9, "moderate": 0.8}
+    for way in (0, 1):
+        # 0.87 of the aircraft's own angle, and half a degree in reserve: within 0.9 of it, and not within 0.8.
+        steepest = limits.slopes(0.0, 200.0)[way]
+        rise = math.tan(0.87 * steepest - ANGLE_MARGIN) * (1.0 if way == 0 else -1.0)
+        path = np.array([[0.0, -2500.0, 200.0], [300.0, -2500.0, 200.0 + 300.0 * rise]])
+        assert violations_of(data, path, Violation.SLOPE)[0] == count
+        # Just within the share, and just beyond it.
+        for beyond, more in ((-1e-4, 0), (1e-4, 1)):
+            angle = TURBULENCE_SHARE[turbulence] * steepest - ANGLE_MARGIN + beyond
+            path = np.array([[0.0, -2500.0, 200.0], [1.0, -2500.0, 200.0 + math.copysign(math.tan(angle), rise)]])
+            assert violations_of(data, path, Violation.SLOPE)[0] == more

@@ -1,0 +1,59 @@
+"""What a search reports as it goes, and what ends it: a stop, a budget, a first safe path."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from planner.plan import parse_plan, plan_json
+from planner.search.plan_path import plan_path
+from world.errors import ScenarioError
+from world.scenario import Scenario
+from world.scenario_variants import with_planner
+
+Floats = NDArray[np.float64]
+
+
+def test_better_paths_are_reported_as_they_are_found(scenario: Scenario, limits: Limits) -> None:
+    seen: list[Floats] = []
+    plan = plan_path(scenario, limits, seed=4, improved=seen.append)
+    lengths = [float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) for path in seen]
+    assert len(seen) > 1
+    # All are out of reach here, so that the shortest is the best.
+    assert lengths == sorted(lengths, reverse=True)
+    np.testing.assert_array_equal(seen[-1], plan.waypoints)
+    np.testing.assert_array_equal(plan_path(scenario, limits, seed=4).waypoints, plan.waypoints)
+
+
+def test_stop_ends_a_search_with_the_best_plan_yet(scenario: Scenario, limits: Limits) -> None:
+    plan = plan_path(scenario, limits, seed=1, stop=lambda: "interrupted")
+    assert plan.ended == "interrupted"
+    assert plan.safe
+    assert plan.evaluations < 1000
+    assert '"ended": "interrupted"' in plan_json(plan)
+    assert parse_plan(plan_json(plan), "plan.json").ended == "interrupted"
+
+
+def test_budget_in_evaluations_is_kept(scenario: Scenario, limits: Limits) -> None:
+    for budget in (60, 700):
+        plan = plan_path(with_planner(scenario, "--budget", budget=budget), limits, seed=1)
+        assert plan.evaluations <= budget + 60
+        assert plan.ended == "budget"
+    with pytest.raises(ScenarioError, match="--budget: budget: 3"):
+        with_planner(scenario, "--budget", budget=3)
+
+
+def test_first_safe_path_comes_before_the_best(scenario: Scenario, limits: Limits) -> None:
+    first = plan_path(scenario, limits, seed=1, first_safe=True)
+    whole = plan_path(scenario, limits, seed=1)
+    assert first.safe
+    assert first.evaluations < whole.evaluations
+    assert whole.objectives[0] <= first.objectives[0]
+
+
+def test_budget_ends_a_search(make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]) -> None:
+    scenario = small(planner={"waypoints": 8, "population": 40, "generations": 100, "budget": 150, "algorithm": "umda"})
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert 150 <= plan.evaluations < 190

@@ -1,0 +1,178 @@
+"""The rules of the house: imports run down, rooms are small, kernels name their data, ``--help`` is quick."""
+
+import ast
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import planfly
+from planfly.cli import main
+from planfly.commands.registry import COMMANDS
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
+CODE = sorted(file for folder in (*PACKAGES, "tests", "examples") for file in (ROOT / folder).rglob("*.py"))
+OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
+MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60
+KERNELS = {"compiled", "compiled_views", "inlined"}
+# Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
+LEANING = ("Do the" + " same", "the design" + " document", "the" + " issue")
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef
+
+
+@cache
+def parsed(file: Path) -> ast.Module:
+    return ast.parse(file.read_text(encoding="utf-8"))
+
+
+def name_of(file: Path) -> str:
+    return file.relative_to(ROOT).as_posix()
+
+
+def functions(file: Path) -> Iterator[Function]:
+    return (node for node in ast.walk(parsed(file)) if isinstance(node, Function))
+
+
+def is_kernel(function: Function) -> bool:
+    """Whether numba compiles it."""
+    for decorator in function.decorator_list:
+        called = decorator.func if isinstance(decorator, ast.Call) else decorator
+        if isinstance(called, ast.Name) and called.id in KERNELS:
+            return True
+    return False
+
+
+def columns(function: Function) -> Iterator[str]:
+    """Subscripts that stand for a name: a constant from 3 on, or two constants."""
+    for node in ast.walk(function):
+        if isinstance(node, ast.Subscript):
+            parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+            numbers = [part.value for part in parts if isinstance(part, ast.Constant) and isinstance(part.value, int)]
+            if any(number >= 3 for number in numbers) or len(numbers) >= 2:
+                yield ast.unparse(node)
+
+
+def imported_across() -> set[tuple[str, str]]:
+    """Module and name of what one of our packages imports from another."""
+    found = set()
+    for file in OURS:
+        for node in ast.walk(parsed(file)):
+            if isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+                home = node.module.partition(".")[0]
+                if home in PACKAGES and home != file.relative_to(ROOT).parts[0]:
+                    found |= {(node.module, alias.name) for alias in node.names}
+    return found
+
+
+def test_the_import_contracts_hold() -> None:
+    result = subprocess.run(
+        [Path(sys.executable).with_name("lint-imports"), "--no-cache"],
+        cwd=ROOT, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "0 broken" in result.stdout
+
+
+def test_help_answers_in_half_a_second() -> None:
+    spent = []
+    for _ in range(3):
+        started = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "planfly", "--help"], check=True, capture_output=True, cwd=ROOT)
+        spent.append(time.perf_counter() - started)
+    assert min(spent) < 0.5
+
+
+def test_help_imports_nothing_heavy() -> None:
+    code = (
+        "import sys, contextlib, io\nfrom planfly.cli import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n    main(['--help'])\n"
+        "print([name for name in ('numpy', 'numba', 'jsbsim', 'matplotlib', 'pydantic') if name in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT)
+    assert result.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as stopped:
+        main([command, "--help"])
+    assert stopped.value.code == 0
+    text = capsys.readouterr().out
+    assert f"example: planfly {command}" in text
+    assert "exit codes" in text
+
+
+def test_package_inits_hold_a_docstring_only() -> None:
+    for package in ("logs", "flight", "planner", "world", "aircraft"):
+        text = (ROOT / package / "__init__.py").read_text(encoding="utf-8")
+        assert text.startswith('"""')
+        assert text.count("\n") <= 3
+        assert "import" not in text.split('"""')[2]
+
+
+def test_modules_stand_in_rooms() -> None:
+    outside = {name_of(file) for package in ("logs", "flight", "planner") for file in (ROOT / package).glob("*.py")}
+    assert outside == {"logs/__init__.py", "flight/__init__.py", "planner/__init__.py", "planner/plan.py"}
+
+
+def test_no_room_holds_more_than_twenty_files() -> None:
+    rooms = {file.parent for file in CODE}
+    sizes = {name_of(room): sum(file.parent == room for file in CODE) for room in rooms}
+    assert {room: size for room, size in sizes.items() if size > MOST_FILES} == {}
+
+
+def test_no_file_is_longer_than_320_lines() -> None:
+    lengths = {name_of(file): file.read_text(encoding="utf-8").count("\n") for file in CODE}
+    assert {file: length for file, length in lengths.items() if length > MOST_LINES} == {}
+
+
+def test_no_function_is_longer_than_60_lines() -> None:
+    lengths = {
+        f"{name_of(file)}:{function.name}": (function.end_lineno or 0) - function.lineno + 1
+        for file in CODE
+        for function in functions(file)
+    }
+    assert {function: length for function, length in lengths.items() if length > LONGEST} == {}
+
+
+def test_kernels_name_what_they_read() -> None:
+    """Coordinates 0, 1 and 2 of a row are what they are; a column from 3 on is a field that has a name."""
+    numbered = [
+        f"{name_of(file)}:{function.name}: {column}"
+        for file in OURS
+        for function in functions(file)
+        if is_kernel(function)
+        for column in columns(function)
+    ]
+    assert numbered == []
+
+
+def test_docstrings_and_comments_lean_on_no_other_text() -> None:
+    leaning = [
+        f"{name_of(file)}: {phrase}"
+        for file in CODE
+        for phrase in LEANING
+        if re.search(rf"\b{phrase}\b", file.read_text(encoding="utf-8"))
+    ]
+    assert leaning == []
+
+
+def test_every_public_function_has_an_example() -> None:
+    """Public: imported by another of our packages, or named in `planfly.__all__`; kernels are called by kernels."""
+    public = imported_across() | {("planfly.pipeline", name) for name in planfly.__all__}
+    bare = [
+        f"{module}.{node.name}"
+        for file in OURS
+        for node in parsed(file).body
+        for module in [name_of(file).removesuffix(".py").removesuffix("/__init__").replace("/", ".")]
+        if isinstance(node, ast.FunctionDef) and (module, node.name) in public and not is_kernel(node)
+        if ">>> " not in (ast.get_docstring(node) or "")
+    ]
+    assert bare == []
