@@ -1,4 +1,4 @@
-"""Numba kernels, compiled once per version of the sources.
+"""Numba kernels, compiled once per version of the sources, and the records that they work on.
 
 Numba's own cache looks at the file a kernel stands in, not at the kernels and constants that it takes from other
 files: after an edit or an upgrade of those it would go on running old code.  Here the cache lies in the user's
@@ -6,16 +6,17 @@ cache folder under a hash of all sources that kernels are made of, so that any c
 """
 
 import hashlib
-import importlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numba
+import numpy as np
 from platformdirs import user_cache_dir
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
-_Result = TypeVar("_Result")
+# A record of named fields, as `record_dtype` makes: mypy cannot know which.
+Record: TypeAlias = Any
 _ROOMS = ("aircraft", "world", "planner", "flight", "logs")
 
 
@@ -36,61 +37,66 @@ if not _settings.CACHE_DIR:
     _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / f"kernels-{_sources_hash()}")
 
 
-def _load_array_functions() -> None:
-    """Load numba's array functions without asking, as they do when loaded, whether SciPy's linear algebra is there.
-
-    Numba needs them before it reads the first kernel from its cache.  That question costs a new process 0.15 s and has
-    one answer: SciPy is a dependency.  Kernels that do call linear algebra ask again.
-    """
-    linalg: Any = importlib.import_module("numba.np.linalg")
-    ask = getattr(linalg, "ensure_blas", None)
-    if ask is None:  # another numba, which loads them in its own way
-        return
-    linalg.ensure_blas = lambda: None
-    try:
-        arraymath: Any = importlib.import_module("numba.np.arraymath")
-    finally:
-        linalg.ensure_blas = ask
-    arraymath.ensure_blas = ask
-
-
-_load_array_functions()
-
-
 def compiled(kernel: _Kernel) -> _Kernel:
-    """Compile a function of numbers and arrays to machine code on first use, and keep it.
+    """Compile a function of numbers, arrays and records to machine code on first use, and keep it.
 
     A division by zero gives infinity or NaN, as in numpy: looking for it costs a tenth of the guidance's time.
+
+    A function has to stand in a file, as `world.terrain.steepest_slopes` does:
+
+    >>> from world.terrain import steepest_slopes
+    >>> steepest_slopes(np.array([[0.0, 3.0], [0.0, 3.0]], dtype=np.float32), 1.0).round(3)
+    array([[3.]], dtype=float32)
     """
     return cast("_Kernel", numba.njit(cache=True, error_model="numpy")(kernel))
 
 
 def inlined(kernel: _Kernel) -> _Kernel:
-    """Do the same with a small function that is to be copied into those that call it in their inner loops.
+    """Compile a small function that is to be copied into the kernels that call it in their inner loops.
 
-    A call hands over seven numbers an array: more than many a kernel's own work.  It may make what `compiled_views`
-    may.
+    A call hands over seven numbers an array: more than many a kernel's own work.  The function makes no arrays but
+    views of its arguments, and returns none.
+
+    >>> from world.geometry import wrap
+    >>> round(wrap(4.0), 6)
+    -2.283185
     """
     njit: Any = numba.njit  # its types leave this option out
     return cast("_Kernel", njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(kernel))
 
 
 def compiled_views(kernel: _Kernel) -> _Kernel:
-    """Do the same with a function that makes no arrays but views of its arguments, and returns none.
+    """Compile a function that makes no arrays but views of its arguments, and returns none.
 
     It does not count references to them, which takes longer than a hundred sums.
+
+    >>> from world.geometry import turning_angle
+    >>> round(turning_angle(0.0, 0.0, 0.0, 1.0, 1.0, 1.0), 6)
+    1.570796
     """
     njit: Any = numba.njit  # its types leave this option out
     return cast("_Kernel", njit(cache=True, error_model="numpy", _nrt=False)(kernel))
 
 
-def entry(kernel: Callable[..., _Result], *arguments: object) -> Callable[..., _Result]:
-    """Give a kernel's machine code for arguments of these types, without the dispatcher that looks at every call's.
+def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
+    """Type of a record whose fields are read and set as attributes, in Python and in compiled code.
 
-    It takes arguments of just these types, and checks none: for a loop that always passes the same arrays.
+    entries: in order: the name of a number (float64), or (name, type) or (name, type, shape) as numpy has them.
+
+    >>> POINT = record_dtype("east", "north", ("leg", np.int64), ("velocity", np.float64, (3,)))
+    >>> points = np.zeros(2, POINT)
+    >>> points[1].north = 4.0
+    >>> points["north"]
+    array([0., 4.])
+    >>> points[1].leg += 1
+    >>> points[1].tolist()[:3]
+    (0.0, 4.0, 1)
     """
-    dispatcher: Any = kernel
-    typeof: Any = numba.typeof
-    signature = tuple(typeof(argument) for argument in arguments)
-    dispatcher.compile(signature)
-    return cast("Callable[..., _Result]", dispatcher.overloads[signature].entry_point)
+    made = [(entry, np.float64) if isinstance(entry, str) else entry for entry in entries]
+    dtype: Any = np.dtype((np.record, np.dtype(made, align=True)))
+    return cast("np.dtype[np.record]", dtype)
+
+
+def field_names(dtype: np.dtype[np.record]) -> tuple[str, ...]:
+    """Names of a record's fields, in order."""
+    return dtype.names or ()

@@ -8,15 +8,15 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.state import STATE_SIZE, C, S
+from flight.dynamics.state import STATE
 from flight.dynamics.trim import Trim, linearise, straight
 
 Floats = NDArray[np.float64]
 
-# Height of the portrait, m above sea level.
+# Height of all measurements, m above sea level.
 AMSL = 500.0
-# Course of the steps and place of all measurements: due north at 45 degrees latitude.
-_PLACE = (45.0, 0.0)
+# Latitude and longitude of all measurements, degrees; steps are flown due north from there.
+_POSITION = (45.0, 0.0)
 _RATE_HZ = 120.0
 _STEP_AT = 1.0
 # Columns of the longitudinal states in (u, v, w, p, q, r, roll, pitch); the other half is lateral.
@@ -25,9 +25,11 @@ _LONGITUDINAL = np.array([True, False, True, False, True, False, False, True])
 
 @dataclass(frozen=True, slots=True)
 class TrimRow:
-    """Level flight: its trim, the power it takes (W, from the battery or as heat of fuel) and how long that lasts (s).
+    """Level flight at one airspeed.
 
-    endurance counts 80 % of the battery or the fuel; NaN where no power is used.
+    trim: its controls and attitude.
+    power: W, from the battery or as heat of fuel.
+    endurance: how long 80 % of the battery or the fuel lasts, s; NaN where no power is used.
     """
 
     trim: Trim
@@ -62,36 +64,56 @@ class Mode:
 class StepResponse:
     """The answer to one control, from level flight at cruise.
 
-    control: which.  size: by how much it moved (rad, or of full throttle).  held: s; infinite for a step that stays.
-    time: (t,) s.  change: (t, k) of the state rows `rows` from the trim, SI and radians.
+    control: a field of `flight.dynamics.state.Commands`.
+    size: by how much it moved, rad, or of full throttle.
+    held: for how long, s; infinite for a step that stays.
+    time: (t,) s.
+    quantities: the k fields of `flight.dynamics.state.STATE` that are shown.
+    change: (t, k) of these quantities from the trim, SI and radians.
     """
 
-    control: C
+    control: str
     size: float
     held: float
     time: Floats
-    rows: tuple[S, ...]
+    quantities: tuple[str, ...]
     change: Floats
 
 
 def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
-    """Level flight over the speeds that guidance may use, where there is a trim."""
+    """Level flight over the speeds that guidance may use, evenly spaced, where there is a trim.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> slow, fast = trim_table(load_aircraft("aerosonde"), 2)
+    >>> slow.trim.airspeed, fast.trim.airspeed
+    (18.0, 31.0)
+    >>> print(f"{slow.power:.0f} W for {slow.endurance / 3600:.1f} hours, or {fast.power:.0f} W")
+    190 W for 3.7 hours, or 622 W
+    """
     fdm = Fdm(aircraft)
     rows = []
-    state = np.zeros(STATE_SIZE)
     for airspeed in np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, count):
         found = straight(fdm, float(airspeed), AMSL)
         if found is None:
             continue
         fdm.balance(found.vector())
-        fdm.read(state)
-        power = float(state[S.POWER])
+        power = float(fdm.read().power)
         rows.append(TrimRow(found, power, 0.8 * aircraft.battery_energy / power if power > 0.0 else math.nan))
     return tuple(rows)
 
 
 def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = AMSL) -> tuple[Mode, ...]:
-    """The named modes of level flight at this airspeed (m/s) and height (m), empty where there is no such flight."""
+    """The named modes of level flight at this airspeed (m/s) and height (m), empty where there is no such flight.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> for mode in modes_at(load_aircraft("aerosonde"), 25.0):
+    ...     print(f"{mode.name}: {mode.root:.3g}")
+    short period: -4.51+9.48j
+    phugoid: -0.132+0.484j
+    Dutch roll: -1.07+4.48j
+    roll: -20.6+0j
+    spiral: 0.0917+0j
+    """
     fdm = Fdm(aircraft)
     found = straight(fdm, airspeed, amsl)
     return () if found is None else name_modes(linearise(fdm, found)[0], airspeed)
@@ -127,38 +149,47 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     Each moves by a tenth of its travel: less would be lost in the play of some models' actuators.  Elevator (up) and
     throttle (down where there is not that much left) stay; aileron and rudder come back after a second, because no
     aircraft stays upright with them held.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> for step in step_responses(load_aircraft("aerosonde")):
+    ...     most = abs(step.change[:, 0]).max()
+    ...     print(f"{step.control} {step.size:+.3f}: {step.quantities[0]} by up to {most:.2f} rad")
+    elevator -0.052: pitch by up to 0.15 rad
+    throttle +0.100: pitch by up to 0.13 rad
+    aileron +0.052: roll by up to 0.87 rad
+    rudder +0.052: roll by up to 0.49 rad
     """
     elevator, aileron, rudder = (
         0.1 * most for most in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
     level = straight(Fdm(aircraft), aircraft.airspeed, AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
+    along, across = ("pitch", "alpha", "airspeed", "amsl"), ("roll", "roll_rate", "beta", "yaw")
     return (
-        _respond(aircraft, C.ELEVATOR, -elevator, math.inf, 20.0, (S.PITCH, S.ALPHA, S.AIRSPEED, S.AMSL)),
-        _respond(aircraft, C.THROTTLE, throttle, math.inf, 20.0, (S.PITCH, S.ALPHA, S.AIRSPEED, S.AMSL)),
-        _respond(aircraft, C.AILERON, aileron, 1.0, 15.0, (S.ROLL, S.P, S.BETA, S.YAW)),
-        _respond(aircraft, C.RUDDER, rudder, 1.0, 15.0, (S.ROLL, S.R, S.BETA, S.YAW)),
+        _respond(aircraft, "elevator", -elevator, math.inf, 20.0, along),
+        _respond(aircraft, "throttle", throttle, math.inf, 20.0, along),
+        _respond(aircraft, "aileron", aileron, 1.0, 15.0, across),
+        _respond(aircraft, "rudder", rudder, 1.0, 15.0, ("roll", "yaw_rate", "beta", "yaw")),
     )
 
 
 def _respond(
-    aircraft: Aircraft, control: C, size: float, held: float, seconds: float, rows: tuple[S, ...]
+    aircraft: Aircraft, control: str, size: float, held: float, seconds: float, quantities: tuple[str, ...]
 ) -> StepResponse:
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
-    commands = fdm.start(*_PLACE, AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
+    commands = fdm.start(*_POSITION, AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
+    moved = commands._replace(**{control: getattr(commands, control) + size})
     count = round(seconds * _RATE_HZ)
-    states = np.zeros((count + 1, STATE_SIZE))
-    fdm.read(states[0])
+    states = np.zeros(count + 1, STATE)
+    states[0] = fdm.read()
     for k in range(count):
-        time = k / _RATE_HZ
-        moved = commands.copy()
-        moved[control] += size if _STEP_AT <= time < _STEP_AT + held else 0.0
-        fdm.write(moved)
+        fdm.write(moved if _STEP_AT <= k / _RATE_HZ < _STEP_AT + held else commands)
         fdm.step()
-        fdm.read(states[k + 1])
-    columns = np.array(rows)
-    change = states[:, columns] - states[0, columns]
-    if S.YAW in rows:
-        yaw = rows.index(S.YAW)
-        change[:, yaw] = np.unwrap(states[:, S.YAW]) - states[0, S.YAW]
-    return StepResponse(control, size, held, states[:, S.TIME].copy(), rows, change)
+        states[k + 1] = fdm.read()
+    change = np.column_stack([_unwrapped(states, name) - states[name][0] for name in quantities])
+    return StepResponse(control, size, held, states["time"].copy(), quantities, change)
+
+
+def _unwrapped(states: NDArray[np.record], name: str) -> Floats:
+    values: Floats = states[name]
+    return np.unwrap(values) if name == "yaw" else values

@@ -12,7 +12,6 @@ from platformdirs import user_cache_dir
 from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
-from flight.dynamics.state import STATE_SIZE, S
 from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
 from world.atomic_files import write_whole
 
@@ -29,6 +28,11 @@ def load_envelope(aircraft: Aircraft, *, motor_braking: bool = False) -> Envelop
     Both are equal to the last bit.  A cache file that cannot be read, is damaged or is for another model, JSBSim or
     schema is computed anew; a cache folder that cannot be written to is left alone.
     Raises FlightError for a model that JSBSim cannot load.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> climb, descent = load_envelope(load_aircraft("aerosonde")).air_angles(25.0, 500.0)
+    >>> print(f"{math.degrees(climb):.1f} degrees up, {math.degrees(descent):.1f} down")
+    13.6 degrees up, 7.7 down
     """
     file = cache_file(aircraft, motor_braking)
     key = _key(aircraft, motor_braking)
@@ -97,10 +101,8 @@ def compute_tables(aircraft: Aircraft, motor_braking: bool) -> dict[str, Floats]
 
 def _power(fdm: Fdm, at: Trim) -> float:
     """Power of a trim, W."""
-    state = np.zeros(STATE_SIZE)
     fdm.balance(at.vector())
-    fdm.read(state)
-    return float(state[S.POWER])
+    return float(fdm.read().power)
 
 
 def _airspeeds(aircraft: Aircraft) -> Floats:
@@ -119,7 +121,7 @@ def _key(aircraft: Aircraft, motor_braking: bool) -> dict[str, Any]:
 
 
 def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Floats] | None:
-    """Return the tables of a cache file, or None if it is not whole, sound and for this key."""
+    """Return the tables of a cache file, or None if it is not whole, undamaged and for this key."""
     try:
         content = json.loads(file.read_text(encoding="utf-8"))
         if {name: content[name] for name in key} != key:
@@ -138,7 +140,7 @@ def _read(file: Path, key: dict[str, Any], airspeeds: Floats) -> dict[str, Float
 
 
 def _write(file: Path, key: dict[str, Any], tables: dict[str, Floats]) -> None:
-    """Write a cache file whole or not at all; without room or permission, do nothing."""
+    """Write a cache file whole or not at all; without disk space or permission, do nothing."""
     values: dict[str, object] = {}
     for name, table in tables.items():
         entries = table.astype(object)

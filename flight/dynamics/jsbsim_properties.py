@@ -2,41 +2,39 @@
 
 import numpy as np
 
-from flight.dynamics.state import S
-
 FOOT = 0.3048
 SLUG_FT3 = 515.3788183931961  # kg/m^3 in one slug/ft^3
 POUND = 0.45359237
 
-# The property behind each row of the state that is the same for all models, and its factor to SI.
-STATE = {
-    S.TIME: ("simulation/sim-time-sec", 1.0),
-    S.LATITUDE: ("position/lat-geod-rad", 1.0),
-    S.LONGITUDE: ("position/long-gc-rad", 1.0),
+# The property behind each field of the state that is the same for all models, and its factor to SI.
+STATE_PROPERTIES = {
+    "time": ("simulation/sim-time-sec", 1.0),
+    "latitude": ("position/lat-geod-rad", 1.0),
+    "longitude": ("position/long-gc-rad", 1.0),
     # Above the ellipsoid along its radius: within 3 cm of the geodetic height up to 4000 m.
-    S.AMSL: ("position/h-sl-ft", FOOT),
-    S.V_NORTH: ("velocities/v-north-fps", FOOT),
-    S.V_EAST: ("velocities/v-east-fps", FOOT),
-    S.V_DOWN: ("velocities/v-down-fps", FOOT),
-    S.ROLL: ("attitude/phi-rad", 1.0),
-    S.PITCH: ("attitude/theta-rad", 1.0),
-    S.YAW: ("attitude/psi-rad", 1.0),
-    S.P: ("velocities/p-rad_sec", 1.0),
-    S.Q: ("velocities/q-rad_sec", 1.0),
-    S.R: ("velocities/r-rad_sec", 1.0),
-    S.AIRSPEED: ("velocities/vt-fps", FOOT),
-    S.ALPHA: ("aero/alpha-rad", 1.0),
-    S.BETA: ("aero/beta-rad", 1.0),
-    S.ACCEL_N: ("accelerations/Nz", 1.0),
-    S.WIND_NORTH: ("atmosphere/total-wind-north-fps", FOOT),
-    S.WIND_EAST: ("atmosphere/total-wind-east-fps", FOOT),
-    S.WIND_DOWN: ("atmosphere/total-wind-down-fps", FOOT),
+    "amsl": ("position/h-sl-ft", FOOT),
+    "velocity_north": ("velocities/v-north-fps", FOOT),
+    "velocity_east": ("velocities/v-east-fps", FOOT),
+    "velocity_down": ("velocities/v-down-fps", FOOT),
+    "roll": ("attitude/phi-rad", 1.0),
+    "pitch": ("attitude/theta-rad", 1.0),
+    "yaw": ("attitude/psi-rad", 1.0),
+    "roll_rate": ("velocities/p-rad_sec", 1.0),
+    "pitch_rate": ("velocities/q-rad_sec", 1.0),
+    "yaw_rate": ("velocities/r-rad_sec", 1.0),
+    "airspeed": ("velocities/vt-fps", FOOT),
+    "alpha": ("aero/alpha-rad", 1.0),
+    "beta": ("aero/beta-rad", 1.0),
+    "load_factor": ("accelerations/Nz", 1.0),
+    "wind_north": ("atmosphere/total-wind-north-fps", FOOT),
+    "wind_east": ("atmosphere/total-wind-east-fps", FOOT),
+    "wind_down": ("atmosphere/total-wind-down-fps", FOOT),
 }
-# The rows that each model has properties of its own for, in the order of `aircraft.jsbsim_model.Model.readings`.
-OWN = (S.ELEVATOR, S.AILERON, S.RUDDER, S.THROTTLE, S.CURRENT, S.POWER)
+# The fields that each model has properties of its own for, in the order of `aircraft.jsbsim_model.Model.readings`.
+MODEL_FIELDS = ("elevator", "aileron", "rudder", "throttle", "current", "power")
 WIND = tuple(f"atmosphere/wind-{axis}-fps" for axis in ("north", "east", "down"))
 GUST = tuple(f"atmosphere/gust-{axis}-fps" for axis in ("north", "east", "down"))
-IC_PLACE = ("ic/lat-geod-deg", "ic/long-gc-deg", "ic/terrain-elevation-ft", "ic/h-sl-ft")
+IC_POSITION = ("ic/lat-geod-deg", "ic/long-gc-deg", "ic/terrain-elevation-ft", "ic/h-sl-ft")
 IC_MOTION = (
     *("ic/phi-rad", "ic/theta-rad", "ic/psi-true-rad"),
     *("ic/vn-fps", "ic/ve-fps", "ic/vd-fps"),

@@ -128,7 +128,7 @@ def check_model(
 
     provided: whether JSBSim itself has a property of this name before a model is loaded.  folders: where the files that
     the model brings in may stand.  shipped: the model is JSBSim's own: its channels are cut out, and its names
-    are known to be sound.
+    are known to be good.
     Raises FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
     declaration, for an ``<input>`` or ``<output>`` channel, for a file brought in that is not in the folders, and for a
     property that is read and that neither JSBSim nor the model makes.

@@ -19,7 +19,7 @@ from flight.dynamics.fdm import Fdm
 from world.errors import FlightError
 try:
     fdm = Fdm(read_aircraft(Path(sys.argv[1])), tried=True)
-    fdm.place(500.0)
+    fdm.move_to(500.0)
     fdm.balance(fdm.first_guess())
     fdm.step(10)
     del fdm
@@ -31,8 +31,8 @@ except FlightError:
 def try_model(aircraft: Aircraft) -> None:
     """Load and step a model in another process, once for each version of it.
 
-    Raises FlightError where that process dies.  Where it only refuses the model, nothing is said: loading it here will
-    refuse it again, with the reason.
+    Raises FlightError where that process dies.  Where it only refuses the model, nothing is raised:
+    loading it here will refuse it again, with the reason.
     """
     code = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:

@@ -1,47 +1,52 @@
-"""The packed arrays that pass between JSBSim and the guidance core: one index a quantity, SI and radians."""
+"""What passes between JSBSim and the guidance core: the aircraft's state and its commands, SI and radians."""
 
-from enum import IntEnum
+from typing import NamedTuple
 
+from world.kernels import record_dtype
 
-class S(IntEnum):
-    """Rows of the state array, written by `flight.dynamics.fdm.Fdm.read`."""
-
-    TIME = 0  # s since the start
-    LATITUDE = 1  # rad, geodetic
-    LONGITUDE = 2  # rad
-    AMSL = 3  # m
-    V_NORTH = 4  # m/s over the ground
-    V_EAST = 5
-    V_DOWN = 6
-    ROLL = 7  # rad
-    PITCH = 8
-    YAW = 9  # rad clockwise from true north
-    P = 10  # rad/s, body rates
-    Q = 11
-    R = 12
-    AIRSPEED = 13  # m/s, true
-    ALPHA = 14  # rad
-    BETA = 15
-    ELEVATOR = 16  # rad, the surface after its actuator, trailing edge down positive
-    AILERON = 17
-    RUDDER = 18
-    THROTTLE = 19  # 0..1, after the motor's lag
-    CURRENT = 20  # A from the battery
-    POWER = 21  # W from the battery
-    ACCEL_N = 22  # normal load factor, g, 1 in level flight
-    WIND_NORTH = 23  # m/s, total with gusts, the way the air moves
-    WIND_EAST = 24
-    WIND_DOWN = 25
-
-
-class C(IntEnum):
-    """Rows of the command array, read by `flight.dynamics.fdm.Fdm.write`."""
-
-    ELEVATOR = 0  # rad
-    AILERON = 1
-    RUDDER = 2
-    THROTTLE = 3  # 0..1
+# The state that `flight.dynamics.fdm.Fdm.read` gives.
+STATE = record_dtype(
+    "latitude",  # rad, geodetic
+    "longitude",  # rad
+    "amsl",  # m
+    "velocity_north",  # m/s over the ground
+    "velocity_east",
+    "velocity_down",
+    "roll",  # rad
+    "pitch",
+    "yaw",  # rad clockwise from true north
+    "roll_rate",  # rad/s, about the body's axes
+    "pitch_rate",
+    "yaw_rate",
+    "airspeed",  # m/s, true
+    "alpha",  # rad
+    "beta",
+    "elevator",  # rad, the surface after its actuator, trailing edge down positive
+    "aileron",
+    "rudder",
+    "throttle",  # 0..1, after the motor's lag
+    "current",  # A from the battery
+    "power",  # W from the battery
+    "load_factor",  # g, normal to the wing, 1 in level flight
+    "time",  # s since the start
+    "wind_north",  # m/s, total with gusts, the way the air moves
+    "wind_east",
+    "wind_down",
+)
 
 
-STATE_SIZE = len(S)
-COMMAND_SIZE = len(C)
+class Commands(NamedTuple):
+    """The four commands that `flight.dynamics.fdm.Fdm.write` sets.
+
+    elevator, aileron, rudder: rad, positive with the trailing edge down, to roll right, to yaw left.
+    throttle: 0..1.
+    """
+
+    elevator: float
+    aileron: float
+    rudder: float
+    throttle: float
+
+
+# The same for compiled code.
+COMMANDS = record_dtype(*Commands._fields)

@@ -1,43 +1,37 @@
 """Steady straight flight: the controls and attitude at which nothing accelerates, and the dynamics about it.
 
-A trim has eight quantities, `T`.  Two are held and Newton's method finds the other six, so that the six body
+A trim has eight quantities, `QUANTITIES`.  Two are held and Newton's method finds the other six, so that the six body
 accelerations vanish.  Speeds and angles are relative to the air mass.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from enum import IntEnum
-from typing import Protocol
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.dynamics.state import COMMAND_SIZE, C
+from flight.dynamics.state import Commands
 from world.errors import FlightError
 
 Floats = NDArray[np.float64]
 
 
-class T(IntEnum):
-    """Rows of a trim vector, SI and radians."""
-
-    AIRSPEED = 0
-    CLIMB = 1  # flight-path angle to the air mass
-    ALPHA = 2
-    BANK = 3  # about the velocity; sideslip is zero
-    ELEVATOR = 4
-    AILERON = 5
-    RUDDER = 6
-    THROTTLE = 7
-
-
+# Of a trim vector (8,), in this order, SI and radians: climb is the flight-path angle to the air mass, bank turns about
+# the velocity; sideslip is zero.
+Quantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 # Of the order of one step of Newton's method; also the scale of the finite differences.
 _STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
 _DIFFERENCE = 1e-5
-START = np.array([25.0, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 _CONVERGED = 1e-8  # m/s^2 and rad/s^2
 _ITERATIONS = 40
+
+
+def first_guess(airspeed: float) -> Floats:
+    """(8,) a trim vector near level flight at an airspeed (m/s)."""
+    return np.array([airspeed, 0.0, 0.06, 0.0, -0.15, 0.0, 0.0, 0.8])
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,35 +52,19 @@ class Trim:
     rudder: float
     throttle: float
 
-    def commands(self) -> Floats:
-        """(4,) commands that hold it, in the order of `flight.dynamics.state.C`."""
-        commands = np.empty(COMMAND_SIZE)
-        commands[C.ELEVATOR] = self.elevator
-        commands[C.AILERON] = self.aileron
-        commands[C.RUDDER] = self.rudder
-        commands[C.THROTTLE] = self.throttle
-        return commands
+    def commands(self) -> Commands:
+        """The commands that hold it."""
+        return Commands(self.elevator, self.aileron, self.rudder, self.throttle)
 
     def vector(self) -> Floats:
-        """(8,) the trim vector, in the order of `T`."""
-        return np.array(
-            [
-                self.airspeed,
-                self.climb,
-                self.alpha,
-                self.bank,
-                self.elevator,
-                self.aileron,
-                self.rudder,
-                self.throttle,
-            ]
-        )
+        """(8,) its trim vector, in the order of `QUANTITIES`."""
+        return np.array([getattr(self, quantity) for quantity in QUANTITIES])
 
 
 class Simulator(Protocol):
     """What a trim needs of a flight-dynamics model; `flight.dynamics.fdm.Fdm` has it."""
 
-    def place(self, amsl: float) -> None:
+    def move_to(self, amsl: float) -> None:
         """Move the point of evaluation to this height."""
 
     def balance(self, values: Floats) -> Floats:
@@ -104,7 +82,7 @@ class Simulator(Protocol):
 
 def solve(
     balance: Callable[[Floats], Floats],
-    held: dict[T, float],
+    held: Mapping[Quantity, float],
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
@@ -113,10 +91,10 @@ def solve(
     balance: trim vector -> (6,) accelerations.  limits: of elevator, aileron, rudder.  start: (8,) first guess.
     Newton's method with one-sided differences; a step is cut to `_STEP` and halved while it makes things worse.
     """
-    values = (START if start is None else start).copy()
-    for row, value in held.items():
-        values[row] = value
-    free = np.array([row for row in T if row not in held])
+    values = (first_guess(25.0) if start is None else start).copy()
+    for quantity, value in held.items():
+        values[QUANTITIES.index(quantity)] = value
+    free = np.array([k for k, quantity in enumerate(QUANTITIES) if quantity not in held])
     lowest, highest = _bounds(limits)
     residual = balance(values)
     for _ in range(_ITERATIONS):
@@ -124,11 +102,11 @@ def solve(
         if size < _CONVERGED or not np.isfinite(size):
             break
         columns = []
-        for row in free:
+        for k in free:
             moved = values.copy()
             # Away from the stops: a surface past its stop no longer moves, and its column would be zero.
-            difference = _DIFFERENCE * _STEP[row] * (-1.0 if values[row] >= 0.0 else 1.0)
-            moved[row] += difference
+            difference = _DIFFERENCE * _STEP[k] * (-1.0 if values[k] >= 0.0 else 1.0)
+            moved[k] += difference
             columns.append((balance(moved) - residual) / difference)
         step = np.linalg.lstsq(np.array(columns).T, -residual, rcond=1e-12)[0]
         step /= max(1.0, float(np.abs(step / _STEP[free]).max()))
@@ -141,8 +119,7 @@ def solve(
                 break
             step = 0.5 * step
         values, residual = trial, changed
-    settled = np.abs(residual).max() < 10.0 * _CONVERGED
-    return values if settled else None
+    return values if np.abs(residual).max() < 10.0 * _CONVERGED else None
 
 
 def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
@@ -152,19 +129,19 @@ def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
     return lowest, highest
 
 
-def trim(simulator: Simulator, amsl: float, held: dict[T, float], near: Trim | None = None) -> Trim | None:
+def trim(simulator: Simulator, amsl: float, held: Mapping[Quantity, float], near: Trim | None = None) -> Trim | None:
     """Return the steady flight at this height with two of its quantities held, or None if there is none.
 
     near: a trim to start from.
     """
-    simulator.place(amsl)
+    simulator.move_to(amsl)
     start = near.vector() if near else simulator.first_guess()
     values = solve(simulator.balance, held, simulator.surface_limits(), start)
     return None if values is None else from_vector(values, amsl)
 
 
 def from_vector(values: Floats, amsl: float) -> Trim:
-    """Return the trim with this vector (8,), in the order of `T`."""
+    """Return the trim with this vector (8,), in the order of `QUANTITIES`."""
     airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = (float(value) for value in values)
     return Trim(airspeed, amsl, climb, alpha, bank, elevator, aileron, rudder, throttle)
 
@@ -173,39 +150,39 @@ def straight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
     """Steady flight at this airspeed (m/s), height (m) and air-mass path angle (rad)."""
-    return trim(simulator, amsl, {T.AIRSPEED: airspeed, T.CLIMB: climb}, near)
+    return trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
 
 
 def full_throttle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
     """Steepest steady climb at this airspeed (m/s) and height (m)."""
-    return trim(simulator, amsl, {T.AIRSPEED: airspeed, T.THROTTLE: 1.0}, near)
+    return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 1.0}, near)
 
 
 def idle(simulator: Simulator, airspeed: float, amsl: float, near: Trim | None = None) -> Trim | None:
     """Steepest steady descent at this airspeed (m/s) and height (m), throttle closed."""
-    return trim(simulator, amsl, {T.AIRSPEED: airspeed, T.THROTTLE: 0.0}, near)
+    return trim(simulator, amsl, {"airspeed": airspeed, "throttle": 0.0}, near)
 
 
 def fastest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
     """Level flight at full throttle."""
-    return trim(simulator, amsl, {T.CLIMB: 0.0, T.THROTTLE: 1.0}, near)
+    return trim(simulator, amsl, {"climb": 0.0, "throttle": 1.0}, near)
 
 
 def slowest(simulator: Simulator, amsl: float, near: Trim | None = None) -> Trim | None:
     """Level flight with the elevator at its upper stop."""
-    return trim(simulator, amsl, {T.CLIMB: 0.0, T.ELEVATOR: -simulator.surface_limits()[0]}, near)
+    return trim(simulator, amsl, {"climb": 0.0, "elevator": -simulator.surface_limits()[0]}, near)
 
 
 def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
     """Return A (8, 8) and B (8, 4) about a trim, by central differences.
 
     States u, v, w, p, q, r, roll, pitch (m/s, rad/s, rad; velocity relative to the air); commands in the order of
-    `flight.dynamics.state.C`, with actuator and motor lags left out.  Height and course are held.
+    `flight.dynamics.state.Commands`, with actuator and motor lags left out.  Height and course are held.
     """
-    simulator.place(at.amsl)
+    simulator.move_to(at.amsl)
     roll, pitch = attitude(at)
     states = np.array([at.airspeed * np.cos(at.alpha), 0.0, at.airspeed * np.sin(at.alpha), 0.0, 0.0, 0.0, roll, pitch])
-    commands = at.commands()
+    commands = np.array(at.commands())
 
     def column(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
         low, high = vector.copy(), vector.copy()
@@ -214,7 +191,7 @@ def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
         return (rate(high) - rate(low)) / 2e-4
 
     a = [column(i, states, lambda moved: simulator.derivatives(moved, commands)) for i in range(8)]
-    b = [column(i, commands, lambda moved: simulator.derivatives(states, moved)) for i in range(COMMAND_SIZE)]
+    b = [column(i, commands, lambda moved: simulator.derivatives(states, moved)) for i in range(len(commands))]
     return np.array(a).T, np.array(b).T
 
 

@@ -13,13 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
-from flight.guidance.path_kernels import profile
+from flight.guidance.path_kernels import NODE, PIECE, Records, profile
 from flight.mission.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length
+from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
-# Where the legs have no room for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
+# Where the legs are too short for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
 # by most of the legs, and a U-turn has no arc at all.
 SHARPEST = math.radians(150.0)
 # Chords of an arc turn by at most this, rad.
@@ -28,16 +29,15 @@ CHORD = math.radians(5.0)
 
 @dataclass(frozen=True, slots=True)
 class FlyByPath:
-    """A path in packed rows, by distance along it.
+    """A path by distance along it.
 
-    pieces: (p, 8) each row a straight piece or an arc: distance at its start, length, east, north and course at its
-    start, curvature (1/m, positive to the right), leg of its start, distance at which the leg changes.
-    nodes: (k, 4) of the height profile: distance, height of the corner, slope (tangent) after it, half-length of its
-    parabola.  length: m.
+    pieces: (p,) of `flight.guidance.path_kernels.PIECE`, straight pieces and arcs.
+    nodes: (k,) of `flight.guidance.path_kernels.NODE`, the corners of the height profile.
+    length: m.
     """
 
-    pieces: Floats
-    nodes: Floats
+    pieces: Records
+    nodes: Records
     length: float
 
     def __post_init__(self) -> None:
@@ -47,39 +47,53 @@ class FlyByPath:
 
 
 def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
-    """Join the legs of a route.  The route has at least one leg, and no leg without horizontal length."""
+    """Join the legs of a route.  The route has at least one leg, and no leg without horizontal length.
+
+    A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from flight.simulation.flight_setup import make_limits
+    >>> from world.scenario import load_scenario
+    >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
+    >>> way = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 520.0]])
+    >>> no = np.zeros(3, dtype=bool)
+    >>> path = fly_by_path(Route(way, np.full(2, 25.0), np.zeros(3), no, np.arange(3), ""), limits)
+    >>> path.pieces["length"].round().tolist(), round(1.0 / path.pieces["curvature"][1])
+    ([883.0, 183.0, 883.0], 117)
+    """
     points = route.waypoints
     courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
     tangents, radii = _arcs(route, limits, courses, runs, turns)
-    pieces: list[list[float]] = []
+    pieces: list[tuple[float, ...]] = []
     nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
     slopes = np.diff(points[:, 2]) / runs
     at = 0.0
-    place = points[0, :2].copy()
+    begin = points[0, :2].copy()
     for leg in range(route.legs):
         straight = runs[leg] - tangents[leg] - tangents[leg + 1]
         course = float(courses[leg])
         if straight > 1e-6 or not pieces:
-            pieces.append([at, straight, *place, course, 0.0, leg, math.inf])
+            pieces.append((at, straight, *begin, course, 0.0, leg, math.inf))
             at += straight
         corner = points[leg + 1]
-        place = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
+        begin = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
         entry = float(corner[2] - slopes[leg] * tangents[leg + 1])
         nodes.append((at, entry))
         if leg + 1 == route.legs or tangents[leg + 1] == 0.0:
             continue
         turn = float(turns[leg])
         length = radii[leg + 1] * abs(turn)
-        pieces.append([at, length, *place, course, math.copysign(1.0 / radii[leg + 1], turn), leg, at + length / 2])
+        pieces.append((at, length, *begin, course, math.copysign(1.0 / radii[leg + 1], turn), leg, at + length / 2))
         at += length
         after = float(courses[leg + 1])
-        place = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
+        begin = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
         nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
-    return FlyByPath(np.array(pieces), _profile(nodes, limits, route), float(at))
+    return FlyByPath(np.array(pieces, PIECE), _profile(nodes, limits, route), float(at))
 
 
 def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats]:
-    """Tangent lengths and radii at each waypoint, (w,) m, shrunk where a leg has no room for them."""
+    """Tangent lengths and radii at each waypoint, (w,) m, shrunk where a leg is too short for them."""
     count = len(route.waypoints)
     tangents, radii = np.zeros(count), np.zeros(count)
     for i in range(1, count - 1):
@@ -108,12 +122,11 @@ def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Fl
     return tangents, radii
 
 
-def _profile(nodes: list[tuple[float, float]], limits: Limits, route: Route) -> Floats:
+def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
     """Corners of the height profile with the parabola that blends each."""
-    at = np.array([node[0] for node in nodes])
-    up = np.array([node[1] for node in nodes])
+    at, up = np.array(corners).T
     keep = np.concatenate([[True], np.diff(at) > 1e-3])
-    # Of two corners at one place the later one is on the leg that follows.
+    # Of two corners at one distance the later one is on the leg that follows.
     at, up = at[keep], up[keep]
     slopes = np.diff(up) / np.diff(at)
     after = np.concatenate([slopes, slopes[-1:]])
@@ -121,8 +134,11 @@ def _profile(nodes: list[tuple[float, float]], limits: Limits, route: Route) -> 
     speed = float(route.airspeed.max()) + limits.wind.strongest(route.waypoints[:, 2])
     half = np.abs(change) * speed**2 / (2.0 * BLEND_ACCELERATION)
     gaps = np.diff(at)
-    room = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
-    return np.column_stack([at, up, after, np.minimum(half, room)])
+    available = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
+    nodes: Records = np.empty(at.size, NODE)
+    nodes["distance"], nodes["height"], nodes["slope"] = at, up, after
+    nodes["half_length"] = np.minimum(half, available)
+    return nodes
 
 
 def sample_path(path: FlyByPath, step: float) -> Floats:
@@ -134,9 +150,13 @@ def sample_path(path: FlyByPath, step: float) -> Floats:
     return out
 
 
+def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
+    return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
+
+
 def _point_at(path: FlyByPath, s: float) -> tuple[float, float, float]:
-    row = path.pieces[max(0, int(np.searchsorted(path.pieces[:, 0], s, side="right")) - 1)]
-    east, north = arc_point(row, s - row[0])
+    piece: Record = path.pieces[_piece_index(path, np.asarray(s))]
+    east, north = arc_point(piece, s - piece.start)
     return east, north, float(profile(path.nodes, s)[0])
 
 
@@ -144,30 +164,36 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
     """The path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
 
     Chords of arcs turn by at most `CHORD`; on a 160 m radius they leave the arc by 0.15 m.
+
+    >>> level = np.array([(0.0, 500.0, 0.0, 0.0), (900.0, 500.0, 0.0, 0.0)], NODE)
+    >>> north = np.array([(0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)], PIECE)
+    >>> points, legs = path_polyline(FlyByPath(north, level, 900.0))
+    >>> points.tolist(), legs.tolist()
+    ([[0.0, 0.0, 500.0], [0.0, 900.0, 500.0]], [0])
     """
     stops = [0.0, path.length]
-    for at, length, _, _, _, curvature, _, change in path.pieces:
-        parts = max(1, math.ceil(abs(curvature) * length / CHORD))
-        stops += [at + length * k / parts for k in range(parts + 1)]
-        if math.isfinite(change):
-            stops.append(change)
-    for at, _, _, half in path.nodes:
-        stops += [at + half * share for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    for piece in path.pieces:
+        parts = max(1, math.ceil(abs(piece.curvature) * piece.length / CHORD))
+        stops += [piece.start + piece.length * k / parts for k in range(parts + 1)]
+        if math.isfinite(piece.leg_change):
+            stops.append(piece.leg_change)
+    for node in path.nodes:
+        stops += [node.distance + node.half_length * share for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
     inside = np.clip(np.array(stops), 0.0, path.length)
     distances = np.unique(np.round(inside, 6))
     points = np.array([_point_at(path, float(s)) for s in distances])
     middles = 0.5 * (distances[1:] + distances[:-1])
-    pieces = path.pieces[np.maximum(0, np.searchsorted(path.pieces[:, 0], middles, side="right") - 1)]
-    return points, (pieces[:, 6] + (middles > pieces[:, 7])).astype(np.int64)
+    pieces = path.pieces[_piece_index(path, middles)]
+    return points, (pieces["leg"] + (middles > pieces["leg_change"])).astype(np.int64)
 
 
-def arc_point(piece: Floats, along: float) -> tuple[float, float]:
-    """Position on a piece ``along`` metres from its start."""
-    course, curvature = piece[4], piece[5]
+def arc_point(piece: Record, along: float) -> tuple[float, float]:
+    """East and north (m) on a piece, a record of `flight.guidance.path_kernels.PIECE`, ``along`` m from its start."""
+    course, curvature = piece.course, piece.curvature
     if curvature == 0.0:
-        return piece[2] + along * math.sin(course), piece[3] + along * math.cos(course)
+        return piece.east + along * math.sin(course), piece.north + along * math.cos(course)
     turned = course + curvature * along
     return (
-        piece[2] + (math.cos(course) - math.cos(turned)) / curvature,
-        piece[3] + (math.sin(turned) - math.sin(course)) / curvature,
+        piece.east + (math.cos(course) - math.cos(turned)) / curvature,
+        piece.north + (math.sin(turned) - math.sin(course)) / curvature,
     )

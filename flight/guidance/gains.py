@@ -1,46 +1,69 @@
-"""The numbers that fit the guidance to an aircraft, read from ``aircraft/<name>/gains.toml``."""
+"""The gains that fit the guidance to an aircraft, read from ``aircraft/<name>/gains.toml``."""
 
 import math
 import tomllib
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from world.errors import FlightError
-
-Floats = NDArray[np.float64]
+from world.kernels import Record, record_dtype
 
 
 @dataclass(frozen=True, slots=True)
 class Gains:
-    """Gains of the guidance core, in SI and radians, in the order the core reads them (`packed`).
+    """Gains of the guidance core, in SI and radians.
+
+    Of the airframe and of the height:
 
     reference_airspeed: the airspeed at which surface gains hold; they are scaled with dynamic pressure.
-    cross_track_frequency, cross_track_damping, cross_track_integral: of the second-order cross-track law.
-    intercept: steepest course to the path that it flies when far away.  turn_lead, turn_smoothing: how far ahead the
-    path's curvature is fed forward, and over how long it is averaged about there.  height_*: the same law upwards.
-    slope_lead: as turn_lead.  aside_frequency: how fast the aircraft goes back to the path from where rolling into an
-    arc took it.
-    speed_gain, speed_integral: throttle per m/s.  throttle_per_slope: throttle per rad of climb.  slow_margin:
-    below command less this, height gives way to speed.  arc_slowing_*: so long before an arc, and by so much, the
-    airspeed gives way to a ground speed that the arc can be flown with.
-    roll_frequency, roll_rate_max, roll_acceleration_max: of the model roll that the aircraft follows.  roll_gain,
-    roll_rate_gain: aileron per rad and rad/s that it differs from it.  roll_disturbance_lag: of the estimate of what
-    else rolls it.  aileron_lead: the ailerons' own lag.  load_lead: how far ahead the lift is asked for the bank.
-    pitch_rate_gain, yaw_rate_gain: damping.  sideslip_gain: rudder per rad of sideslip.
-    Of the airframe: alpha_per_g; elevator_per_alpha, elevator_per_pitch_rate, aileron_per_roll_rate,
-    aileron_per_roll_acceleration, rudder_per_yaw_rate (without sideslip); side_per_sideslip, side_per_aileron: sideways
-    acceleration, m/s^2 a rad.
-    side_gain, side_lag: how much of the sideways acceleration that bank and ailerons do not explain is answered, and
-    its lag.  push_lead, push_smoothing: how far ahead a correction is asked for, as the bank comes late, by its rate of
-    change, and over how long that is smoothed.  sideslip_max: skid where the bank ends.
+    height_frequency, height_damping, height_integral: of the second-order law on the height's error.
+    slope_lead: how far ahead the path's slope is fed forward.
+    load_lead: how far ahead the lift is asked for the bank.
+    alpha_per_g: angle of attack for the weight.
+    elevator_per_alpha, elevator_per_pitch_rate: what holds an angle of attack and a pitch rate.
+    pitch_rate_gain: damping.
 
-    The rivals' have defaults.  l1_*: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
-    field_approach: course to the path far from it.  field_path, field_orbit: how the vector field closes in on a line
-    and on an orbit.  field_course, field_course_integral: bank per course error.  So have those that an aircraft can do
-    without.
+    Of the airspeed:
+
+    speed_gain, speed_integral: throttle per m/s.
+    throttle_per_slope: throttle per rad of climb.
+    slow_margin: below command less this, height gives way to speed.
+    arc_slowing_time, arc_slowing_max: so long before an arc, and by so much, the airspeed gives way to a ground speed
+    that the arc can be flown with.
+
+    Across the path:
+
+    cross_track_frequency, cross_track_damping, cross_track_integral: of the second-order cross-track law.
+    intercept: steepest course to the path that it flies when far away.
+    turn_lead, turn_smoothing: how far ahead the path's curvature is fed forward, and over how long it is averaged about
+    there.
+    aside_frequency: how fast the aircraft goes back to the path from where rolling into an arc took it.
+    side_gain, side_lag: how much of the sideways acceleration that bank and ailerons do not explain is answered, and
+    its lag.
+    push_lead, push_smoothing: how far ahead a correction is asked for, as the bank comes late, by its rate of change,
+    and over how long that is smoothed.
+    side_per_sideslip, side_per_aileron: sideways acceleration, m/s^2 a rad.
+    sideslip_max: skid where the bank ends.
+
+    In roll and yaw:
+
+    roll_frequency, roll_rate_max, roll_acceleration_max: of the model roll that the aircraft follows.
+    roll_gain, roll_rate_gain: aileron per rad and rad/s that it differs from it.
+    roll_disturbance_lag: of the estimate of what else rolls it.
+    aileron_lead: the ailerons' own lag.
+    aileron_per_roll_rate, aileron_per_roll_acceleration: what rolls the airframe.
+    rudder_per_yaw_rate: what turns it without sideslip.
+    yaw_rate_gain: damping.
+    sideslip_gain: rudder per rad of sideslip.
+
+    Of the reference laws, which have defaults, as have those that an aircraft can do without:
+
+    l1_period, l1_damping, l1_integral: ArduPlane's NAVL1_PERIOD, NAVL1_DAMPING and NAVL1_XTRACK_I, and its defaults.
+    field_approach: course to the path far from it.
+    field_path, field_orbit: how the vector field closes in on a line and on an orbit.
+    field_course, field_course_integral: bank per course error.
     """
 
     reference_airspeed: float
@@ -94,10 +117,15 @@ class Gains:
     push_lead: float = 0.0
     push_smoothing: float = 0.1
 
-    def packed(self) -> Floats:
-        """(g,) the fields in order."""
-        return np.array([getattr(self, item.name) for item in fields(self)])
+    def record(self) -> Record:
+        """The same for compiled code, a record of `GAINS`."""
+        record: Record = np.zeros(1, GAINS)[0]
+        for name, value in asdict(self).items():
+            setattr(record, name, value)
+        return record
 
+
+GAINS = record_dtype(*(item.name for item in fields(Gains)))
 
 # Suffixes that a key may carry, the longer first, and what takes the value to SI and radians.
 _DEG = math.radians(1.0)

@@ -6,16 +6,35 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.geometry import wrap
-from world.kernels import compiled
+from world.kernels import Record, compiled, record_dtype
 
-Floats = NDArray[np.float64]
+Records = NDArray[np.record]
+
+# A straight piece or an arc of the path.
+PIECE = record_dtype(
+    "start",  # m along the path
+    "length",  # m
+    "east",  # m, of its start
+    "north",
+    "course",  # rad, at its start
+    "curvature",  # 1/m, positive to the right
+    ("leg", np.int64),  # of its start
+    "leg_change",  # m along the path where the next leg begins; infinite where it does not
+)
+# A corner of the height profile and the parabola that blends it.
+NODE = record_dtype(
+    "distance",  # m along the path
+    "height",  # m
+    "slope",  # tangent, after it
+    "half_length",  # m, of its parabola
+)
 
 
 @compiled
-def project(piece: Floats, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Distance along a piece (m), cross-track error to the right (m) and the path's course there (rad)."""
-    course, curvature = piece[4], piece[5]
-    de, dn = east - piece[2], north - piece[3]
+    course, curvature = piece.course, piece.curvature
+    de, dn = east - piece.east, north - piece.north
     if curvature == 0.0:
         return (
             de * math.sin(course) + dn * math.cos(course),
@@ -34,42 +53,46 @@ def project(piece: Floats, east: float, north: float) -> tuple[float, float, flo
 
 
 @compiled
-def mean_curvature(pieces: Floats, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
     total = 0.0
     for i in range(k, pieces.shape[0]):
-        low = max(start, pieces[i, 0])
-        high = min(end, pieces[i, 0] + pieces[i, 1])
+        piece = pieces[i]
+        low = max(start, piece.start)
+        high = min(end, piece.start + piece.length)
         if high > low:
-            total += pieces[i, 5] * (high - low)
-        if pieces[i, 0] > end:
+            total += piece.curvature * (high - low)
+        if piece.start > end:
             break
     return total / (end - start)
 
 
 @compiled
-def most_curvature(pieces: Floats, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+def most_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
     """Sharpest curvature of the path between two distances, both at or after piece ``k``, 1/m, positive."""
     most = 0.0
     for i in range(k, pieces.shape[0]):
-        if pieces[i, 0] > end:
+        piece = pieces[i]
+        if piece.start > end:
             break
-        if pieces[i, 0] + pieces[i, 1] > start:
-            most = max(most, abs(pieces[i, 5]))
+        if piece.start + piece.length > start:
+            most = max(most, abs(piece.curvature))
     return most
 
 
 @compiled
-def profile(nodes: Floats, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+def profile(nodes: Records, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Height (m), slope (tangent) and its change per metre of the height profile at distance ``s``."""
     k = 0
-    while k + 1 < nodes.shape[0] and nodes[k + 1, 0] <= s:
+    while k + 1 < nodes.shape[0] and nodes[k + 1].distance <= s:
         k += 1
     for i in range(k, min(k + 2, nodes.shape[0])):
-        half = nodes[i, 3]
-        if half > 0.0 and abs(s - nodes[i, 0]) < half:
-            before = nodes[max(i - 1, 0), 2]
-            bend = (nodes[i, 2] - before) / (2.0 * half)
-            x = s - nodes[i, 0] + half
-            return nodes[i, 1] + before * (x - half) + 0.5 * bend * x * x, before + bend * x, bend
-    return nodes[k, 1] + nodes[k, 2] * (s - nodes[k, 0]), nodes[k, 2], 0.0
+        node = nodes[i]
+        half = node.half_length
+        if half > 0.0 and abs(s - node.distance) < half:
+            before = nodes[max(i - 1, 0)].slope
+            bend = (node.slope - before) / (2.0 * half)
+            x = s - node.distance + half
+            return node.height + before * (x - half) + 0.5 * bend * x * x, before + bend * x, bend
+    node = nodes[k]
+    return node.height + node.slope * (s - node.distance), node.slope, 0.0

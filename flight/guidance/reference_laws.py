@@ -8,13 +8,19 @@ switching legs at a turn distance.  The field is that of Beard and McLain, *Smal
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from world.geometry import wrap
-from world.kernels import compiled
+from world.kernels import Record, compiled, record_dtype
 
-Floats = NDArray[np.float64]
-
+# A waypoint, and the leg that begins there.
+WAYPOINT = record_dtype(
+    "east",  # m
+    "north",
+    "turn",  # rad, positive whichever way round
+    ("fly_over", np.bool_),
+    "acceptance",  # m; 0 where the mission states none
+    "airspeed",  # m/s, of the leg
+)
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.
 WAYPOINT_RADIUS = 90.0
 # L1 integrates only this near to its line (rad), and up to this much (rad).
@@ -32,24 +38,26 @@ def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: 
 
 
 @compiled
-def l1_angles(place: Floats, a: Floats, b: Floats, length: float) -> tuple[float, float]:  # pragma: no cover - compiled
+def l1_angles(
+    estimated: Record, a: Record, b: Record, length: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
     """Angle from the ground velocity to the leg or the waypoint it heads for, and from there to its aim, rad.
 
-    place: east, north, up, ground velocity east and north.  a, b: the leg's ends, east and north first.  The second is
-    NaN while it heads straight for a waypoint.  Both are positive where the aircraft has to turn left.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.  a, b: the leg's ends, of `WAYPOINT`.  The second
+    angle is NaN while it heads straight for a waypoint.  Both are positive where the aircraft has to turn left.
     """
-    leg_e, leg_n = b[0] - a[0], b[1] - a[1]
+    leg_e, leg_n = b.east - a.east, b.north - a.north
     run = max(1e-6, math.hypot(leg_e, leg_n))
     leg_e, leg_n = leg_e / run, leg_n / run
-    from_e, from_n = place[0] - a[0], place[1] - a[1]
+    from_e, from_n = estimated.east - a.east, estimated.north - a.north
     along = from_e * leg_e + from_n * leg_n
     cross = from_e * leg_n - from_n * leg_e
     distance = math.hypot(from_e, from_n)
-    course = math.atan2(place[3], place[4])
+    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
     if distance > length and along < -_CAPTURE * max(1.0, distance):
         return wrap(course - math.atan2(-from_e, -from_n)), math.nan
-    if along > run + _PASSED * math.hypot(place[3], place[4]):
-        return wrap(course - math.atan2(b[0] - place[0], b[1] - place[1])), math.nan
+    if along > run + _PASSED * math.hypot(estimated.velocity_east, estimated.velocity_north):
+        return wrap(course - math.atan2(b.east - estimated.east, b.north - estimated.north)), math.nan
     aim = math.asin(min(_CAPTURE, max(-_CAPTURE, cross / max(0.1, length))))
     return wrap(course - math.atan2(leg_e, leg_n)), aim
 
@@ -71,18 +79,18 @@ def l1_acceleration(angle: float, speed: float, length: float, damping: float) -
 
 @compiled
 def l1_reached(
-    place: Floats, a: Floats, b: Floats, length: float, radius: float
+    estimated: Record, a: Record, b: Record, length: float, radius: float
 ) -> bool:  # pragma: no cover - compiled
     """Whether L1 turns to the next leg: within its turn distance of b, or past the line square to the leg there.
 
-    b: east, north, turn (rad), 1 if flown over.  radius: m, for a right angle; smaller turns start later.
+    estimated, a, b: as `l1_angles` takes them.  radius: m, for a right angle; smaller turns start later.
     """
-    leg_e, leg_n = b[0] - a[0], b[1] - a[1]
-    to_e, to_n = b[0] - place[0], b[1] - place[1]
+    leg_e, leg_n = b.east - a.east, b.north - a.north
+    to_e, to_n = b.east - estimated.east, b.north - estimated.north
     if to_e * leg_e + to_n * leg_n <= 0.0:
         return True
-    distance = min(radius, length) * min(1.0, b[2] / (0.5 * math.pi))
-    within: bool = b[3] == 0.0 and math.hypot(to_e, to_n) <= distance
+    distance = min(radius, length) * min(1.0, b.turn / (0.5 * math.pi))
+    within: bool = not b.fly_over and math.hypot(to_e, to_n) <= distance
     return within
 
 

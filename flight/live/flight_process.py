@@ -24,19 +24,14 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from aircraft.catalog import Aircraft
 from flight.live.snapshot import Snapshot, SnapshotMaker
 from flight.live.status_text import CRITICAL, StatusText
 from flight.mission.items import Home, Mission
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import TICK, Flight, as_track
-from flight.simulation.track import Track
+from flight.simulation.simulate import TICK, Flight
+from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import PlanflyError
-
-Floats = NDArray[np.float64]
 
 # Snapshots a second that are sent; the log is handed to the operating system this often, s.
 SNAPSHOT_RATE = 60.0
@@ -222,7 +217,7 @@ def _in_step(
     """Step the flight by the clock: how it ended, and whether the process goes on."""
     clock = time.monotonic
     started = begun = clock()
-    pending: list[Floats] = []
+    pending: list[Rows] = []
     ticks, flushed, beat = 0, started, 0
     ended, go_on = "", True
     while not ended:
@@ -244,7 +239,7 @@ def _in_step(
                 ended = ended or (SHUT_DOWN if order.quit else STOPPED)
                 go_on = not order.quit
         if pending and (ended or now - flushed >= FLUSH_PERIOD):
-            log.write(as_track(np.concatenate(pending)))
+            log.write(as_track(join_rows(pending)))
             pending.clear()
             flushed = now
         if not ended:

@@ -3,15 +3,15 @@
 import math
 import struct
 from dataclasses import astuple, dataclass, fields, replace
-from types import SimpleNamespace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.local_map import Chart
-from flight.simulation.track import COLUMNS
+from flight.simulation.local_map import LocalMap
+from flight.simulation.track import TRACK_ROW
 from world.frames import GeoOrigin, to_geo
+from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
@@ -70,15 +70,6 @@ class Snapshot:
 _FORM = struct.Struct(f"<{len(fields(Snapshot))}d")
 
 
-def _named(row: Floats) -> SimpleNamespace:
-    """Fields of a flown row by name, as `flight.simulation.track.Track` names them."""
-    found, at = SimpleNamespace(), 0
-    for name, width in COLUMNS.items():
-        setattr(found, name, row[at] if width == 1 else row[at : at + width])
-        at += width
-    return found
-
-
 class SnapshotMaker:
     """Makes snapshots of the rows of one flight.
 
@@ -87,11 +78,7 @@ class SnapshotMaker:
 
     def __init__(self, setup: FlightSetup) -> None:
         self._origin: GeoOrigin = setup.scenario.origin
-        self._chart = Chart.around(setup)
-
-    def snapshot(self, row: Floats) -> Snapshot:
-        """Snapshot of a flown row."""
-        return self._of_fields(_named(row))
+        self._map = LocalMap.around(setup)
 
     def before_start(self, setup: FlightSetup) -> Snapshot:
         """Snapshot of an aircraft that waits at the route's start, on the course of its first leg."""
@@ -99,18 +86,19 @@ class SnapshotMaker:
         step = points[1] - points[0]
         terrain = setup.scenario.terrain
         ground = math.nan if terrain is None else float(terrain.height(points[0, 0], points[0, 1]))
-        row = _named(np.zeros(sum(COLUMNS.values())))
+        row: Record = np.zeros(1, TRACK_ROW)[0]
         row.position = points[0]
         row.attitude[2] = math.atan2(step[0], step[1])
         row.clearance = points[0, 2] - ground
         row.leg = -1.0
-        return self._of_fields(row)
+        return self.snapshot(row)
 
-    def _of_fields(self, row: SimpleNamespace) -> Snapshot:
+    def snapshot(self, row: Record) -> Snapshot:
+        """Snapshot of a flown row, a record of `flight.simulation.track.TRACK_ROW`."""
         east, north, amsl = (float(value) for value in row.position)
         lat, lon = (float(value) for value in to_geo(self._origin, east, north))
         # A map course is the true course and this.
-        turn = self._chart.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
+        turn = self._map.convergence(lat, lon) if math.isfinite(lat) and math.isfinite(lon) else 0.0
         v_east, v_north, v_up = _turned(row.velocity, turn)
         wind_east, wind_north, _ = _turned(row.wind, turn)
         roll, pitch, yaw = (float(value) for value in row.attitude)

@@ -13,7 +13,15 @@ _EDGE = 1e-3
 
 
 def control_limits(aircraft: str) -> list[tuple[str, float]]:
-    """Name each control and its limit either way (rad; 1 for the throttle; NaN for an aircraft that is not known)."""
+    """Each control and its limit either way (rad; 1 for the throttle; NaN for an aircraft that is not known).
+
+    >>> for name, limit in control_limits("aerosonde"):
+    ...     print(f"{name} {limit:.2f}")
+    elevator 0.52
+    aileron 0.52
+    rudder 0.52
+    throttle 1.00
+    """
     try:
         known = load_aircraft(aircraft)
     except ValueError:
@@ -24,7 +32,16 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
 
 
 def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.bool_]:
-    """Rows at which control k (a column of `Track.commands`) is asked for its limit or more; none for NaN limits."""
+    """Rows at which control k (a column of `Track.commands`) is asked for its limit or more, (t,).
+
+    low, high: its limits; none of the rows for NaN.
+
+    >>> from flight.simulation.track import TRACK_ROW, as_track
+    >>> rows = np.zeros(3, TRACK_ROW)
+    >>> rows["commands"][:, 3] = 0.5, 1.0, 0.9
+    >>> held_at_limit(as_track(rows), 3, 0.0, 1.0)
+    array([False,  True, False])
+    """
     command = track.commands[:, k].astype(np.float64)
     edge = _EDGE * (high - low)
     return np.asarray((command <= low + edge) | (command >= high - edge))

@@ -10,13 +10,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled
+from world.kernels import Record, compiled, record_dtype
 
 Floats = NDArray[np.float64]
 
 _FOOT = 0.3048
-# State of the five first-order filters: u, then two each for v and w.
-GUST_STATES = 5
+# State of the five first-order filters of unit variance: one along the wind, two in a row across and down.
+GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_first", "down_second")
 
 
 @compiled
@@ -33,43 +33,47 @@ def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no co
     return h / (base * root) * _FOOT, h * _FOOT, 1.0 / (root * root)
 
 
-@compiled
-def start_gusts(noise: Floats, gusts: Floats) -> None:  # pragma: no cover - compiled
-    """Draw the filters' stationary state from (5,) unit normals into (5,) ``gusts``."""
-    gusts[0] = noise[0]
-    for axis in range(2):
-        y1 = noise[1 + 2 * axis]
-        gusts[1 + 2 * axis] = y1
-        # Stationary: var y1 = 1, var y2 = cov(y1, y2) = 1/2.
-        gusts[2 + 2 * axis] = 0.5 * y1 + 0.5 * noise[2 + 2 * axis]
+def start_gusts(noise: Floats, filters: Record) -> None:
+    """Draw the stationary state of the filters, a record of `GUST_FILTERS`, from (5,) unit normals."""
+    filters.along, filters.across_first, across, filters.down_first, down = noise.tolist()
+    # Stationary: the second of two has a variance of 1/2, and as much in common with the first.
+    filters.across_second = 0.5 * filters.across_first + 0.5 * across
+    filters.down_second = 0.5 * filters.down_first + 0.5 * down
 
 
 @compiled
 def step_gusts(
-    gusts: Floats, noise: Floats, w20: float, height: float, airspeed: float, dt: float
+    filters: Record, noise: Floats, w20: float, height: float, airspeed: float, dt: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Advance by dt and return the gust along the mean wind, across it to the right, and down, m/s.
 
-    noise: (3,) unit normals.  w20: wind at 20 ft, m/s; sigma_w = 0.1 w20.  Longitudinal: sigma / (1 + T s);
-    transverse: sigma (1 + sqrt(3) T s) / (1 + T s)^2, as the sum of the outputs of two equal lags in a row.
+    filters: a record of `GUST_FILTERS`.  noise: (3,) unit normals.  w20: wind at 20 ft, m/s; sigma_w = 0.1 w20.
+    Longitudinal: sigma / (1 + T s); transverse: sigma (1 + sqrt(3) T s) / (1 + T s)^2, as the sum of the outputs of two
+    equal lags in a row.
     """
     length_u, length_w, ratio = dryden_scales(height)
     sigma_w = 0.1 * w20
     sigma_u = sigma_w * ratio
     speed = max(airspeed, 5.0)
     decay = math.exp(-dt * speed / length_u)
-    gusts[0] = decay * gusts[0] + math.sqrt(1.0 - decay * decay) * noise[0]
-    out_v = _transverse(gusts, 1, noise[1], decay)
-    out_w = _transverse(gusts, 3, noise[2], math.exp(-dt * speed / length_w))
-    return sigma_u * gusts[0], sigma_u * out_v, sigma_w * out_w
+    filters.along = decay * filters.along + math.sqrt(1.0 - decay * decay) * noise[0]
+    filters.across_first, filters.across_second, across = _transverse(
+        filters.across_first, filters.across_second, noise[1], decay
+    )
+    filters.down_first, filters.down_second, down = _transverse(
+        filters.down_first, filters.down_second, noise[2], math.exp(-dt * speed / length_w)
+    )
+    return sigma_u * filters.along, sigma_u * across, sigma_w * down
 
 
 @compiled
-def _transverse(gusts: Floats, k: int, noise: float, decay: float) -> float:  # pragma: no cover - compiled
-    before = gusts[k]
-    gusts[k] = decay * before + math.sqrt(1.0 - decay * decay) * noise
-    gusts[k + 1] = decay * gusts[k + 1] + (1.0 - decay) * 0.5 * (before + gusts[k])
+def _transverse(
+    first: float, second: float, noise: float, decay: float
+) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Both lags after a step, and the gust in standard deviations."""
+    before = first
+    first = decay * before + math.sqrt(1.0 - decay * decay) * noise
+    second = decay * second + (1.0 - decay) * 0.5 * (before + first)
     root = math.sqrt(3.0)
-    # var(sqrt(3) y1 + (1 - sqrt(3)) y2) = 2.
-    gust: float = (root * gusts[k] + (1.0 - root) * gusts[k + 1]) / math.sqrt(2.0)
-    return gust
+    # var(sqrt(3) first + (1 - sqrt(3)) second) = 2.
+    return first, second, (root * first + (1.0 - root) * second) / math.sqrt(2.0)

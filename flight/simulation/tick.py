@@ -3,24 +3,22 @@
 import math
 
 import numpy as np
+from numba import literal_unroll
 from numpy.typing import NDArray
 
-from flight.dynamics.nodes import get_node, set_node
-from flight.dynamics.state import STATE_SIZE, C, S
+from flight.dynamics.state import STATE
 from flight.guidance.lateral import guide
 from flight.guidance.navigation_error import navigate
-from flight.guidance.rows import M
-from flight.simulation import workspace as at
+from flight.guidance.path_kernels import Records
 from flight.simulation.dryden import step_gusts
-from flight.simulation.workspace import NOISE_SIZE, ROW, K, Table
-from world.frames import polymap_within
+from flight.simulation.workspace import OUTPUT
+from world.frames import polymap
 from world.geometry import wrap
-from world.kernels import compiled, compiled_views
+from world.kernels import Record, compiled, compiled_views, field_names
 from world.terrain import Heights, pixel_height
 from world.wind import mean_wind_speed
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 STEEPEST_BANK = math.radians(75.0)
 # What `tick` returns, and how the flight ended by then.
@@ -35,170 +33,151 @@ ENDS = {
     STALLED: "departure: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
 }
-_STATE, _COMMANDS, _FACTORS, _PLACE, _SEEN = at.STATE, at.COMMANDS, at.FACTORS, at.PLACE, at.SEEN
-_AIR, _WIND, _GUSTS, _NAV, _MEMORY = at.AIR, at.WIND, at.GUSTS, at.NAV, at.MEMORY
-_GAINS, _CONSTANTS, _LAYOUT = at.GAINS, at.CONSTANTS, at.LAYOUT
-_OUT, _OUT_SIZE, _SCALES, _NOISE = at.OUT, at.OUT_SIZE, at.SCALES, at.NOISE
-# Rows of the state that JSBSim gives; time and winds are known without asking.
-_FIRST, _LAST = int(S.LATITUDE), int(S.ACCEL_N)
+_STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
 
 @compiled_views
-def _map(
-    arena: Floats, tables: Floats, name: int, x: float, y: float
-) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Both components of one of the polynomial maps."""
-    rows = tables[_start(arena, name) : _end(arena, name)]
-    return polymap_within(rows, int(arena[_LAYOUT + 3 * name + 2]), x, y)
-
-
-@compiled
-def _start(arena: Floats, name: int) -> int:  # pragma: no cover - compiled
-    """First row of a table; a function that gave the rows themselves would have to count references to them."""
-    return int(arena[_LAYOUT + 3 * name])
-
-
-@compiled
-def _end(arena: Floats, name: int) -> int:  # pragma: no cover - compiled
-    """Row after the last of a table."""
-    return int(arena[_LAYOUT + 3 * name + 1])
-
-
-@compiled_views
-def linked_tick(arena: Floats, tables: Floats, heights: Heights, nodes: Ints) -> int:  # pragma: no cover - compiled
-    """Read JSBSim, do `tick`, and set JSBSim unless the flight has ended.
-
-    nodes: (STATE_SIZE + OUT_SIZE,) addresses of what is read and set, 0 for none, as `flight.dynamics.nodes.addresses`
-    gives.
-    """
-    for i in range(_FIRST, _LAST + 1):
-        arena[_STATE + i] = get_node(nodes[i]) if nodes[i] != 0 else 0.0
-    status = tick(arena, tables, heights)
-    if status == 0:
-        for i in range(_OUT_SIZE):
-            if nodes[STATE_SIZE + i] != 0:
-                set_node(nodes[STATE_SIZE + i], arena[_OUT + i])
-    return status
-
-
-@compiled_views
-def tick(arena: Floats, tables: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
+def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: no cover - compiled
     """Take the state as JSBSim gave it, in its units; return a key of `ENDS` or 0 to fly on.
 
-    What to set in JSBSim, in its units, stands in the arena's `out`.
+    What to set in JSBSim, in its units, then stands in the workspace's output.
 
-    arena, tables: `flight.simulation.workspace`.  heights: of the terrain.
+    workspace, path: of a `flight.simulation.workspace.Workspace`.  heights: of the terrain.
     """
-    state, memory = arena[_STATE:_COMMANDS], arena[_MEMORY:_GAINS]
-    commands, place, seen = arena[_COMMANDS:_FACTORS], arena[_PLACE:_SEEN], arena[_SEEN:_AIR]
-    air, constants = arena[_AIR:_WIND], arena[_CONSTANTS:_LAYOUT]
-    total = 0.0
-    for i in range(state.size):
-        state[i] *= arena[_FACTORS + i]
-        total += state[i] * 0.0
-    if total != 0.0:  # any NaN or infinity
+    work = workspace[0]
+    state, true, memory, air = work.state, work.true, work.memory, work.air
+    timing, settings = work.timing, work.settings
+    if not _to_si(state, work.state_factors):
         return NOT_A_NUMBER
-    state[S.WIND_NORTH], state[S.WIND_EAST], state[S.WIND_DOWN] = air[0] + air[2], air[1] + air[3], air[4]
-    dt, k = constants[K.DT], int(constants[K.ROW])
-    # About the chart's middle, so that a flight may cross the 180th meridian.
-    middle = constants[K.LONGITUDE]
-    state[S.LONGITUDE] = middle + wrap(state[S.LONGITUDE] - middle)
-    place[0], place[1] = _map(arena, tables, Table.POSITION, state[S.LATITUDE], state[S.LONGITUDE])
-    place[2] = state[S.AMSL]
+    state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
+    state.wind_down = air.gust_down
+    # About the local map's middle, so that a flight may cross the 180th meridian.
+    state.longitude = settings.middle + wrap(state.longitude - settings.middle)
     # Map course of true north.
-    turn, _ = _map(arena, tables, Table.ANGLE, state[S.LATITUDE], state[S.LONGITUDE])
-    cos, sin = math.cos(turn), math.sin(turn)
-    east = state[S.V_EAST] * cos + state[S.V_NORTH] * sin
-    place[3], place[4], place[5] = east, state[S.V_NORTH] * cos - state[S.V_EAST] * sin, -state[S.V_DOWN]
-    state[S.YAW] = wrap(state[S.YAW] + turn)
-    col, row = _map(arena, tables, Table.TO_PIXEL, place[0], place[1])
-    ground = pixel_height(heights, col, row)
-    clearance = place[2] - ground
-    noise = arena[_NOISE + NOISE_SIZE * k : _NOISE + NOISE_SIZE * (k + 1)]
-    navigate(place, seen, arena[_NAV:_MEMORY], noise[3:], constants[K.NAV_SIGMA], constants[K.NAV_TIME], dt)
-    guide(
-        state, seen, tables[_start(arena, Table.PIECES) : _end(arena, Table.PIECES)],
-        tables[_start(arena, Table.NODES) : _end(arena, Table.NODES)],
-        tables[_start(arena, Table.CORNERS) : _end(arena, Table.CORNERS)],
-        tables[_start(arena, Table.SPEEDS) : _end(arena, Table.SPEEDS), 0],
-        arena[_GAINS:_CONSTANTS], memory, commands, dt,
+    north, _ = polymap(work.north_map, state.latitude, state.longitude)
+    cos, sin = math.cos(north), math.sin(north)
+    state.yaw = wrap(state.yaw + north)
+    true.east, true.north = polymap(work.position_map, state.latitude, state.longitude)
+    true.up = state.amsl
+    true.velocity_east = state.velocity_east * cos + state.velocity_north * sin
+    true.velocity_north = state.velocity_north * cos - state.velocity_east * sin
+    true.velocity_up = -state.velocity_down
+    column, row = polymap(work.pixel_map, true.east, true.north)
+    ground = pixel_height(heights, column, row)
+    clearance = true.up - ground
+    noise = work.noise[timing.row]
+    navigate(
+        true, work.estimated, work.navigation, noise.navigation,
+        settings.navigation_sigma, settings.navigation_time, timing.dt,
     )  # fmt: skip
-    _blow(state, arena[_WIND:_GUSTS], arena[_GUSTS:_NAV], noise, clearance, place[2], cos, sin, air, dt)
-    air[5] = ground if not math.isnan(ground) else air[5]
-    air[6] += state[S.POWER] * dt / 3600.0
-    start = int(constants[K.ROWS]) + ROW * k
-    _fill(
-        arena[start : start + ROW], state, place, commands, memory, constants[K.TICK] * dt, air[6], clearance, cos, sin
-    )
-    constants[K.TICK] += 1.0
-    constants[K.ROW] += 1.0
-    status = 0
-    if memory[M.DONE] > 0.0:
-        near = abs(memory[M.CROSS_TRACK]) <= FAR and abs(memory[M.HEIGHT_ERROR]) <= FAR
-        status = COMPLETED if near else MISSED
+    guide(
+        state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
+        path.waypoint[: settings.waypoints], work.gains, memory, work.commands, timing.dt,
+    )  # fmt: skip
+    _blow(state, work.wind, work.gusts, noise.turbulence, clearance, true.up, cos, sin, air, timing.dt)
+    air.ground = ground if not math.isnan(ground) else air.ground
+    air.energy += state.power * timing.dt / 3600.0
+    _fill(work.rows[timing.row], state, true, work.commands, memory, timing.tick * timing.dt, air.energy, clearance)
+    _fill_wind(work.rows[timing.row], state, cos, sin)
+    timing.tick += 1
+    timing.row += 1
+    _output(work.output, work.commands, air, work.scale_above, work.scale_below)
+    return _status(state, memory, clearance, settings.slowest)
+
+
+@compiled
+def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compiled
+    """Take the state to SI; False where it has a NaN or an infinity."""
+    total = 0.0
+    for name in literal_unroll(_STATE):
+        value = state[name] * factors[name]
+        state[name] = value
+        total += value * 0.0
+    return total == 0.0
+
+
+@compiled
+def _status(state: Record, memory: Record, clearance: float, slowest: float) -> int:  # pragma: no cover
     if clearance <= 0.0:
-        status = GROUND
-    elif abs(state[S.ROLL]) > STEEPEST_BANK:
-        status = BANKED
-    elif state[S.AIRSPEED] < constants[K.SLOWEST]:
-        status = STALLED
-    out = arena[_OUT:_SCALES]
-    for i in range(4):
-        out[i] = commands[i]
-    out[4], out[5], out[6], out[7] = air[0] + air[2], air[1] + air[3], air[4], air[5]
-    for i in range(_OUT_SIZE):
-        out[i] *= arena[_SCALES + 2 * i + (0 if out[i] > 0.0 else 1)]
-    return status
+        return GROUND
+    if abs(state.roll) > STEEPEST_BANK:
+        return BANKED
+    if state.airspeed < slowest:
+        return STALLED
+    if memory.done:
+        near = abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR
+        return COMPLETED if near else MISSED
+    return 0
+
+
+@compiled
+def _output(
+    output: Record, commands: Record, air: Record, above: Record, below: Record
+) -> None:  # pragma: no cover - compiled
+    """What to set in JSBSim, in its units."""
+    output.elevator, output.aileron = commands.elevator, commands.aileron
+    output.rudder, output.throttle = commands.rudder, commands.throttle
+    # All that blows is set as a gust: three properties a tick, not six.
+    output.gust_north, output.gust_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
+    output.gust_down, output.ground = air.gust_down, air.ground
+    for name in literal_unroll(_OUTPUT):
+        output[name] *= above[name] if output[name] > 0.0 else below[name]
 
 
 @compiled
 def _blow(
-    state: Floats, wind: Floats, gusts: Floats, noise: Floats, clearance: float, up: float, turn_cos: float,
-    turn_sin: float, air: Floats, dt: float,
+    state: Record, wind: Record, gusts: Record, noise: Floats, clearance: float, up: float, turn_cos: float,
+    turn_sin: float, air: Record, dt: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """Mean wind at this height and the next gust, true north, east and down, into ``air``.
-
-    wind: speed, the cosine and sine of the map course it blows to, gradient, reference height, w20.
-    """
-    speed = mean_wind_speed(wind[0], wind[3], wind[4], up)
+    """Mean wind at this height and the next gust, true north, east and down, into ``air``."""
+    speed = mean_wind_speed(wind.speed, wind.gradient, wind.reference_amsl, up)
     # The angle less the map course of true north.
-    cos = wind[1] * turn_cos + wind[2] * turn_sin
-    sin = wind[2] * turn_cos - wind[1] * turn_sin
-    air[0], air[1] = speed * cos, speed * sin
-    if wind[5] > 0.0:
+    cos = wind.cos * turn_cos + wind.sin * turn_sin
+    sin = wind.sin * turn_cos - wind.cos * turn_sin
+    air.wind_north, air.wind_east = speed * cos, speed * sin
+    if wind.w20 > 0.0:
         # Over unknown ground the scales of 300 m and above hold.
         height = clearance if not math.isnan(clearance) else 1000.0
-        along, across, down = step_gusts(gusts, noise, wind[5], height, state[S.AIRSPEED], dt)
-        air[2] = along * cos - across * sin
-        air[3] = along * sin + across * cos
-        air[4] = down
+        along, across, down = step_gusts(gusts, noise, wind.w20, height, state.airspeed, dt)
+        air.gust_north = along * cos - across * sin
+        air.gust_east = along * sin + across * cos
+        air.gust_down = down
 
 
 @compiled
 def _fill(
-    row: Floats, state: Floats, place: Floats, commands: Floats, memory: Floats, time: float, energy: float,
-    clearance: float, cos: float, sin: float,
+    row: Record, state: Record, true: Record, commands: Record, memory: Record, time: float,
+    energy: float, clearance: float,
 ) -> None:  # pragma: no cover - compiled  # fmt: skip
-    """One row of the track, in the order of `flight.simulation.track.COLUMNS`."""
-    # Element by element: assigning a slice checks shapes.
-    row[0] = time
-    for i in range(3):
-        row[1 + i] = place[i]
-        row[7 + i] = state[S.ROLL + i]
-        row[10 + i] = state[S.P + i]
-    row[4], row[5], row[6] = place[3], place[4], place[5]
-    row[13], row[14], row[15] = state[S.AIRSPEED], state[S.ALPHA], state[S.BETA]
-    for i in range(4):
-        row[16 + i] = state[S.ELEVATOR + i]
-        row[20 + i] = commands[C.ELEVATOR + i]
-    row[24] = state[S.WIND_EAST] * cos + state[S.WIND_NORTH] * sin
-    row[25] = state[S.WIND_NORTH] * cos - state[S.WIND_EAST] * sin
-    row[26] = -state[S.WIND_DOWN]
-    row[27] = state[S.ACCEL_N]
-    row[28] = state[S.CURRENT]
-    row[29] = energy
-    row[30] = memory[M.LEG]
-    row[31] = memory[M.CROSS_TRACK]
-    row[32] = memory[M.HEIGHT_ERROR]
-    row[33] = memory[M.SPEED_COMMAND]
-    row[34] = clearance
+    """One row of the track, a record of `flight.simulation.track.TRACK_ROW`, but for the wind."""
+    row.time = time
+    # Element by element: assigning a whole array checks shapes.
+    position, velocity, attitude, rates = row.position, row.velocity, row.attitude, row.rates
+    position[0], position[1], position[2] = true.east, true.north, true.up
+    velocity[0], velocity[1], velocity[2] = true.velocity_east, true.velocity_north, true.velocity_up
+    attitude[0], attitude[1], attitude[2] = state.roll, state.pitch, state.yaw
+    rates[0], rates[1], rates[2] = state.roll_rate, state.pitch_rate, state.yaw_rate
+    row.airspeed = state.airspeed
+    flow, controls, commanded = row.flow, row.controls, row.commands
+    flow[0], flow[1] = state.alpha, state.beta
+    controls[0], controls[1], controls[2] = state.elevator, state.aileron, state.rudder
+    controls[3] = state.throttle
+    commanded[0], commanded[1], commanded[2] = commands.elevator, commands.aileron, commands.rudder
+    commanded[3] = commands.throttle
+    row.load_factor = state.load_factor
+    row.current = state.current
+    row.energy = energy
+    row.leg = memory.leg
+    row.cross_track = memory.cross_track
+    row.height_error = memory.height_error
+    row.speed_command = memory.speed_command
+    row.clearance = clearance
+
+
+@compiled
+def _fill_wind(row: Record, state: Record, cos: float, sin: float) -> None:  # pragma: no cover - compiled
+    """The row's wind in map axes.  cos, sin: of the map course of true north."""
+    wind = row.wind
+    wind[0] = state.wind_east * cos + state.wind_north * sin
+    wind[1] = state.wind_north * cos - state.wind_east * sin
+    wind[2] = -state.wind_down

@@ -1,112 +1,126 @@
-"""All that the compiled tick works on, in two arrays: passing an array to compiled code costs more than most sums.
+"""All that the compiled tick works on: one record, and one table of the path.
 
-One array holds what changes, at fixed places; the other the tables of a flight, below each other, all as wide as the
-widest.
+Each array that is passed to compiled code costs as much as a hundred sums.
 """
 
-from enum import IntEnum
-from typing import Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.dynamics.state import COMMAND_SIZE, STATE_SIZE
-from flight.guidance.gains import Gains
-from flight.guidance.navigation_error import NAV_STATES
-from flight.guidance.rows import G, M
-from flight.simulation.dryden import GUST_STATES
-from flight.simulation.track import COLUMNS
+from flight.dynamics.state import COMMANDS, STATE
+from flight.guidance.fly_by_path import FlyByPath
+from flight.guidance.gains import GAINS, Gains
+from flight.guidance.memory import GUIDANCE_MEMORY
+from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS
+from flight.guidance.path_kernels import NODE, PIECE, Records
+from flight.guidance.reference_laws import WAYPOINT
+from flight.simulation.dryden import GUST_FILTERS
+from flight.simulation.track import TRACK_ROW
+from world.frames import POLYMAP
+from world.kernels import Record, field_names, record_dtype
 
 Floats = NDArray[np.float64]
 
-# One row of a track.
-ROW: Final = sum(COLUMNS.values())
-PLACE_SIZE: Final = 6
-# Wind north and east, gust north, east and down (m/s, true axes), ground below (m), energy used (Wh).
-AIR_SIZE: Final = 7
-# Speed, cosine and sine of the map course it blows to, gradient, reference height, W20.
-WIND_SIZE: Final = 6
+# What is read of JSBSim each tick: the state but for time and wind, which are known without asking.
+READ_FIELDS = field_names(STATE)[: field_names(STATE).index("time")]
+# Ticks that are flown at a time, at most.
+BLOCK_TICKS = 60
+# Mean wind and gust, true north, east and down; ground below; battery.
+AIR = record_dtype(
+    "wind_north",  # m/s, the way the air moves
+    "wind_east",
+    "gust_north",
+    "gust_east",
+    "gust_down",
+    "ground",  # m, the last that was known
+    "energy",  # Wh used
+)
+MEAN_WIND = record_dtype(
+    "speed",  # m/s at the reference height
+    "cos",  # of the map course that it blows to
+    "sin",
+    "gradient",  # 1/s
+    "reference_amsl",  # m
+    "w20",  # m/s, turbulence's wind at 20 ft
+)
+TIMING = record_dtype(
+    ("tick", np.int64),  # ticks flown
+    ("row", np.int64),  # row of the block that is filled next
+    "dt",  # s
+)
+SETTINGS = record_dtype(
+    "slowest",  # m/s, slower is a departure
+    "navigation_sigma",  # m
+    "navigation_time",  # s
+    "middle",  # rad, longitude of the local map's middle
+    ("pieces", np.int64),  # rows of the path's table that have one
+    ("nodes", np.int64),
+    ("waypoints", np.int64),
+)
+# The i-th piece, node and waypoint of a path beside each other.
+PATH_ROW = record_dtype(("piece", PIECE), ("node", NODE), ("waypoint", WAYPOINT))
+# What is set in JSBSim after a tick.
+OUTPUT = record_dtype(*field_names(COMMANDS), "gust_north", "gust_east", "gust_down", "ground")
+# Unit normals of a tick.
+NOISE = record_dtype(("turbulence", np.float64, (3,)), ("navigation", np.float64, (3,)))
+WORKSPACE = record_dtype(
+    ("state", STATE),
+    ("state_factors", STATE),  # take what JSBSim gives to SI
+    ("true", MOTION),
+    ("estimated", MOTION),
+    ("commands", COMMANDS),
+    ("air", AIR),
+    ("wind", MEAN_WIND),
+    ("gusts", GUST_FILTERS),
+    ("navigation", NAVIGATION_LAGS),
+    ("memory", GUIDANCE_MEMORY),
+    ("gains", GAINS),
+    ("timing", TIMING),
+    ("settings", SETTINGS),
+    ("position_map", POLYMAP),  # latitude and longitude to east and north
+    ("north_map", POLYMAP),  # latitude and longitude to the map course of true north
+    ("pixel_map", POLYMAP),  # east and north to column and row of the terrain
+    ("output", OUTPUT),  # in JSBSim's units
+    ("scale_above", OUTPUT),  # take an SI value above zero to JSBSim's
+    ("scale_below", OUTPUT),  # and one that is not
+    ("noise", NOISE, (BLOCK_TICKS,)),
+    ("rows", TRACK_ROW, (BLOCK_TICKS,)),
+)
 
 
-class K(IntEnum):
-    """Rows of the constants and counters of a flight."""
+class Workspace:
+    """One flight's record, and plain views of the parts that pass to and from JSBSim.
 
-    TICK = 0  # ticks flown
-    DT = 1  # s
-    SLOWEST = 2  # m/s, slower is a departure
-    ROW = 3  # row of the block that is filled next
-    NAV_SIGMA = 4  # m
-    NAV_TIME = 5  # s
-    ROWS = 6  # where the rows of a block start in the arena
-    LONGITUDE = 7  # rad, the chart's middle
-
-
-class Table(IntEnum):
-    """Tables of a flight: each has its first row, the row after its last and its columns in the layout."""
-
-    POSITION = 0
-    ANGLE = 1
-    TO_PIXEL = 2
-    PIECES = 3
-    NODES = 4
-    CORNERS = 5
-    SPEEDS = 6
-
-
-# Where the fixed parts start.
-STATE: Final = 0
-COMMANDS: Final = STATE + STATE_SIZE
-FACTORS: Final = COMMANDS + COMMAND_SIZE
-PLACE: Final = FACTORS + STATE_SIZE
-SEEN: Final = PLACE + PLACE_SIZE
-AIR: Final = SEEN + PLACE_SIZE
-WIND: Final = AIR + AIR_SIZE
-GUSTS: Final = WIND + WIND_SIZE
-NAV: Final = GUSTS + GUST_STATES
-MEMORY: Final = NAV + NAV_STATES
-GAINS: Final = MEMORY + len(M)
-CONSTANTS: Final = GAINS + len(G)
-LAYOUT: Final = CONSTANTS + len(K)
-# What is set in JSBSim: commands, gusts north, east and down, the ground's height; SI here, then times its scale.
-OUT: Final = LAYOUT + 3 * len(Table)
-OUT_SIZE: Final = COMMAND_SIZE + 4
-SCALES: Final = OUT + OUT_SIZE
-NOISE: Final = SCALES + 2 * OUT_SIZE
-# Turbulence's and navigation's, each tick.
-NOISE_SIZE: Final = 6
-
-
-class Arena:
-    """The arrays and named views into them.
-
-    block: ticks that are flown at a time; `noise` (block, 6) and `rows` (block, ROW) hold one block.  tables: one
-    two-dimensional array for each of `Table`, copied into `tables`.
+    array: (1,) of `WORKSPACE`, for compiled code.
+    record: its one record, for Python.
+    path: of `PATH_ROW`, as many as there are pieces, nodes or waypoints.
+    readings: (n,) the state's `READ_FIELDS`.
+    output: (n,) the fields of `OUTPUT`.
+    ticks_flown, rows_filled: (1,) of the workspace's timing.
+    turbulence, navigation: (BLOCK_TICKS, 3) the noise of each.
+    rows: (BLOCK_TICKS,) of the track.
     """
 
-    def __init__(self, gains: Gains, block: int, tables: dict[Table, Floats]) -> None:
-        rows = NOISE + NOISE_SIZE * block
-        self.packed: Floats = np.zeros(rows + ROW * block)
-        self.packed[GAINS:CONSTANTS] = gains.packed()
-        self.packed[CONSTANTS + K.ROWS] = rows
-        self.tables: Floats = np.zeros(
-            (sum(map(len, tables.values())), max(table.shape[1] for table in tables.values()))
-        )
-        at = 0
-        for name, table in tables.items():
-            end = at + len(table)
-            self.tables[at:end, : table.shape[1]] = table
-            self.packed[LAYOUT + 3 * name : LAYOUT + 3 * name + 3] = at, end, table.shape[1]
-            at = end
-        self.state = self.packed[STATE:COMMANDS]
-        self.commands = self.packed[COMMANDS:FACTORS]
-        self.factors = self.packed[FACTORS:PLACE]
-        self.air = self.packed[AIR:WIND]
-        self.wind = self.packed[WIND:GUSTS]
-        self.gusts = self.packed[GUSTS:NAV]
-        self.nav = self.packed[NAV:MEMORY]
-        self.memory = self.packed[MEMORY:GAINS]
-        self.constants = self.packed[CONSTANTS:LAYOUT]
-        self.out = self.packed[OUT:SCALES]
-        self.scales = self.packed[SCALES:NOISE]
-        self.noise = self.packed[NOISE:rows].reshape(block, NOISE_SIZE)
-        self.rows = self.packed[rows:].reshape(block, ROW)
+    def __init__(self, gains: Gains, path: FlyByPath, waypoints: Records) -> None:
+        self.array: Records = np.zeros(1, WORKSPACE)
+        self.record: Record = self.array[0]
+        self.record.gains = gains.record()
+        parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
+        self.path: Records = np.zeros(max(map(len, parts.values())), PATH_ROW)
+        for name, rows in parts.items():
+            self.path[name][: len(rows)] = rows
+            setattr(self.record.settings, f"{name}s", len(rows))
+        self.readings = self._numbers("state", len(READ_FIELDS))
+        self.output = self._numbers("output", len(field_names(OUTPUT)))
+        # Made once: numpy takes microseconds for each field of a record that Python asks for.
+        self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
+        self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
+        self.turbulence: Floats = self.array["noise"]["turbulence"][0]
+        self.navigation: Floats = self.array["noise"]["navigation"][0]
+        self.rows: Records = self.array["rows"][0]
+
+    def _numbers(self, field: str, count: int) -> Floats:
+        """The first numbers of a field, as an array that shares its memory."""
+        fields: Any = WORKSPACE.fields
+        return np.frombuffer(self.array, np.float64, count, fields[field][1])

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope, turn_radius
 from flight.dynamics.characteristics import AMSL, Mode, StepResponse, TrimRow
-from flight.dynamics.state import C, S
 from logs.figures.elements import style
 
 Floats = NDArray[np.float64]
@@ -32,15 +31,15 @@ _MODE_COLORS = {
     "spiral": style.LIMIT,
 }
 _ROWS = {
-    S.PITCH: ("pitch", "°", 180.0 / math.pi),
-    S.ROLL: ("roll", "°", 180.0 / math.pi),
-    S.YAW: ("heading", "°", 180.0 / math.pi),
-    S.ALPHA: ("angle of attack", "°", 180.0 / math.pi),
-    S.BETA: ("sideslip", "°", 180.0 / math.pi),
-    S.P: ("roll rate", "°/s", 180.0 / math.pi),
-    S.R: ("yaw rate", "°/s", 180.0 / math.pi),
-    S.AIRSPEED: ("airspeed", "m/s", 1.0),
-    S.AMSL: ("height", "m", 1.0),
+    "pitch": ("pitch", "°", 180.0 / math.pi),
+    "roll": ("roll", "°", 180.0 / math.pi),
+    "yaw": ("heading", "°", 180.0 / math.pi),
+    "alpha": ("angle of attack", "°", 180.0 / math.pi),
+    "beta": ("sideslip", "°", 180.0 / math.pi),
+    "roll_rate": ("roll rate", "°/s", 180.0 / math.pi),
+    "yaw_rate": ("yaw rate", "°/s", 180.0 / math.pi),
+    "airspeed": ("airspeed", "m/s", 1.0),
+    "amsl": ("height", "m", 1.0),
 }
 
 
@@ -207,7 +206,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
     >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
     ['pitch (°)', 'pitch (°)', 'roll (°)', 'roll (°)']
     """
-    deep = max(len(step.rows) for step in steps)
+    deep = max(len(step.quantities) for step in steps)
     with style.clean_style():
         figure = style.new_figure(1.3 + 1.7 * deep)
         axes = figure.subplots(deep, len(steps), squeeze=False, sharex="col")
@@ -219,7 +218,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
         for column, step in enumerate(steps):
             for row in range(deep):
                 panel = axes[row, column]
-                if row >= len(step.rows):
+                if row >= len(step.quantities):
                     panel.axis("off")
                     continue
                 _answer(panel, step, row)
@@ -230,7 +229,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
 
 
 def _answer(axes: Any, step: StepResponse, row: int) -> None:
-    name, unit, factor = _ROWS[step.rows[row]]
+    name, unit, factor = _ROWS[step.quantities[row]]
     values = factor * step.change[:, row]
     axes.axhline(0.0, color="#999999", linewidth=0.6)
     held = min(step.held, float(step.time[-1]) - 1.0)
@@ -243,11 +242,11 @@ def _answer(axes: Any, step: StepResponse, row: int) -> None:
 
 
 def _step_title(step: StepResponse) -> str:
-    name = step.control.name.lower()
-    if step.control is C.THROTTLE:
+    name = step.control
+    if step.control == "throttle":
         size = f"{100.0 * step.size:+.0f} %"
     else:
-        ways = {C.ELEVATOR: ("down", "up"), C.AILERON: ("to roll right", "to roll left"), C.RUDDER: ("to yaw left", "")}
+        ways = {"elevator": ("down", "up"), "aileron": ("to roll right", "to roll left"), "rudder": ("to yaw left", "")}
         size = f"{abs(math.degrees(step.size)):.1f}° {ways[step.control][step.size < 0.0]}"
     return f"{name} {size}" + (f", {step.held:.0f} s" if math.isfinite(step.held) else ", held")
 

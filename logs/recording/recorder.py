@@ -19,7 +19,7 @@ from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.track import COLUMNS, Track, track_rows
+from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording.attachment_names import RESULT, VERDICT, media_type
 from logs.recording.chunk_layout import (
@@ -39,14 +39,10 @@ from logs.recording.setup_attachments import pack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
-    FLOWN_ROW,
     SECOND_NS,
     STATE_NAME,
     STATE_TOPIC,
-    Rows,
     encode_rows,
-    join_rows,
-    named_rows,
     schema_of,
     state_schema,
     times_ns,
@@ -59,7 +55,7 @@ PROFILE = "planfly"
 LONGEST = 1e7  # s
 
 _BUFFER = 2**20
-_NO_ROWS: Rows = np.empty(0, dtype=FLOWN_ROW)
+_NO_ROWS: Rows = np.empty(0, dtype=TRACK_ROW)
 _NO_TIMES = np.empty(0, dtype=np.int64)
 _CHANNELS: dict[str, Any] = {
     TF_TOPIC: FrameTransform,
@@ -141,15 +137,14 @@ class Recorder:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
         self.write_rows(track_rows(block))
 
-    def write_rows(self, rows: Floats) -> None:
-        """Record rows as a flight hands them on: (t, columns) in the order of `flight.simulation.track.COLUMNS`.
+    def write_rows(self, rows: Rows) -> None:
+        """Record rows as a flight hands them on, (t,) of `flight.simulation.track.TRACK_ROW`.
 
         Raises ValueError unless their times increase, from 0 on, across all calls.
         """
         if not len(rows):
             return
-        flown = named_rows(rows)
-        times = np.ascontiguousarray(flown["time"])
+        times = np.ascontiguousarray(rows["time"])
         newest = last_log_time(times, self._newest_ns, EPOCH_NS, LONGEST)
         if newest == OUT_OF_RANGE:
             raise ValueError(f"time {times[0]}..{times[-1]} s: 0..{LONGEST:g} is expected")
@@ -157,9 +152,9 @@ class Recorder:
             raise ValueError(f"rows from {times[0]} s on: times must increase by at least 1 ns a row")
         self._newest_ns = newest
         # One row in `every`, counted from the flight's first.
-        kept = flown[-self._received % self._every :: self._every]
-        self._received += len(flown)
-        self._skipped = flown[-1:] if (self._received - 1) % self._every else None
+        kept = rows[-self._received % self._every :: self._every]
+        self._received += len(rows)
+        self._skipped = rows[-1:] if (self._received - 1) % self._every else None
         if len(kept):
             self._append(kept)
 
@@ -235,7 +230,7 @@ class Recorder:
 
     def _emit(self, until: int | None) -> None:
         """Write the pending rows and events before ``until`` (ns; None for all), in chunks of at most a second."""
-        rows = join_rows(self._pending, FLOWN_ROW)
+        rows = join_rows(self._pending)
         log_times = times_ns(rows["time"])
         stop = len(rows) if until is None else int(np.searchsorted(log_times, until))
         self._pending = [rows[stop:]] if stop < len(rows) else []

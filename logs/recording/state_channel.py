@@ -96,8 +96,6 @@ def _fields() -> tuple[StateField, ...]:
 
 FIELDS = _fields()
 _MESSAGE_FIELDS = [("row", "<u4"), *((field.name, field.kind) for field in FIELDS)]
-# A row as it is flown, by the names of `Track`, all float64.
-FLOWN_ROW = np.dtype([(name, np.float64, (width,) if width > 1 else ()) for name, width in COLUMNS.items()])
 
 
 def _file() -> descriptor_pb2.FileDescriptorProto:
@@ -185,13 +183,8 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def named_rows(rows: NDArray[np.float64]) -> Rows:
-    """Flown rows (t, columns), in the order of `flight.simulation.track.COLUMNS`, as (t,) of `FLOWN_ROW`."""
-    return np.ascontiguousarray(rows).view(FLOWN_ROW).reshape(len(rows))
-
-
-def encode_rows(rows: Rows, first_row: int, channel: int) -> Rows:
-    """Encode flown rows, (t,) of `FLOWN_ROW`, as MCAP message records (t,) of `RECORD`.
+def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> Rows:
+    """Encode flown rows, (t,) of `flight.simulation.track.TRACK_ROW`, as MCAP message records (t,) of `RECORD`.
 
     first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
     """

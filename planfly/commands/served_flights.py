@@ -21,8 +21,8 @@ from flight.live.snapshot import SnapshotMaker
 from flight.live.status_text import CRITICAL, INFO, NOTICE, WARNING, StatusText
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import Flight, as_track
-from flight.simulation.track import Track, join_tracks
+from flight.simulation.simulate import Flight
+from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry

@@ -55,7 +55,7 @@ def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
     """
     number, count, _ = paths.shape
     violations, objectives = np.zeros(number, dtype=VIOLATIONS), np.zeros(number, dtype=OBJECTIVES)
-    scratch = np.zeros(1, dtype=BLOCK_SCRATCH)[0]
+    scratch = np.zeros(1, dtype=BLOCK_SCRATCH)
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     _score_paths(data, paths, scratch, legs, corners, violations, objectives)
     return as_columns(violations).astype(np.int64), as_columns(objectives)
@@ -65,14 +65,17 @@ def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
 def _score_paths(
     data: ProblemArrays,
     paths: Floats,
-    block: Record,
+    scratch: Records,
     legs: Records,
     corners: Records,
     violations: Records,
     objectives: Records,
 ) -> None:  # pragma: no cover - compiled
-    """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3); the others are scratch."""
-    number = paths.shape[0]
+    """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
+
+    scratch: a `BLOCK_SCRATCH` record (1,); legs, corners: records of one path.
+    """
+    number, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
     by_numbers = _by_numbers(data, limits)
     for begin in range(0, number, BLOCK):

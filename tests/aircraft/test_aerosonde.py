@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from aircraft import beard_mclain as reference
 from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm, Variation
-from flight.dynamics.state import STATE_SIZE, S
 from flight.dynamics.trim import Trim, attitude, full_throttle, idle, linearise, straight
+from world.kernels import Record
 
 Floats = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def test_rates_in_any_flight_are_the_reference_rates(motor_braking: bool, spread
     # Off trim, sideslipping, turning, windmilling; with the wider spread, beyond the stall, where JSBSim reads the
     # lift from a table.
     fdm, world = _flat(motor_braking=motor_braking), reference.BookAtmosphere(motor_braking=motor_braking)
-    fdm.place(100.0)
+    fdm.move_to(100.0)
     rng = np.random.default_rng(3)
     for _ in range(60):
         alpha, beta, airspeed = rng.uniform(-spread, spread), rng.uniform(-0.3, 0.3), rng.uniform(12.0, 40.0)
@@ -105,10 +105,11 @@ def test_rates_in_any_flight_are_the_reference_rates(motor_braking: bool, spread
         np.testing.assert_allclose(got / scale, expected / scale, atol=tolerance, rtol=tolerance)
 
 
-def _body(state: Floats) -> Floats:
-    alpha, beta, airspeed = state[S.ALPHA], state[S.BETA], state[S.AIRSPEED]
+def _body(state: Record) -> Floats:
+    alpha, beta, airspeed = state.alpha, state.beta, state.airspeed
     u, v, w = math.cos(alpha) * math.cos(beta), math.sin(beta), math.sin(alpha) * math.cos(beta)
-    return np.array([airspeed * u, airspeed * v, airspeed * w, *state[[S.P, S.Q, S.R, S.ROLL, S.PITCH]]])
+    rates = (state.roll_rate, state.pitch_rate, state.yaw_rate)
+    return np.array([airspeed * u, airspeed * v, airspeed * w, *rates, state.roll, state.pitch])
 
 
 def _departure(rate_hz: int) -> Floats:
@@ -117,24 +118,23 @@ def _departure(rate_hz: int) -> Floats:
     Both fly the surfaces and the motor as JSBSim's actuators move them.
     """
     fdm, world = Fdm(load_aircraft("aerosonde"), flat_earth=True, rate_hz=rate_hz), reference.BookAtmosphere()
-    trimmed = fdm.start(0.0, 0.0, 500.0, 0.0, 25.0).commands()
-    packed = np.empty(STATE_SIZE)
-    fdm.read(packed)
-    states, worst = _body(packed), np.zeros(8)
+    trimmed = np.array(fdm.start(0.0, 0.0, 500.0, 0.0, 25.0).commands())
+    state = fdm.read()
+    states, worst = _body(state), np.zeros(8)
     for k in range(3 * rate_hz):
         commands = trimmed.copy()
         sign = 1.0 if k < rate_hz / 2 else -1.0 if k < rate_hz else 0.0
         commands += [-0.08 * sign, 0.1 * sign, 0.05, 0.2]
         fdm.write(commands)
-        flown = packed[[S.ELEVATOR, S.AILERON, S.RUDDER, S.THROTTLE]].copy()
+        flown = np.array([state.elevator, state.aileron, state.rudder, state.throttle])
         k1 = reference.rates(states, flown, world)
         k2 = reference.rates(states + 0.5 * fdm.dt * k1, flown, world)
         k3 = reference.rates(states + 0.5 * fdm.dt * k2, flown, world)
         k4 = reference.rates(states + fdm.dt * k3, flown, world)
         states = states + fdm.dt / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
         fdm.step()
-        fdm.read(packed)
-        worst = np.maximum(worst, np.abs(_body(packed) - states))
+        state = fdm.read()
+        worst = np.maximum(worst, np.abs(_body(state) - states))
     return worst
 
 

@@ -10,7 +10,6 @@ import pytest
 from aircraft.catalog import jsbsim_folder, load_aircraft, read_aircraft
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.model_check import check_model
-from flight.dynamics.state import STATE_SIZE, C, S
 from flight.dynamics.trim import fastest, full_throttle, idle, straight
 from flight.guidance.gains import load_gains
 from world.errors import FlightError
@@ -23,20 +22,19 @@ def test_a_trimmed_start_has_a_running_engine_and_no_transient(tmp_path: Path, m
     shipped = sorted(path.name for path in CESSNA.model_file.parent.iterdir())
     fdm = Fdm(CESSNA)
     trim = fdm.start(46.0, 8.0, 900.0, 1.0, 50.0, 0.02, (3.0, -4.0, 0.0), terrain_amsl=400.0)
-    first, last = np.zeros(STATE_SIZE), np.zeros(STATE_SIZE)
-    fdm.read(first)
-    rpm = fdm._getter("propulsion/engine/propeller-rpm")
+    first = fdm.read()
+    rpm = fdm.properties.getter("propulsion/engine/propeller-rpm")
     before = rpm()
     assert before > 1500.0
     fdm.write(trim.commands())
     fdm.step(240)
-    fdm.read(last)
-    assert first[S.AIRSPEED] == pytest.approx(50.0, abs=1e-6)
+    last = fdm.read()
+    assert first.airspeed == pytest.approx(50.0, abs=1e-6)
     assert rpm() == pytest.approx(before, rel=1e-3)
-    assert last[S.AIRSPEED] == pytest.approx(50.0, abs=0.02)
+    assert last.airspeed == pytest.approx(50.0, abs=0.02)
     # Its elevator has play, which takes up 0.1 degrees.
-    assert abs(last[S.V_DOWN] - first[S.V_DOWN]) < 0.1
-    assert abs(last[S.ROLL] - first[S.ROLL]) < 0.01
+    assert abs(last.velocity_down - first.velocity_down) < 0.1
+    assert abs(last.roll - first.roll) < 0.01
     # The stock model writes JSBout172B.csv.
     assert not list(tmp_path.iterdir())
     assert sorted(path.name for path in CESSNA.model_file.parent.iterdir()) == shipped
@@ -72,40 +70,37 @@ def test_a_trim_does_not_depend_on_where_the_engine_was() -> None:
 
 
 @pytest.mark.parametrize(
-    ("row", "surface", "rate", "sign"),
-    [(C.ELEVATOR, S.ELEVATOR, S.Q, -1.0), (C.AILERON, S.AILERON, S.P, 1.0), (C.RUDDER, S.RUDDER, S.R, -1.0)],
+    ("control", "rate", "sign"),
+    [("elevator", "pitch_rate", -1.0), ("aileron", "roll_rate", 1.0), ("rudder", "yaw_rate", -1.0)],
 )
 @pytest.mark.parametrize("way", [1.0, -1.0])
-def test_commands_in_radians_move_the_surfaces_by_that(row: C, surface: S, rate: S, sign: float, way: float) -> None:
+def test_commands_in_radians_move_the_surfaces_by_that(control: str, rate: str, sign: float, way: float) -> None:
     fdm = Fdm(CESSNA)
     commands = fdm.start(46.0, 8.0, 600.0, 0.0, 50.0).commands()
     size = way * 0.12
-    commands[row] += size
-    fdm.write(commands)
-    states = np.zeros((2, STATE_SIZE))
-    fdm.read(states[0])
+    fdm.write(commands._replace(**{control: getattr(commands, control) + size}))
+    before = fdm.read()
     fdm.step(30)
-    fdm.read(states[1])
+    after = fdm.read()
     # The play of the actuators: 0.05 rad in the elevator, 0.005 in the ailerons.
-    assert states[1, surface] - states[0, surface] == pytest.approx(size, abs=0.026)
-    assert sign * way * states[1, rate] > 0.01
+    assert after[control] - before[control] == pytest.approx(size, abs=0.026)
+    assert sign * way * after[rate] > 0.01
 
 
 def test_power_is_the_heat_of_the_fuel_burned() -> None:
     fdm = Fdm(CESSNA)
     fdm.start(46.0, 8.0, 600.0, 0.0, 50.0)
-    tanks = [fdm._getter(f"propulsion/tank[{k}]/contents-lbs") for k in range(2)]
+    tanks = [fdm.properties.getter(f"propulsion/tank[{k}]/contents-lbs") for k in range(2)]
     assert sum(tank() for tank in tanks) * 0.45359237 == pytest.approx(117.9, abs=0.1)  # trimming burns nothing
     before, heat = sum(tank() for tank in tanks), 0.0
-    state = np.zeros(STATE_SIZE)
     for _ in range(1200):
         fdm.step()
-        fdm.read(state)
-        heat += state[S.POWER] * fdm.dt
+        state = fdm.read()
+        heat += state.power * fdm.dt
     burned = (before - sum(tank() for tank in tanks)) * 0.45359237
     assert burned > 0.01
     assert heat == pytest.approx(burned * 43.5e6, rel=2e-3)
-    assert state[S.CURRENT] == 0.0
+    assert state.current == 0.0
 
 
 def test_what_it_lacks_is_refused_only_where_it_is_asked_for() -> None:

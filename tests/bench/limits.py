@@ -199,7 +199,7 @@ def calm_limits(*, whole: bool) -> list[Limit]:
 
 
 def wind_limits(*, whole: bool) -> list[Limit]:
-    """The same in a wind of 10 m/s: from ahead, behind and the side."""
+    """Slopes and shortest legs of the Aerosonde in a wind of 10 m/s: from ahead, behind and the side."""
     aircraft = load_aircraft("aerosonde")
     sides = [COURSE + part * math.pi for part in ((0.0, 0.5, 1.0, 1.5) if whole else (1.0,))]
     found = []

@@ -17,7 +17,7 @@ def best(work: Callable[[], object], rounds: int = ROUNDS) -> float:
 
 
 def best_cpu(work: Callable[[], object], rounds: int = ROUNDS) -> float:
-    """Do the same in CPU seconds of this process."""
+    """The shortest of a few runs in CPU seconds of this process, s."""
     spent = []
     for _ in range(rounds):
         started = time.process_time()

@@ -62,8 +62,8 @@ SEARCHED = tuple(START)
 TRAINED, REPORTED = {"aerosonde": range(16), "c172x": range(8)}, range(1000, 1024)
 # The first factor that a gain is changed by, and the least share of the cost that a change must save.
 FIRST_STEP, WORTH_TAKING = 1.5, 0.001
-# What a figure counts as one: the aims in wind, of the cross-track's RMS in calm air; and, of the aircraft that
-# the aims are for, of its largest too.
+# What a figure counts as one: the aims of `tests.bench.flight` in wind, of the cross-track's RMS in calm air; and, of
+# the aircraft that the aims are for, of its largest too.
 SCALES = {"aerosonde": (0.05, 0.4, 0.2, 0.8), "c172x": (0.05, 0.6, 0.2, 0.8)}
 # What the cross-track's RMS on straight legs counts as one, m, and how far from corners, m, at 25 m/s.
 STRAIGHT, CLEAR = 0.02, 250.0

@@ -8,7 +8,6 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.dynamics.characteristics import name_modes, step_responses, trim_table
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.state import C, S
 from flight.dynamics.trim import linearise, straight
 
 AEROSONDE = load_aircraft("aerosonde")
@@ -57,15 +56,15 @@ def test_slower_takes_less_power_and_lasts_longer() -> None:
 @pytest.mark.parametrize("name", ["aerosonde", "c172x"])
 def test_each_control_is_answered_the_right_way(name: str) -> None:
     steps = {step.control: step for step in step_responses(load_aircraft(name))}
-    assert list(steps) == [C.ELEVATOR, C.THROTTLE, C.AILERON, C.RUDDER]
-    for control, row, sign in (
-        (C.ELEVATOR, S.ALPHA, 1.0),
-        (C.THROTTLE, S.AIRSPEED, 1.0),
-        (C.AILERON, S.ROLL, 1.0),
-        (C.RUDDER, S.R, -1.0),
+    assert list(steps) == ["elevator", "throttle", "aileron", "rudder"]
+    for control, quantity, sign in (
+        ("elevator", "alpha", 1.0),
+        ("throttle", "airspeed", 1.0),
+        ("aileron", "roll", 1.0),
+        ("rudder", "yaw_rate", -1.0),
     ):
         step = steps[control]
-        answer = step.change[:, step.rows.index(row)]
+        answer = step.change[:, step.quantities.index(quantity)]
         before = step.time < 1.0
         assert np.abs(answer[before]).max() < 2e-3
         assert sign * answer[np.searchsorted(step.time, 1.8)] > 2e-3

@@ -1,4 +1,4 @@
-"""L1 and the vector field by their formulas and in flight, and what navigation's errors look like."""
+"""L1 and the vector field by their formulas and in flight."""
 
 import math
 from collections.abc import Callable
@@ -8,17 +8,19 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
-from flight.guidance.navigation_error import ERRORS, NAV_STATES, navigate, start_navigation
-from flight.guidance.reference_laws import field_course, l1_acceleration, l1_angles, l1_length, l1_reached
+from flight.guidance.navigation_error import MOTION
+from flight.guidance.reference_laws import WAYPOINT, field_course, l1_acceleration, l1_angles, l1_length, l1_reached
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
+from world.kernels import Record
 
 MakeSetup = Callable[..., FlightSetup]
-A, B = np.array([0.0, 0.0, 0.0, 0.0]), np.array([0.0, 1000.0, math.pi / 4, 0.0])
+A, B = np.array([(0.0, 0.0, 0.0, False, 0.0, 25.0), (0.0, 1000.0, math.pi / 4, False, 0.0, 25.0)], WAYPOINT)
 
 
-def _at(east: float, north: float, course: float = 0.0) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return np.array([east, north, 500.0, 25.0 * math.sin(course), 25.0 * math.cos(course), 0.0])
+def _at(east: float, north: float, course: float = 0.0) -> Record:
+    rows = [(east, north, 500.0, 25.0 * math.sin(course), 25.0 * math.cos(course), 0.0)]
+    return np.array(rows, MOTION)[0]
 
 
 def test_l1_is_the_second_order_law_it_claims() -> None:
@@ -41,7 +43,7 @@ def test_l1_far_away_and_at_its_corners() -> None:
     assert l1_reached(_at(0.0, 956.0), A, B, 200.0, 90.0)
     assert not l1_reached(_at(0.0, 954.0), A, B, 200.0, 90.0)
     over = B.copy()
-    over[3] = 1.0
+    over.fly_over = True
     assert not l1_reached(_at(0.0, 999.0), A, over, 200.0, 90.0)
     assert l1_reached(_at(30.0, 1000.1), A, over, 200.0, 90.0)
 
@@ -58,7 +60,7 @@ def test_the_field_points_to_its_path() -> None:
 
 
 @pytest.mark.parametrize("law", ["l1", "vector-field"])
-def test_a_rival_flies_the_mission(make_setup: MakeSetup, aerosonde: Aircraft, law: str) -> None:
+def test_a_reference_law_flies_the_mission(make_setup: MakeSetup, aerosonde: Aircraft, law: str) -> None:
     way = [[0, 0, 500], [0, 1500, 520], [1000, 2500, 520], [1000, 4000, 500]]
     setup = make_setup(way, wind=(5.0, 70.0))
     flown = simulate(replace(setup, guidance=law), aerosonde)
@@ -67,40 +69,3 @@ def test_a_rival_flies_the_mission(make_setup: MakeSetup, aerosonde: Aircraft, l
     assert 0.3 < float(np.abs(flown.track.cross_track).max()) < 40.0
     assert float(np.abs(ours.track.cross_track).max()) < float(np.abs(flown.track.cross_track).max())
     assert float(np.abs(flown.track.height_error[300:]).max()) < 1.0
-
-
-def test_navigation_errors_have_their_size_and_their_rate() -> None:
-    dt, count = 1 / 60, 400_000
-    random = np.random.default_rng(5)
-    for sigma, time_constant in (ERRORS["rtk"], ERRORS["gnss"]):
-        errors, seen = np.zeros(NAV_STATES), np.zeros(6)
-        start_navigation(random.standard_normal(NAV_STATES), errors)
-        found = np.empty((count, 6))
-        noise = random.standard_normal((count, 3))
-        for k in range(count):
-            navigate(np.zeros(6), seen, errors, noise[k], sigma, time_constant, dt)
-            found[k] = seen
-        assert np.sqrt((found[:, :3] ** 2).mean()) == pytest.approx(sigma, rel=0.25)
-        # Of this process the rate's deviation is sigma / T, and the velocity's error is the rate of the position's.
-        assert np.sqrt((found[:, 3:] ** 2).mean()) == pytest.approx(sigma / time_constant, rel=0.1)
-        rate = np.diff(found[:, :3], axis=0) / dt
-        assert np.sqrt(((rate - found[:-1, 3:]) ** 2).mean()) < 0.1 * sigma / time_constant
-
-
-def test_guidance_follows_what_navigation_says_and_the_track_is_true(
-    make_setup: MakeSetup, aerosonde: Aircraft
-) -> None:
-    setup = make_setup([[0, 0, 500], [0, 3000, 500]])
-    perfect, rtk, gnss = (simulate(replace(setup, nav=nav), aerosonde).track for nav in ("perfect", "rtk", "gnss"))
-    away = [float(np.abs(track.position[300:, 0]).max()) for track in (perfect, rtk, gnss)]
-    assert away[0] < 0.05 < 0.3 < away[2] < 8.0
-    assert away[0] < away[1] < 0.5
-    # It believes to be on the path.
-    assert float(np.abs(gnss.cross_track[300:]).max()) < 0.5 * away[2]
-
-
-def test_thirty_hertz(make_setup: MakeSetup, aerosonde: Aircraft) -> None:
-    setup = make_setup([[0, 0, 500], [0, 1500, 500], [800, 2600, 520]])
-    track = simulate(replace(setup, guidance_hz=30), aerosonde).track
-    assert np.diff(track.time) == pytest.approx(1 / 30, abs=1e-9)
-    assert float(np.abs(track.cross_track[150:]).max()) < 0.6

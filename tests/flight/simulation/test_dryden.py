@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from scipy.signal import welch
 
 from aircraft.catalog import Aircraft
-from flight.simulation.dryden import GUST_STATES, dryden_scales, start_gusts, step_gusts
-from flight.simulation.simulate import Flight, as_track
+from flight.simulation.dryden import GUST_FILTERS, dryden_scales, start_gusts, step_gusts
+from flight.simulation.simulate import Flight
+from flight.simulation.track import as_track
 from tests.setups import MakeSetup
+from world.kernels import Record
 
 Floats = NDArray[np.float64]
 SPEED, DT = 25.0, 1.0 / 60.0
@@ -20,10 +22,10 @@ LIGHT, MODERATE = 7.716, 15.43  # 15 and 30 knots at 20 ft
 
 
 @njit
-def _run(noise: Floats, gusts: Floats, w20: float, height: float, speed: float, dt: float) -> Floats:
+def _run(noise: Floats, filters: Record, w20: float, height: float, speed: float, dt: float) -> Floats:
     out = np.empty((noise.shape[0], 3))
     for k in range(noise.shape[0]):
-        out[k, 0], out[k, 1], out[k, 2] = step_gusts(gusts, noise[k], w20, height, speed, dt)
+        out[k, 0], out[k, 1], out[k, 2] = step_gusts(filters, noise[k], w20, height, speed, dt)
     return out
 
 
@@ -31,9 +33,9 @@ def _gusts(
     count: int, height: float, seed: int = 1, w20: float = MODERATE, speed: float = SPEED, dt: float = DT
 ) -> Floats:
     random = np.random.default_rng(seed)
-    state = np.zeros(GUST_STATES)
-    start_gusts(random.standard_normal(GUST_STATES), state)
-    return np.asarray(_run(random.standard_normal((count, 3)), state, w20, height, speed, dt))
+    filters = np.zeros(1, GUST_FILTERS)[0]
+    start_gusts(random.standard_normal(5), filters)
+    return np.asarray(_run(random.standard_normal((count, 3)), filters, w20, height, speed, dt))
 
 
 def _military(height: float, w20: float) -> tuple[Floats, Floats]:

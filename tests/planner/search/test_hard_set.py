@@ -50,7 +50,7 @@ def test_hard_set_is_safe_in_every_run(threats: str, make_limits: Callable[[Scen
         plan = plan_path(scenario, make_limits(scenario), seed=seed, algorithm="umda-seeded")
         assert plan.safe, (seed, plan.certificate.problems)
         check_at_one_metre(plan)
-        # The paper's own budget, seeds and polish included.
+        # The paper's own budget, seeds and pattern search included.
         assert plan.evaluations <= table.population + table.generations * (table.population // 2)
         lengths.append(float(plan.objectives[0]))
     assert max(lengths) <= 1.03 * min(lengths)

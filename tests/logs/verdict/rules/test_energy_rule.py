@@ -10,7 +10,6 @@ from aircraft.catalog import load_aircraft
 from aircraft.envelope import Envelope
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
-from flight.dynamics.state import STATE_SIZE, S
 from flight.dynamics.trim import straight
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
@@ -33,14 +32,13 @@ def real_setup(*, table: Envelope | None = None, scenario: Scenario | None = Non
 @pytest.mark.parametrize("airspeed", [20.0, 25.0, 29.0])
 @pytest.mark.parametrize("angle_deg", [-4.0, -2.0, 0.0, 2.0, 4.0])
 def test_the_parabola_through_three_trims_is_the_trims_between_them(airspeed: float, angle_deg: float) -> None:
-    fdm, state = Fdm(AEROSONDE), np.zeros(STATE_SIZE)
+    fdm = Fdm(AEROSONDE)
     found = straight(fdm, airspeed, 700.0, math.radians(angle_deg))
     assert found is not None
     fdm.balance(found.vector())
-    fdm.read(state)
     known = load_envelope(AEROSONDE).power(airspeed, 700.0, math.radians(angle_deg))
     # Idle is less than full by 300 to 800 W.
-    assert known == pytest.approx(float(state[S.POWER]), abs=10.0)
+    assert known == pytest.approx(float(fdm.read().power), abs=10.0)
 
 
 def test_prediction_and_flight_agree() -> None:
