@@ -4,35 +4,68 @@ Only the planning is tightened: every round is judged against the scenario as it
 """
 
 import copy
-import re
 from collections.abc import Callable
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import Change
 from world.scenario import Scenario, from_spec
 
 Spec = dict[str, Any]
 
 # Beyond what the flight fell short by, m.
-CLEARANCE_RESERVE = 5.0
-MISSILE_RESERVE = 10.0
+CLEARANCE_BUFFER = 5.0
+MISSILE_BUFFER = 10.0
 # Where a limit is already the aircraft's and the flight failed all the same, this share of it is left.
 SHARE = 0.9
+# Bank (deg) below which it is not tightened further.
+LEAST_BANK_DEG = 5.0
 # What follows a round that another follows.
 GO_ON = "tightened and planned again"
 
+Tightened = Literal["max_climb_deg", "max_dive_deg", "max_turn_deg", "max_bank_deg", "min_clearance_m", "kill_radius_m"]
 
-def tighten(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[str]]:
-    """The scenario to plan in next, and what was changed in words; no words where nothing can be tightened."""
+
+@dataclass(frozen=True, slots=True)
+class Tightening:
+    """One number of the scenario to plan in, changed.
+
+    what: its key.
+    name: of the threat that it belongs to, "" for the scenario's own.
+    current, wanted: in the key's unit, or "aircraft" for the aircraft's limit.
+    """
+
+    what: Tightened
+    current: float | str
+    wanted: float | str
+    name: str = ""
+
+
+def tightening_text(change: Tightening) -> str:
+    """One tightening, as ``rounds.json`` and the terminal have it.
+
+    >>> tightening_text(Tightening("min_clearance_m", 60.0, 72.5))
+    'limits.min_clearance_m: 60 to 72.5'
+    """
+    match change.what:
+        case "max_bank_deg":
+            return f"flight.max_bank_deg (of the plan): {change.current:g} to {change.wanted:g}"
+        case "kill_radius_m":
+            return f"kill radius of {change.name}: {change.current:g} to {change.wanted:g}"
+        case "min_clearance_m":
+            return f"limits.min_clearance_m: {change.current:g} to {change.wanted:g}"
+    return f"limits.{change.what}: {change.current} to {change.wanted}"
+
+
+def tighten(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
+    """The scenario to plan in next, and what was changed; no changes where nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
     failed = [item for item in verdict.findings if item.ok is False]
-    changes: list[str] = []
-    for change in (_slopes, _turns):
-        changes += change(spec, scenario, failed)
+    changes = _slopes(spec, failed) + _turns(spec, scenario, failed)
     if not changes:
         # A flight that cannot follow its plan comes down lower and closer too: that is no reason of its own.
-        for change in (_clearance, _missiles):
-            changes += change(spec, scenario, failed)
+        changes = _clearance(spec, scenario, failed) + _missiles(spec, failed)
     if not changes:
         return scenario, []
     return from_spec(spec, scenario.name, ground=scenario.terrain), changes
@@ -42,9 +75,10 @@ def _limits(spec: Spec) -> Spec:
     return spec.setdefault("limits", {})  # type: ignore[no-any-return]  # plain JSON data
 
 
-def _slopes(spec: Spec, _scenario: Scenario, failed: list[Finding]) -> list[str]:
+def _slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
-    for key, sign in (("max_climb_deg", 1.0), ("max_dive_deg", -1.0)):
+    keys: tuple[tuple[Tightened, float], ...] = (("max_climb_deg", 1.0), ("max_dive_deg", -1.0))
+    for key, sign in keys:
         mine = [sign * item.planned for item in failed if item.rule == "slope" and item.planned is not None]
         steep = [angle for angle in mine if angle > 0.0]
         if not steep:
@@ -55,52 +89,53 @@ def _slopes(spec: Spec, _scenario: Scenario, failed: list[Finding]) -> list[str]
         if now == "aircraft" or not by_aircraft:
             tighter = round(SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
         _limits(spec)[key] = tighter
-        changes.append(f"limits.{key}: {now} to {tighter}")
+        changes.append(Tightening(key, now, tighter))
     return changes
 
 
-def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[str]:
+def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     if not any(item.rule in ("turn", "waypoint") for item in failed):
         return []
     now = _limits(spec).get("max_turn_deg", "aircraft")
     if now != "aircraft":
         _limits(spec)["max_turn_deg"] = "aircraft"
-        return [f"limits.max_turn_deg: {now} to aircraft"]
+        return [Tightening("max_turn_deg", now, "aircraft")]
     # Larger arcs to plan with, while the flight keeps its bank.
     bank = scenario.flight.max_bank_deg
     tighter = round(SHARE * bank, 2)
-    if tighter < 5.0:
+    if tighter < LEAST_BANK_DEG:
         return []
     spec.setdefault("flight", {})["max_bank_deg"] = tighter
-    return [f"flight.max_bank_deg (of the plan): {bank:g} to {tighter:g}"]
+    return [Tightening("max_bank_deg", bank, tighter)]
 
 
-def _clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[str]:
+def _clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
     short = [-item.margin for item in failed if item.rule == "clearance" and item.margin is not None]
     if not short:
         return []
     now = scenario.limits.min_clearance_m
-    tighter = round(now + max(0.0, *short) + CLEARANCE_RESERVE, 1)
+    tighter = round(now + max(0.0, *short) + CLEARANCE_BUFFER, 1)
     _limits(spec)["min_clearance_m"] = tighter
-    return [f"limits.min_clearance_m: {now:g} to {tighter:g}"]
+    return [Tightening("min_clearance_m", now, tighter)]
 
 
-def _missiles(spec: Spec, _scenario: Scenario, failed: list[Finding]) -> list[str]:
+def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
     changes = []
     for item in failed:
         if item.planned:
             # The plan itself enters it: the planner knew no way outside, and a larger sphere leaves none either.
             continue
-        depth = re.search(r"pass .* (\d+) m further away", item.suggestion)
-        name = item.where.removesuffix(" (missile)")
-        if item.rule != "threat" or depth is None:
-            continue
-        for number, threat in enumerate(spec.get("threats", [])):
-            if threat.get("name", f"threat {number + 1}") == name and "kill_radius_m" in threat:
-                now = threat["kill_radius_m"]
-                threat["kill_radius_m"] = now + float(depth[1]) + MISSILE_RESERVE
-                changes.append(f"kill radius of {name}: {now:g} to {threat['kill_radius_m']:g}")
+        for step in _distances(item):
+            threat = spec["threats"][item.place.index]
+            now = threat["kill_radius_m"]
+            threat["kill_radius_m"] = now + step.wanted + MISSILE_BUFFER
+            changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], item.place.name))
     return changes
+
+
+def _distances(item: Finding) -> list[Change]:
+    """What a finding suggests of the distance to a missile."""
+    return [change for suggestion in item.suggestions for change in suggestion if change.what == "distance"]
 
 
 Rounds = list[dict[str, Any]]
@@ -110,21 +145,23 @@ OneRound = Callable[[Scenario], tuple[Verdict, bool]]
 def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[int], None]) -> tuple[Verdict, Rounds]:
     """Plan and fly in rounds, each tightened by the one before, until flyable or shown not to be.
 
-    most: rounds after the first.  one_round: plans in a scenario and flies; the verdict, and whether it was flown.
-    keep: is told the number of a round whose results another will replace.  Returns the last verdict and a list of
-    what each round changed and gave.
+    most: rounds after the first.
+    one_round: plans in a scenario and flies; the verdict, and whether it was flown.
+    keep: is called with the number of a round whose results another will replace.
+
+    Returns the last verdict, and what each round changed and gave as ``rounds.json`` holds it.
     """
     rounds: Rounds = []
-    planned_in, changes = scenario, list[str]()
+    planned_in, changes = scenario, list[Tightening]()
     for number in range(most + 1):
         verdict, flown = one_round(planned_in)
         rounds.append(
             {
                 "round": number,
-                "changes": changes,
+                "changes": [tightening_text(change) for change in changes],
                 "flown": flown,
                 "flyable": verdict.flyable,
-                "summary": verdict.summary.splitlines()[0],
+                "summary": verdict.headline,
                 "next": "",
             }
         )
@@ -136,7 +173,7 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
     return verdict, rounds
 
 
-def _next(verdict: Verdict, flown: bool, last: bool, changes: list[str]) -> str:
+def _next(verdict: Verdict, flown: bool, last: bool, changes: list[Tightening]) -> str:
     """What follows from a round."""
     if verdict.flyable:
         return "done: it flies"

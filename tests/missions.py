@@ -18,6 +18,7 @@ from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.places import Place
 from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import make_setup
 from tests.mission_draft import Draft, draw_heights, draw_runs, draw_turns
@@ -49,14 +50,14 @@ _AIRSPEEDS = (18.0, 31.0)  # that a scenario may ask an Aerosonde to fly
 class MadeMission:
     """A mission ready to be judged and flown.
 
-    kind: what it breaks, "" for nothing.  where: the legs or waypoints at which that is to be
-    found, as findings begin.
+    kind: what it breaks, "" for nothing.  places: the legs or waypoints, without their items, at which that is to be
+    found.
     """
 
     setup: FlightSetup
     airframe: Airframe
     kind: str
-    where: tuple[str, ...]
+    places: tuple[Place, ...]
 
     @property
     def rule(self) -> str:
@@ -119,16 +120,16 @@ def _make(kind: str, number: int, margin: float) -> MadeMission:
     airframe = load_airframe(scenario)
     mission = waypoint_mission(points, draft.speeds, scenario.origin)
     setup = make_setup(scenario, airframe, mission, number)
-    return MadeMission(setup, airframe, kind, _where(draft))
+    return MadeMission(setup, airframe, kind, _places(draft))
 
 
-def _where(draft: Draft) -> tuple[str, ...]:
+def _places(draft: Draft) -> tuple[Place, ...]:
     """Where a mission's fault is to be found: of a leg too short for its turns, at either of them."""
     if not draft.kind:
         return ()
     if draft.short >= 0:
-        return f"waypoint {draft.short}", f"waypoint {draft.short + 1}"
-    return (f"{'waypoint' if draft.kind == 'turn number' else 'leg'} {draft.bad}",)
+        return Place("waypoint", draft.short), Place("waypoint", draft.short + 1)
+    return (Place("waypoint" if draft.kind == "turn number" else "leg", draft.bad),)
 
 
 def _turbulence(rng: np.random.Generator) -> Any:

@@ -40,8 +40,10 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
     return shapes
 
 
-def fence_problem(fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float) -> str | None:
-    """First fence that a position violates, as text for people; None for none.
+def fence_problem(
+    fences: tuple[MissionItem, ...], origin: GeoOrigin, east: float, north: float
+) -> tuple[str, int] | None:
+    """First fence that a position violates: how, as text for people, and its first item's number; None for none.
 
     fences: items 5001..5004, a polygon's corners together.  Inclusions count together: a position must be in all of
     them.  east, north: m on the map about ``origin``.  Raises MissionError for a polygon of fewer corners than it
@@ -51,7 +53,7 @@ def fence_problem(fences: tuple[MissionItem, ...], origin: GeoOrigin, east: floa
     >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
     >>> origin = GeoOrigin(36.5, -84.2)
     >>> fence_problem((circle,), origin, east=0.0, north=600.0)
-    'outside an inclusion circle of 500 m (fence item 0)'
+    ('outside an inclusion circle of 500 m', 0)
     >>> fence_problem((circle,), origin, east=0.0, north=400.0) is None
     True
     """
@@ -66,7 +68,7 @@ def fence_problem(fences: tuple[MissionItem, ...], origin: GeoOrigin, east: floa
             inside = math.hypot(east - float(corners_east[0]), north - float(corners_north[0])) <= item.params[0]
             name = f"circle of {item.params[0]:.0f} m"
         if inside != (item.command in INCLUSIONS):
-            return f"{'outside an inclusion' if not inside else 'inside an exclusion'} {name} (fence item {item.seq})"
+            return f"{'outside an inclusion' if not inside else 'inside an exclusion'} {name}", item.seq
     return None
 
 

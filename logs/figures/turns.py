@@ -1,7 +1,6 @@
 """Turn by turn and leg by leg: planned, flown and limit of each finding that has a place on the route."""
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,6 @@ from logs.figures.elements import style
 from logs.figures.elements.legend import draw_legend
 from logs.verdict.findings import Finding, Verdict
 
-_PLACE = re.compile(r"(?:waypoint|leg) (\d+)")
 _LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 0.25, 0.6, 0.85, 1.55, 0.62
 _NUMBERED = 45
 
@@ -42,12 +40,12 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
     """List a rule's findings by the number of their waypoint or leg; those of the whole flight are left out."""
     found = []
     for finding in findings:
-        place = _PLACE.match(finding.where)
-        if finding.rule == rule and place is not None:
+        place = finding.place
+        if finding.rule == rule and place.kind in ("leg", "waypoint") and place.index is not None:
             planned, flown, limit = (
                 math.nan if value is None else value for value in (finding.planned, finding.flown, finding.limit)
             )
-            found.append(PlaceValue(int(place.group(1)), planned, flown, limit, finding.ok))
+            found.append(PlaceValue(place.index, planned, flown, limit, finding.ok))
     return sorted(found, key=lambda value: value.number)
 
 

@@ -106,8 +106,8 @@ def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
             ("all radars", threats.detection_radius, threats.detection_scale),
         ):
             met = path_spheres(position, time, threats.position, radii, scales)
-            found[f"time within reach, sum over {name}", "s"] = float(met[:, 0].sum())
-            found[f"exposure, sum over {name}", "s"] = float(met[:, 1].sum())
+            found[f"time within reach, sum over {name}", "s"] = float(met.inside.sum())
+            found[f"exposure, sum over {name}", "s"] = float(met.exposure.sum())
     lasts = np.append(np.diff(track.time), 0.0)
     for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
         if math.isfinite(limit):

@@ -55,7 +55,7 @@ def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
         for name, data in files.items()
     ]
     verdicts = [
-        (name, verdict.flyable, (verdict.summary.splitlines() or [""])[0])
+        (name, verdict.flyable, verdict.headline)
         for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
     ]
     environment = Environment(

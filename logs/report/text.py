@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.wording import place_text, suggestions_text
 
 NOTHING = "–"
 _UNITS = {"deg": "°", "none": "", "1": ""}
@@ -130,14 +131,14 @@ def _row(finding: Finding) -> FindingRow:
     planned, flown, limit, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.limit, finding.margin)
     )
-    method = finding.method
+    method, mended = finding.method, suggestions_text(finding.suggestions)
     if finding.tolerance:
         method = f"{method} (±\u00a0{quantity(finding.tolerance, finding.unit)})" if method else ""
     return FindingRow(
         state=state,
         sign=f"{_SIGNS[state]} {_WORDS[state]}",
         rule=finding.rule,
-        where=finding.where,
+        where=place_text(finding.place),
         planned=number(planned),
         flown=number(flown),
         limit=number(limit),
@@ -145,7 +146,7 @@ def _row(finding: Finding) -> FindingRow:
         margin=number(margin, signed=True),
         unit=in_unit(None, finding.unit)[1],
         method=method,
-        reason=finding.reason + (f"; would pass: {finding.suggestion}" if finding.suggestion else ""),
+        reason=finding.reason + (f"; would pass: {mended}" if mended else ""),
         sentence=_sentence(finding),
     )
 
@@ -161,8 +162,8 @@ def _sentence(finding: Finding) -> str:
         parts.append(f"limit {quantity(finding.limit, finding.unit)}{source}")
     if finding.margin is not None and finding.margin < 0.0:
         parts.append(f"beyond it by {quantity(-finding.margin, finding.unit)}")
-    said = ", ".join(parts)
-    return f"{said}; {finding.reason}" if said and finding.reason else said or finding.reason
+    numbers = ", ".join(parts)
+    return f"{numbers}; {finding.reason}" if numbers and finding.reason else numbers or finding.reason
 
 
 def rule_rows(findings: Iterable[Finding]) -> list[RuleRow]:
@@ -187,8 +188,8 @@ def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
     )
     sign = f"{_SIGNS[state]} {_WORDS[state]}"
     if tightest is None:
-        place = "" if judged else group[0].reason
-        return RuleRow(state, sign, rule, ", ".join(parts), place, NOTHING, NOTHING, NOTHING, NOTHING, "")
+        why = "" if judged else group[0].reason
+        return RuleRow(state, sign, rule, ", ".join(parts), why, NOTHING, NOTHING, NOTHING, NOTHING, "")
     row = _row(tightest)
     numbers = (row.planned, row.flown, row.limit, row.margin, row.unit)
     return RuleRow(state, sign, rule, ", ".join(parts), row.where, *numbers)

@@ -2,40 +2,52 @@
 
 import json
 import math
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-SCHEMA = "planfly.verdict/1"
+from logs.verdict.places import Disagreement, Place, Suggestion
+from logs.verdict.wording import disagreement_text, place_text, suggestions_text
 
-RULES = (
-    "mission",
-    "turn",
-    "loiter",
-    "slope",
-    "clearance",
-    "threat",
-    "bounds",
-    "waypoint",
-    "speed",
-    "energy",
-    "departure",
-    "completion",
-)
+SCHEMA = "planfly.verdict/2"
+
+# Each rule and its title, in the order in which a verdict lists them.
+RULES = {
+    "mission": "mission",
+    "turn": "turns",
+    "loiter": "loiters",
+    "slope": "slopes",
+    "clearance": "clearance",
+    "threat": "threats",
+    "bounds": "bounds",
+    "waypoint": "waypoints",
+    "speed": "airspeed",
+    "energy": "energy",
+    "departure": "departure",
+    "completion": "completion",
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One rule at one place: what was planned, what was flown, what is allowed.
 
-    where: "waypoint 3 (item 4)", "leg 2", "flight"; waypoints and legs count from 0, as `Track.leg` does.
-    planned, flown, limit, tolerance, margin: in `unit`, None where there is no such number.  margin: how far inside
-    the limit (negative: beyond), tolerance not counted.  limit_source: "scenario", "aircraft", or what set it.
-    method: how the number was got.  ok: None where it was not judged, with the reason.  suggestion: of a failed
-    finding, the smallest changes of the plan that would pass it, "" where none is known.
+    rule: a key of `RULES`.
+    place: where.
+    planned, flown, limit, tolerance, margin: in `unit`, None where there is no such number.
+    margin: how far inside the limit (negative: beyond), tolerance not counted.
+    limit_source: "scenario", "aircraft", or what set it.
+    method: how the numbers were got.
+    ok: None where it was not judged.
+    reason: why, for a person to read; everything that a program needs of it stands in another field.
+    suggestions: of a failed finding, the smallest changes of the plan that would pass it, the least change first.
+    brief: the reason in a few words, for a headline.
+    placed: whether the reason begins with the place.
+    check: where a rule has several checks, which one; "" otherwise.
     """
 
     rule: str
-    where: str
+    place: Place
     planned: float | None
     flown: float | None
     limit: float | None
@@ -46,45 +58,89 @@ class Finding:
     method: str
     ok: bool | None
     reason: str
-    suggestion: str = ""
+    suggestions: tuple[Suggestion, ...] = ()
+    brief: str = ""
+    placed: bool = False
+    check: str = ""
 
 
 @dataclass(frozen=True, slots=True)
 class Prediction:
     """What the geometric level says of a mission that was flown.
 
-    headline: its answer in a line.  disagreements: one line for each finding that the two levels judge differently.
+    headline: its answer in a line.  disagreements: the findings that the two levels judge differently.
     """
 
     flyable: bool
     headline: str
-    disagreements: tuple[str, ...]
+    disagreements: tuple[Disagreement, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
     """Whether a plan really flies.
 
-    flyable: complete, and no finding failed.  complete: the plan was feasible, flown to its end, and recorded
-    whole (at the geometric level: feasible, or a mission that a person brought).  summary: lines, of which the first
-    answers the question.  level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible
-    plan, so nothing was flown).  prediction: of a flown verdict, what the geometric level says beside it.
+    flyable: complete, and no finding failed.
+    complete: the plan was feasible, flown to its end, and recorded whole (at the geometric level: feasible, or a
+    mission that a person brought).
+    lines: the summary for a person, of which the first, the headline, answers the question.
+    level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
+    flown).
+    prediction: of a flown verdict, what the geometric level says beside it.
+    notes: what is not flown as the mission has it; the lines say it too.
+
+    >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
+    >>> verdict.headline, verdict.summary.count("Start")
+    ('flyable', 1)
     """
 
     findings: tuple[Finding, ...]
     flyable: bool
     complete: bool
-    summary: str
+    lines: tuple[str, ...]
     level: str
     prediction: Prediction | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """The answer in a line."""
+        return self.lines[0] if self.lines else ""
+
+    @property
+    def summary(self) -> str:
+        """All lines as one text."""
+        return "\n".join(self.lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """A statement of a rule: in full, and how it begins, which is what a headline has room for.
+
+    placed: whether it begins with the finding's place.
+    """
+
+    text: str
+    brief: str
+    placed: bool = False
+
+
+def message(brief: str, more: str = "", *, placed: bool = False) -> Message:
+    """Make a statement of its beginning and the rest.
+
+    >>> message("overshoots its arc by 8 m", " (at most 5 m)").text
+    'overshoots its arc by 8 m (at most 5 m)'
+    """
+    return Message(brief + more, brief, placed)
 
 
 def make_finding(
     rule: str,
-    where: str,
+    place: Place,
     *,
     ok: bool | None,
     reason: str,
+    faults: Sequence[Message] = (),
     planned: float | None = None,
     flown: float | None = None,
     limit: float | None = None,
@@ -93,16 +149,21 @@ def make_finding(
     margin: float | None = None,
     unit: str = "",
     method: str = "",
+    check: str = "",
 ) -> Finding:
     """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite.
 
+    faults: what the reason begins with, where it begins with faults.
     A finding that fails by other evidence than its number has no margin: the reason says what failed.
+
+    >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
+    True
     """
     if ok is False and margin is not None and margin >= 0.0:
         margin = None
     return Finding(
         rule=rule,
-        where=where,
+        place=place,
         planned=_plain(planned),
         flown=_plain(flown),
         limit=_plain(limit),
@@ -113,6 +174,9 @@ def make_finding(
         method=method,
         ok=None if ok is None else bool(ok),
         reason=reason,
+        brief=faults[0].brief if faults else reason,
+        placed=bool(faults) and faults[0].placed,
+        check=check,
     )
 
 
@@ -122,15 +186,54 @@ def _plain(value: float | None) -> float | None:
     return round(float(value), 6) + 0.0  # no -0.0
 
 
+def reason_of(faults: Sequence[Message], facts: Sequence[str] = ()) -> str:
+    """Faults with the facts in brackets after them, or the facts alone.
+
+    >>> reason_of([message("bank 40.0° beyond 35.0°")], ["turns 62.0°", "radius 76 m"])
+    'bank 40.0° beyond 35.0° (turns 62.0°; radius 76 m)'
+    """
+    known = "; ".join(facts)
+    if not faults:
+        return known
+    return "; ".join(fault.text for fault in faults) + (f" ({known})" if known else "")
+
+
 def verdict_json(verdict: Verdict) -> str:
-    """Write the verdict as the text of a ``verdict.json``."""
+    """Write the verdict as the text of a ``verdict.json``: each place and suggestion as data and in words.
+
+    >>> finding = make_finding("turn", Place("waypoint", 1, item=2), ok=True, reason="turns 30.0°", planned=30.0)
+    >>> written = json.loads(verdict_json(Verdict((finding,), True, True, ("flyable",), "flown")))
+    >>> written["schema"], written["summary"], written["findings"][0]["where"], written["findings"][0]["place"]["index"]
+    ('planfly.verdict/2', 'flyable', 'waypoint 1 (item 2)', 1)
+    """
     data: dict[str, Any] = {
         "schema": SCHEMA,
         "level": verdict.level,
         "flyable": verdict.flyable,
         "complete": verdict.complete,
         "summary": verdict.summary,
-        "geometric": None if verdict.prediction is None else asdict(verdict.prediction),
-        "findings": [asdict(finding) for finding in verdict.findings],
+        "geometric": None if verdict.prediction is None else _prediction_data(verdict.prediction),
+        "findings": [_finding_data(finding) for finding in verdict.findings],
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _prediction_data(prediction: Prediction) -> dict[str, Any]:
+    differing = prediction.disagreements
+    return {
+        "flyable": prediction.flyable,
+        "headline": prediction.headline,
+        "disagreements": [disagreement_text(one) for one in differing],
+        "differences": [asdict(one) for one in differing],
+    }
+
+
+def _finding_data(finding: Finding) -> dict[str, Any]:
+    """A finding's fields, and its place and suggestions in words beside them."""
+    data = asdict(finding)
+    return {
+        "rule": data.pop("rule"),
+        "where": place_text(finding.place),
+        **data,
+        "suggestion": suggestions_text(finding.suggestions),
+    }

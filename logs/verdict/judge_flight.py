@@ -1,4 +1,4 @@
-"""Check: is this flight evidence that its plan is flyable?  Every number is worked out again from the track.
+"""Is this flight evidence that its plan is flyable?  Every number is worked out again from the track.
 
 What guidance noted about itself (leg, cross-track, height error, clearance) and any verdict that was recorded are
 not read.
@@ -10,19 +10,20 @@ from logs.verdict.findings import Finding, Prediction, Verdict
 from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.places import Disagreement
+from logs.verdict.rules.bounds_rule import bounds_findings
+from logs.verdict.rules.clearance_rule import clearance_findings
+from logs.verdict.rules.completion_rule import completion_findings
+from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
-from logs.verdict.rules.flight_rules import (
-    completion_findings,
-    departure_findings,
-    speed_findings,
-    waypoint_findings,
-)
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.slope_rule import slope_findings
+from logs.verdict.rules.speed_rule import speed_findings
+from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
-from logs.verdict.rules.world_rules import bounds_findings, clearance_findings, threat_findings
+from logs.verdict.rules.waypoint_rule import waypoint_findings
 from logs.verdict.suggestions import with_suggestions
-from logs.verdict.summary import headline, summary_text
+from logs.verdict.summary import headline, summary_lines
 
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 
@@ -30,44 +31,58 @@ __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = True, envelope: bool = True) -> Verdict:
     """Judge a flown track: level "flown".
 
-    ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.  envelope: whether
-    the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and the scenario's
-    numbers alone.  Any track is judged, however short or damaged: what cannot be known makes it incomplete.
+    Any track is judged, however short or damaged: what cannot be known makes it incomplete.
+
+    ended: how the flight ended, "completed" or what stopped it.
+    whole: the record has its end.
+    envelope: whether the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and
+    the scenario's numbers alone.
+
+    >>> from flight.mission.items import Mission, MissionItem
+    >>> from flight.simulation.simulate import simulate
+    >>> from planfly.airframe import load_airframe
+    >>> from planfly.pipeline import make_setup
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.01 * k, 75.0) for k in range(2)]
+    >>> airframe = load_airframe(scenario)
+    >>> setup = make_setup(scenario, airframe, Mission(None, tuple(way)), seed=1)
+    >>> flown = simulate(setup, airframe.aircraft)
+    >>> verdict = judge_flight(setup, flown.track, flown.ended)
+    >>> verdict.headline
+    'flyable'
     """
-    shape = route_demands(setup, envelope=envelope)
-    flown = lay_track(shape, track)
+    demands = route_demands(setup, envelope=envelope)
+    aligned = lay_track(demands, track)
     findings: tuple[Finding, ...] = (
-        *turn_findings(shape, flown),
-        *slope_findings(shape, flown),
-        *clearance_findings(shape, flown),
-        *threat_findings(shape, flown),
-        *bounds_findings(shape, flown),
-        *waypoint_findings(shape, flown),
-        *speed_findings(shape, flown),
-        *energy_findings(shape, flown),
-        *departure_findings(shape, flown),
-        *completion_findings(shape, flown, ended, whole),
+        *turn_findings(demands, aligned),
+        *slope_findings(demands, aligned),
+        *clearance_findings(demands, aligned),
+        *threat_findings(demands, aligned),
+        *bounds_findings(demands, aligned),
+        *waypoint_findings(demands, aligned),
+        *speed_findings(demands, aligned),
+        *energy_findings(demands, aligned),
+        *departure_findings(demands, aligned),
+        *completion_findings(demands, aligned, ended, whole),
     )
-    findings = fold_loiters(shape, flown, findings)
+    findings = fold_loiters(demands, aligned, findings)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
-    findings = with_suggestions(shape, flown, findings)
-    prediction = _predict(shape, findings) if envelope else None
-    summary = summary_text(findings, flyable, setup, "flown", prediction)
-    return Verdict(findings, flyable, complete, summary, "flown", prediction)
+    findings = with_suggestions(demands, aligned, findings)
+    prediction = _predict(demands, findings) if envelope else None
+    lines = summary_lines(findings, flyable, setup, "flown", prediction)
+    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes)
 
 
-def _predict(shape: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:
+def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:
     """What the geometric level says, and where it and the flight differ."""
-    predicted = geometric_findings(shape)
-    judged = {(item.rule, item.where): item.ok for item in flown}
-    words = {True: "passes", False: "fails"}
+    predicted = geometric_findings(demands)
+    judged = {(item.rule, item.place): item.ok for item in flown}
     disagreements = []
     for item in predicted:
-        other = judged.get((item.rule, item.where))
+        other = judged.get((item.rule, item.place))
         if item.ok is not None and other is not None and item.ok != other:
-            disagreements.append(
-                f"{item.rule} at {item.where} {words[item.ok]} by geometry and {words[other]} in flight"
-            )
+            disagreements.append(Disagreement(item.rule, item.place, item.ok, other))
     flyable = not any(item.ok is False for item in predicted)
     return Prediction(flyable, headline(predicted, flyable), tuple(disagreements))

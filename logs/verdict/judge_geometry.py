@@ -3,49 +3,77 @@
 import math
 
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.findings import Finding, Verdict, make_finding, message
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
+from logs.verdict.places import PLAN
+from logs.verdict.rules.bounds_rule import bounds_findings
+from logs.verdict.rules.clearance_rule import clearance_findings
 from logs.verdict.rules.energy_rule import energy_findings
-from logs.verdict.rules.flight_rules import speed_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.px4_rule import mission_findings
 from logs.verdict.rules.slope_rule import slope_findings
+from logs.verdict.rules.speed_rule import speed_findings
+from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
-from logs.verdict.rules.world_rules import bounds_findings, clearance_findings, threat_findings
 from logs.verdict.suggestions import with_suggestions
-from logs.verdict.summary import headline, summary_text
+from logs.verdict.summary import headline, summary_lines
 from planner.plan import Plan, Violation
 
 
-def geometric_findings(shape: RouteDemands) -> tuple[Finding, ...]:
+def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
     """Findings of a route's geometry against the aircraft's envelope."""
     findings: tuple[Finding, ...] = (
-        *turn_findings(shape, None, geometric=True),
-        *slope_findings(shape, None, geometric=True),
-        *clearance_findings(shape, None, geometric=True),
-        *threat_findings(shape, None, geometric=True),
-        *bounds_findings(shape, None, geometric=True),
-        *speed_findings(shape, None, geometric=True),
-        *energy_findings(shape, None, geometric=True),
+        *turn_findings(demands, None, geometric=True),
+        *slope_findings(demands, None, geometric=True),
+        *clearance_findings(demands, None, geometric=True),
+        *threat_findings(demands, None, geometric=True),
+        *bounds_findings(demands, None, geometric=True),
+        *speed_findings(demands, None, geometric=True),
+        *energy_findings(demands, None, geometric=True),
     )
-    return fold_loiters(shape, None, findings)
+    return fold_loiters(demands, None, findings)
 
 
 def judge_geometry(setup: FlightSetup) -> Verdict:
-    """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric"."""
-    shape = route_demands(setup)
+    """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric".
+
+    >>> from flight.mission.items import Mission, MissionItem
+    >>> from planfly.airframe import load_airframe
+    >>> from planfly.pipeline import make_setup
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.001 * k, 60.0 + 20.0 * k) for k in range(2)]
+    >>> setup = make_setup(scenario, load_airframe(scenario), Mission(None, tuple(way)), seed=1)
+    >>> verdict = judge_geometry(setup)
+    >>> verdict.headline
+    'not flyable: slope on leg 0 (14.5° > 14.2°)'
+    >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]
+    [['airspeed'], ['rise'], ['length']]
+    """
+    demands = route_demands(setup)
     findings = (
         *mission_findings(setup),
-        *with_suggestions(shape, None, geometric_findings(shape)),
+        *with_suggestions(demands, None, geometric_findings(demands)),
         *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
-    return Verdict(findings, flyable, complete, summary_text(findings, flyable, setup, "geometric"), "geometric")
+    lines = summary_lines(findings, flyable, setup, "geometric")
+    return Verdict(findings, flyable, complete, lines, "geometric", notes=setup.route.notes)
 
 
 def judge_plan_only(plan: Plan) -> Verdict:
-    """Judge a run that found no feasible plan, so that nothing was flown: never complete."""
+    """Judge a run that found no feasible plan, so that nothing was flown: level "plan", never complete.
+
+    >>> import numpy as np
+    >>> from planner.plan import Certificate
+    >>> from world.scenario import load_scenario
+    >>> certificate = Certificate(0.1, math.inf, -0.05, 12.0, 100.0, 50.0, ("leg 2: climbs 16.6 deg, allowed 13.7",))
+    >>> way, none = np.zeros((2, 3)), np.zeros((0, 3))
+    >>> plan = Plan(load_scenario("tight"), way, np.array([0, 2, 0, 0]), np.zeros(4), certificate, 1, "umda", 1, none)
+    >>> print(judge_plan_only(plan).headline)
+    not flyable: no feasible plan was found: slope (the plan's slope limit is exceeded, least margin -2.86 deg, ...)
+    """
     margins = (
         ("turn", plan.certificate.turn, Violation.TURN, "deg", 180.0 / math.pi),
         ("slope", plan.certificate.slope, Violation.SLOPE, "deg", 180.0 / math.pi),
@@ -65,7 +93,7 @@ def judge_plan_only(plan: Plan) -> Verdict:
         findings.append(
             make_finding(
                 rule,
-                "plan",
+                PLAN,
                 ok=False if bad else (True if known else None),
                 reason=reason,
                 source="plan",
@@ -75,25 +103,22 @@ def judge_plan_only(plan: Plan) -> Verdict:
             )
         )
     findings.append(_not_feasible(plan))
-    return Verdict(tuple(findings), False, False, _plan_summary(findings, plan), "plan")
+    return Verdict(tuple(findings), False, False, _plan_lines(findings, plan), "plan")
 
 
 def _not_feasible(plan: Plan) -> Finding:
-    problems = "; ".join(plan.certificate.problems) or "the search still counts violations"
+    problems = plan.certificate.problems or ("the search still counts violations",)
+    first, *others = problems
+    fault = message(f"no feasible plan was found: {first}", "".join(f"; {problem}" for problem in others))
     return make_finding(
-        "completion",
-        "plan",
-        ok=False,
-        reason=f"no feasible plan was found: {problems}",
-        source="plan",
-        method="certificate",
+        "completion", PLAN, ok=False, reason=fault.text, faults=[fault], source="plan", method="certificate"
     )
 
 
-def _plan_summary(findings: list[Finding], plan: Plan) -> str:
+def _plan_lines(findings: list[Finding], plan: Plan) -> tuple[str, ...]:
     failed = [item for item in findings if item.ok is False and item.rule != "completion"]
     if not failed:
-        return headline(findings, False)
+        return (headline(findings, False),)
     text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
-    lines = [f"not flyable: no feasible plan was found: {text}", "Nothing was flown"]
-    return "\n".join(lines + [f"Problem: {problem}" for problem in plan.certificate.problems])
+    problems = (f"Problem: {problem}" for problem in plan.certificate.problems)
+    return (f"not flyable: no feasible plan was found: {text}", "Nothing was flown", *problems)

@@ -9,223 +9,251 @@ from numpy.typing import NDArray
 from aircraft.path_limits import aircraft_slopes, turn_radius_between
 from logs.verdict.findings import Finding
 from logs.verdict.measures.path_sweeps import path_spheres
-from logs.verdict.measures.route_demands import ON_THE_SPOT, RouteDemands, route_demands, turn_room
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.tighter_limits import slope_limit, steep_arc, tighter_turn, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.rules.slope_rule import slope_limit, steep_arc
-from logs.verdict.rules.turn_rule import turn_limit
-from logs.verdict.rules.world_rules import planned_path
+from logs.verdict.measures.turn_demands import available_lengths, performance_tables, turn_demands, turn_lengths
+from logs.verdict.places import FLIGHT, Change, Place, Quantity, Suggestion
+from logs.verdict.tolerances import (
+    ABOVE_SLOWEST,
+    BUFFER_ANGLE,
+    BUFFER_LENGTH,
+    BUFFER_SPEED,
+    LEAST_RISE,
+    SPEED_STEP,
+    TRIES,
+)
 
 Floats = NDArray[np.float64]
-
-# A change is asked for with this much to spare, so that rounding does not undo it.
-SPARE_ANGLE = math.radians(0.1)
-SPARE_LENGTH = 1.0
-SPARE_SPEED = 0.03
-SPEED_STEP = 0.5
-# Times that a gentler turn is tried.
-_TRIES = 6
+# A suggestion with the relative size of its change.
+_Sized = tuple[float, Suggestion]
 
 
 def with_suggestions(
-    shape: RouteDemands, flown: AlignedTrack | None, findings: tuple[Finding, ...]
+    demands: RouteDemands, aligned: AlignedTrack | None, findings: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
-    """Fill in ``suggestion`` of every failed finding that a change of the plan could mend."""
+    """Fill in ``suggestions`` of every failed finding that a change of the plan could mend."""
     return tuple(
-        replace(item, suggestion=_suggest(shape, flown, item)) if item.ok is False else item for item in findings
+        replace(item, suggestions=_suggest(demands, aligned, item)) if item.ok is False else item for item in findings
     )
 
 
-def _suggest(shape: RouteDemands, flown: AlignedTrack | None, item: Finding) -> str:
-    if item.rule == "slope" and item.where.startswith("leg "):
-        return slope_suggestion(shape, int(item.where.split()[1]), item)
-    if item.rule == "turn" and item.where.startswith("waypoint "):
-        return turn_suggestion(shape, int(item.where.split()[1]))
-    if item.rule == "threat":
-        return _threat(shape, flown, item)
-    if item.limit is None or item.margin is None:
-        return ""
-    short = -item.margin + SPARE_LENGTH
-    if item.rule == "clearance" and item.planned is not None:
-        # A flight that ended early did not get to the lowest place.
-        short = max(short, item.limit - item.planned + SPARE_LENGTH)
-    if item.rule == "clearance" and short > SPARE_LENGTH:
-        return f"fly {item.where} {short:.0f} m higher"
-    if item.rule == "bounds" and short > SPARE_LENGTH:
-        return f"bring the path {short:.0f} m further inside"
-    if item.rule == "energy":
-        return _energy(shape, item)
-    if item.rule == "speed":
-        return _speed(shape, item)
-    return ""
+def _suggest(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+    match item.rule, item.place:
+        case "slope", Place("leg", int(leg)):
+            return slope_suggestions(demands, leg, item)
+        case "turn", Place("waypoint", int(i)):
+            return turn_suggestions(demands, i)
+        case "threat", Place("missile", int(m)):
+            return _further(demands, aligned, item.place, m)
+        case "clearance", _:
+            return _higher(item)
+        case "bounds", _:
+            return _inside(item)
+        case "energy", _:
+            return _less_energy(demands, item)
+        case "speed", Place("leg", int(leg)) if item.limit is not None and item.margin is not None:
+            return _level_speeds(demands, item.place, leg)
+    return ()
 
 
-def slope_suggestion(shape: RouteDemands, leg: int, item: Finding) -> str:
-    """Gentler slope, longer leg or another speed for one leg; the least relative change first."""
-    limit, source = slope_limit(shape, leg)
-    planned = abs(float(shape.slopes[leg]))
-    rise = abs(float(shape.points[leg + 1, 2] - shape.points[leg, 2]))
-    run = float(shape.runs[leg])
+def _least_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
+    """Alternatives by the relative size of their changes; of equal ones the one listed first."""
+    return tuple(suggestion for _, suggestion in sorted(alternatives, key=lambda sized: sized[0]))
+
+
+def slope_suggestions(demands: RouteDemands, leg: int, item: Finding) -> tuple[Suggestion, ...]:
+    """A gentler slope, a longer leg or another speed for one leg; the least relative change first."""
+    limit, source = slope_limit(demands, leg)
+    planned = abs(float(demands.slopes[leg]))
+    rise = abs(float(demands.points[leg + 1, 2] - demands.points[leg, 2]))
+    run = float(demands.runs[leg])
     if planned <= limit and item.flown is not None:
-        # The geometry passes and the flight did not: what it managed is what it can.
+        # The geometry passes and the flight did not: what it managed is its limit.
         limit = min(limit, abs(math.radians(item.flown)))
-    allowed = limit - SPARE_ANGLE
+    allowed = limit - BUFFER_ANGLE
     if allowed <= 0.0 or planned <= allowed:
-        return _arc_suggestion(shape, leg)
-    word = "climb" if shape.slopes[leg] >= 0.0 else "fall"
+        return _gentler_arc(demands, leg)
+    place, sign = Place("leg", leg), 1.0 if demands.slopes[leg] >= 0.0 else -1.0
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
-    instead = "; it goes nowhere now" if run < ON_THE_SPOT else f" instead of {run:.0f} m"
-    changes = [(longer / run - 1.0, f"make leg {leg} {math.ceil(longer)} m long{instead}")]
-    if gentler >= 1.0:
-        changes.append((1.0 - gentler / rise, f"{word} {math.floor(gentler)} m on leg {leg} instead of {rise:.0f} m"))
-    speed = _slope_speed(shape, leg, planned + SPARE_ANGLE) if source == "aircraft" else None
+    alternatives: list[_Sized] = []
+    if gentler >= LEAST_RISE:
+        change = Change("rise", place, sign * rise, sign * math.floor(gentler), "m")
+        alternatives.append((1.0 - gentler / rise, (change,)))
+    speed = _slope_speed(demands, leg, planned + BUFFER_ANGLE) if source == "aircraft" else None
     if speed is not None:
-        now = float(shape.setup.route.airspeed[leg])
-        changes.append((abs(speed - now) / now, f"fly it at {speed:g} m/s instead of {now:g} m/s"))
-    return ", or ".join(text for _, text in sorted(changes))
+        now = float(demands.setup.route.airspeed[leg])
+        alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
+    alternatives.append((longer / run - 1.0, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
+    return _least_first(alternatives)
 
 
-def _arc_suggestion(shape: RouteDemands, leg: int) -> str:
-    """Gentler legs on either side of a fly-by arc that is too steep where they are not, or ""."""
-    steep = steep_arc(shape, leg)
+def _gentler_arc(demands: RouteDemands, leg: int) -> tuple[Suggestion, ...]:
+    """Gentler legs on either side of a fly-by arc that is too steep where they are not."""
+    steep = steep_arc(demands, leg)
     if steep is None:
-        return ""
-    tangent, can = steep
-    share = math.tan(math.atan(can) - SPARE_ANGLE) / abs(tangent)
-    parts = []
+        return ()
+    share = math.tan(math.atan(steep.limit) - BUFFER_ANGLE) / abs(steep.tangent)
+    changes = []
     for k in (leg, leg + 1):
-        rise = share * float(shape.points[k + 1, 2] - shape.points[k, 2])
+        rise = share * float(demands.points[k + 1, 2] - demands.points[k, 2])
         # A leg that goes the other way makes the arc flatter, and stays.
-        if rise * tangent > 0.0:
-            parts.append(f"{'climb' if rise > 0.0 else 'fall'} {math.floor(abs(rise))} m on leg {k}")
-    return " and ".join(parts)
+        if rise * steep.tangent > 0.0:
+            wanted = math.copysign(math.floor(abs(rise)), rise)
+            changes.append(Change("rise", Place("leg", k), None, wanted, "m"))
+    return (tuple(changes),) if changes else ()
 
 
-def turn_suggestion(shape: RouteDemands, i: int) -> str:
-    """Gentler turn, longer legs or a lower speed for one waypoint; the least relative change first."""
-    limit, source = turn_limit(shape, i)
-    planned = abs(float(shape.turns[i]))
-    if planned <= limit or limit <= SPARE_ANGLE:
-        return ""
-    allowed = limit - SPARE_ANGLE
-    degrees = _gentler_turn(shape, i, allowed)
-    changes = [(1.0 - allowed / planned, f"turn at most {degrees:.1f}° there")] if degrees > 0.0 else []
-    if source == "aircraft" and math.isfinite(shape.before[i]):
-        before = shape.before[i] + shape.after[i - 1] + shape.reversal[i - 1] + SPARE_LENGTH
-        after = shape.after[i] + shape.before[i + 1] + shape.reversal[i] + SPARE_LENGTH
-        short = []
-        grown = 0.0
-        for leg, needed in ((i - 1, before), (i, after)):
-            if math.isfinite(needed) and needed > shape.runs[leg]:
-                short.append(f"leg {leg} {math.ceil(needed)} m long instead of {shape.runs[leg]:.0f} m")
-                grown = max(grown, needed / float(shape.runs[leg]) - 1.0)
-        if short:
-            changes.append((grown, "make " + " and ".join(short)))
-        speed = _turn_speed(shape, i)
+def turn_suggestions(demands: RouteDemands, i: int) -> tuple[Suggestion, ...]:
+    """A gentler turn, longer legs or a lower speed for one waypoint; the least relative change first."""
+    limit, source = turn_limit(demands, i)
+    planned = abs(float(demands.turns[i]))
+    if planned <= limit or limit <= BUFFER_ANGLE:
+        return ()
+    place, allowed = demands.waypoint(i), limit - BUFFER_ANGLE
+    alternatives: list[_Sized] = []
+    if source == "aircraft" and math.isfinite(demands.before[i]):
+        speed = _turn_speed(demands, i)
         if speed is not None:
-            now = float(max(shape.setup.route.airspeed[i - 1 : i + 1]))
-            changes.append((1.0 - speed / now, f"fly it at {speed:g} m/s instead of {now:g} m/s"))
-    return ", or ".join(text for _, text in sorted(changes))
+            now = float(max(demands.setup.route.airspeed[i - 1 : i + 1]))
+            alternatives.append((1.0 - speed / now, (Change("airspeed", place, now, speed, "m/s"),)))
+        alternatives += _longer_legs(demands, i)
+    degrees = _gentler_turn(demands, i, allowed)
+    if degrees > 0.0:
+        change = Change("turn", place, math.degrees(planned), degrees, "deg")
+        alternatives.append((1.0 - allowed / planned, (change,)))
+    return _least_first(alternatives)
 
 
-def _gentler_turn(shape: RouteDemands, i: int, allowed: float) -> float:
+def _longer_legs(demands: RouteDemands, i: int) -> list[_Sized]:
+    """Both legs at a waypoint long enough for its turn beside its neighbours; none where they are."""
+    before = demands.before[i] + demands.after[i - 1] + demands.reversal[i - 1] + BUFFER_LENGTH
+    after = demands.after[i] + demands.before[i + 1] + demands.reversal[i] + BUFFER_LENGTH
+    changes = []
+    grown = 0.0
+    for leg, needed in ((i - 1, before), (i, after)):
+        run = float(demands.runs[leg])
+        if math.isfinite(needed) and needed > run:
+            changes.append(Change("length", Place("leg", leg), run, float(math.ceil(needed)), "m"))
+            grown = max(grown, needed / run - 1.0)
+    return [(grown, tuple(changes))] if changes else []
+
+
+def _gentler_turn(demands: RouteDemands, i: int, allowed: float) -> float:
     """Largest turn in tenths of a degree, up to ``allowed`` (rad), that passes with all that follows turned along.
 
-    In wind the next turns change with their courses, and with them the room for this one.  0 where none was found.
+    In wind the next turns change with their courses, and with them the length available to this one.  0 where none
+    was found.
     """
-    first, last = max(0, i - 2), min(len(shape.points), i + 3)
-    route = shape.setup.route
+    first, last = max(0, i - 2), min(len(demands.points), i + 3)
+    route = demands.setup.route
     near = replace(
         route,
         waypoints=route.waypoints[first:last],
         airspeed=route.airspeed[first : last - 1],
         **{name: getattr(route, name)[first:last] for name in ("acceptance", "fly_over", "items", "arcs")},
     )
-    at = i - first
-    for _ in range(_TRIES):
+    tables, at = performance_tables(near, demands.limits), i - first
+    for _ in range(TRIES):
         degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
         if degrees <= 0.0:
             return 0.0
-        points = np.array(shape.points[first:last])
-        change = math.copysign(math.radians(degrees), shape.turns[i]) - float(shape.turns[i])
+        points = np.array(demands.points[first:last])
+        change = math.copysign(math.radians(degrees), demands.turns[i]) - float(demands.turns[i])
         cos, sin = math.cos(change), math.sin(change)
         onward = points[at + 1 :, :2] - points[at, :2]
         points[at + 1 :, :2] = points[at, :2] + onward @ np.array([[cos, -sin], [sin, cos]])
-        limit, _ = turn_limit(route_demands(replace(shape.setup, route=replace(near, waypoints=points))), at)
+        turning = turn_demands(replace(near, waypoints=points), tables)
+        limit, _ = tighter_turn(demands, i, float(turning.limit[at]))
         if limit >= math.radians(degrees):
             return degrees
-        allowed = min(allowed, limit) - SPARE_ANGLE
+        allowed = min(allowed, limit) - BUFFER_ANGLE
     return 0.0
 
 
-def _speeds(shape: RouteDemands, amsl: float, now: float) -> list[float]:
+def _speeds(demands: RouteDemands, amsl: float, now: float) -> list[float]:
     """Speeds of level flight at this height in the envelope, the nearest to ``now`` first."""
-    envelope = shape.setup.envelope
+    envelope = demands.setup.envelope
     low, high = envelope.level_speeds(amsl)
-    low, high = max(low * 1.1, float(envelope.airspeed[0])), min(high, float(envelope.airspeed[-1]))
+    low, high = max(low * ABOVE_SLOWEST, float(envelope.airspeed[0])), min(high, float(envelope.airspeed[-1]))
     steps = np.arange(math.ceil(low / SPEED_STEP), math.floor(high / SPEED_STEP) + 1) * SPEED_STEP
     return sorted((float(v) for v in steps), key=lambda v: (abs(v - now), v))
 
 
-def _slope_speed(shape: RouteDemands, leg: int, slope: float) -> float | None:
+def _slope_speed(demands: RouteDemands, leg: int, slope: float) -> float | None:
     """Airspeed nearest to the commanded one at which the aircraft can hold a slope on a leg, or None."""
-    course, side = float(shape.courses[leg]), 0 if shape.slopes[leg] >= 0.0 else 1
-    heights = (float(shape.points[leg, 2]), float(shape.points[leg + 1, 2]))
-    for speed in _speeds(shape, max(heights), float(shape.setup.route.airspeed[leg])):
-        table = shape.limits.performance(speed)
+    course, side = float(demands.courses[leg]), 0 if demands.slopes[leg] >= 0.0 else 1
+    heights = (float(demands.points[leg, 2]), float(demands.points[leg + 1, 2]))
+    for speed in _speeds(demands, max(heights), float(demands.setup.route.airspeed[leg])):
+        table = demands.limits.performance(speed)
         if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
             return speed
     return None
 
 
-def _turn_speed(shape: RouteDemands, i: int) -> float | None:
+def _turn_speed(demands: RouteDemands, i: int) -> float | None:
     """Highest lower airspeed at which the turn at a waypoint fits its legs beside its neighbours, or None."""
-    now = float(max(shape.setup.route.airspeed[i - 1 : i + 1]))
-    # As the turn limit has it: what the neighbours leave, and half of each leg in any case.
-    room = min(
-        max(shape.runs[i - 1] - shape.after[i - 1], 0.5 * shape.runs[i - 1]) - shape.reversal[i - 1],
-        max(shape.runs[i] - shape.before[i + 1], 0.5 * shape.runs[i]) - shape.reversal[i],
-    )
-    for speed in sorted((v for v in _speeds(shape, float(shape.points[i, 2]), now) if v < now), reverse=True):
-        table = shape.limits.performance(speed)
-        radius = turn_radius_between(table, shape.courses[i - 1], shape.courses[i], float(shape.points[i, 2]))
-        used = turn_room(abs(float(shape.turns[i])), radius, bool(shape.setup.route.fly_over[i]))
-        if max(used) + SPARE_LENGTH <= room:
+    now = float(max(demands.setup.route.airspeed[i - 1 : i + 1]))
+    available = min(available_lengths(demands.runs, demands.before, demands.after, demands.reversal, i))
+    for speed in sorted((v for v in _speeds(demands, float(demands.points[i, 2]), now) if v < now), reverse=True):
+        table = demands.limits.performance(speed)
+        radius = turn_radius_between(table, demands.courses[i - 1], demands.courses[i], float(demands.points[i, 2]))
+        used = turn_lengths(abs(float(demands.turns[i])), radius, bool(demands.setup.route.fly_over[i]))
+        if max(used) + BUFFER_LENGTH <= available:
             return speed
     return None
 
 
-def _energy(shape: RouteDemands, item: Finding) -> str:
-    used = item.planned if item.flown is None else item.flown
-    if used is None or item.limit is None or used <= item.limit:
-        return ""
-    more = used / item.limit
-    store = "battery" if shape.setup.envelope.volts or not shape.setup.envelope.power_level.size else "tank"
-    shorter, larger = math.ceil(100.0 * (1.0 - 1.0 / more)), math.ceil(100.0 * more) / 100.0
-    return f"shorten the flight by {shorter} %, or take a {store} {larger:.2f} times as large"
+def _whole(metres: float) -> float:
+    """Whole metres, as they are asked for."""
+    return float(round(metres))
 
 
-def _threat(shape: RouteDemands, flown: AlignedTrack | None, item: Finding) -> str:
-    threats = shape.setup.scenario.threats
-    name = item.where.removesuffix(" (missile)")
-    if name == item.where or name not in threats.names:
-        return ""
-    m = threats.names.index(name)
+def _further(demands: RouteDemands, aligned: AlignedTrack | None, place: Place, m: int) -> tuple[Suggestion, ...]:
+    threats = demands.setup.scenario.threats
     one = slice(m, m + 1)
     spheres = (threats.position[one], threats.kill_radius[one], threats.kill_scale[one])
-    points, _, times = planned_path(shape)
-    nearest = path_spheres(points, times, *spheres)[0, 2]
-    if flown is not None and len(flown.track) > 1:
-        nearest = min(nearest, path_spheres(flown.track.position, flown.track.time, *spheres)[0, 2])
-    return f"pass {name} {threats.kill_radius[m] - nearest + SPARE_LENGTH:.0f} m further away"
+    nearest = path_spheres(demands.path.points, demands.path.times, *spheres).closest[0]
+    if aligned is not None and len(aligned.track) > 1:
+        nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
+    away = _whole(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
+    return ((Change("distance", place, None, away, "m"),),)
 
 
-def _speed(shape: RouteDemands, item: Finding) -> str:
-    if not item.where.startswith("leg "):
-        return ""
-    leg = int(item.where.split()[1])
-    commanded = float(shape.setup.route.airspeed[leg])
-    low, high = shape.setup.envelope.level_speeds(float(max(shape.points[leg, 2], shape.points[leg + 1, 2])))
+def _higher(item: Finding) -> tuple[Suggestion, ...]:
+    if item.limit is None or item.margin is None:
+        return ()
+    short = -item.margin + BUFFER_LENGTH
+    if item.planned is not None:
+        # A flight that ended early did not get to the lowest place.
+        short = max(short, item.limit - item.planned + BUFFER_LENGTH)
+    return ((Change("height", item.place, None, _whole(short), "m"),),) if short > BUFFER_LENGTH else ()
+
+
+def _inside(item: Finding) -> tuple[Suggestion, ...]:
+    if item.margin is None or not item.margin < 0.0:
+        return ()
+    return ((Change("inset", FLIGHT, None, _whole(-item.margin + BUFFER_LENGTH), "m"),),)
+
+
+def _less_energy(demands: RouteDemands, item: Finding) -> tuple[Suggestion, ...]:
+    used = item.planned if item.flown is None else item.flown
+    if used is None or item.limit is None or item.margin is None or used <= item.limit:
+        return ()
+    more = used / item.limit
+    envelope = demands.setup.envelope
+    store: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
+    shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / more))), "%")
+    larger = Change(store, FLIGHT, None, math.ceil(100.0 * more) / 100.0, "1")
+    return (shorter,), (larger,)
+
+
+def _level_speeds(demands: RouteDemands, place: Place, leg: int) -> tuple[Suggestion, ...]:
+    commanded = float(demands.setup.route.airspeed[leg])
+    up = float(max(demands.points[leg, 2], demands.points[leg + 1, 2]))
+    low, high = demands.setup.envelope.level_speeds(up)
     if low <= commanded <= high:
-        return ""
-    low, high = math.ceil(10.0 * low * (1.0 + SPARE_SPEED)) / 10.0, math.floor(10.0 * high * (1.0 - SPARE_SPEED)) / 10.0
-    return f"command {low:.1f} to {high:.1f} m/s on leg {leg}"
+        return ()
+    low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0
+    high = math.floor(10.0 * high * (1.0 - BUFFER_SPEED)) / 10.0
+    return ((Change("airspeed", place, commanded, low, "m/s", most=high),),)

@@ -1,9 +1,10 @@
-"""The verdict in a sentence, and what a reader should know beside it."""
+"""The verdict in a line, and what a reader should know beside it."""
 
 from collections.abc import Sequence
 
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import Finding, Prediction
+from logs.verdict.findings import RULES, Finding, Prediction
+from logs.verdict.wording import disagreement_text, place_text, shortened
 
 # Failed findings that the first line names.
 _NAMED = 4
@@ -18,21 +19,9 @@ _NAV = {
     "rtk": "with RTK's error (0.05 m on each axis)",
     "gnss": "with GNSS's error (1.5 m on each axis)",
 }
-# What ends a flight, then what a plan may be mended by.
-_ORDER = (
-    "departure",
-    "completion",
-    "mission",
-    "slope",
-    "turn",
-    "loiter",
-    "clearance",
-    "threat",
-    "bounds",
-    "waypoint",
-    "speed",
-    "energy",
-)
+# What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
+_FIRST = ("departure", "completion", "mission", "slope")
+_URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
 
 
 def headline(findings: Sequence[Finding], flyable: bool) -> str:
@@ -43,7 +32,7 @@ def headline(findings: Sequence[Finding], flyable: bool) -> str:
             return "flyable"
         whole = len(terrain) == sum(item.rule == "clearance" for item in findings)
         return "flyable; terrain not judged" if whole else f"flyable; terrain not judged on {len(terrain)} legs"
-    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _ORDER.index(item.rule))
+    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
     named = _spread(failed)
     more = len(failed) - len(named)
     return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
@@ -53,25 +42,29 @@ def _spread(failed: list[Finding]) -> list[Finding]:
     """At most four findings: the worst of each rule before the second worst of any."""
     margins = [0.0 if item.margin is None else item.margin for item in failed]
     by_margin = sorted(range(len(failed)), key=margins.__getitem__)
-    seen: dict[str, int] = {}
-    place = {}
+    count: dict[str, int] = {}
+    rank = {}
     for k in by_margin:
-        place[k] = seen[failed[k].rule] = seen.get(failed[k].rule, 0) + 1
-    chosen = sorted(range(len(failed)), key=lambda k: (place[k], k))[:_NAMED]
+        rank[k] = count[failed[k].rule] = count.get(failed[k].rule, 0) + 1
+    chosen = sorted(range(len(failed)), key=lambda k: (rank[k], k))[:_NAMED]
     return [failed[k] for k in sorted(chosen)]
 
 
 def _phrase(item: Finding) -> str:
     """One failed finding in a few words."""
-    if item.rule in ("completion", "departure"):
-        return f"{item.rule} ({_clause(item.reason)})"
-    if item.rule == "waypoint":
-        return f"{item.where} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if _over(item) else "")
-    place = "" if item.where == "flight" else f" {'at' if item.where.startswith('waypoint') else 'on'} {item.where}"
-    if item.rule == "threat":
-        place = item.where if item.where.startswith("threat") else f"threat {item.where}"
-        return f"{place} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
-    return f"{item.rule}{place} ({_numbers(item)})"
+    where = place_text(item.place)
+    match item.rule:
+        case "completion" | "departure":
+            return f"{item.rule} ({shortened(item.brief)})"
+        case "waypoint":
+            return f"{where} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if _over(item) else "")
+        case "threat":
+            # "threat 3 (missile)" is what a threat without a name of its own is called.
+            named = where if item.place.name.startswith("threat") else f"threat {where}"
+            return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
+    if item.place.kind == "flight":
+        return f"{item.rule} ({_numbers(item)})"
+    return f"{item.rule} {'at' if item.place.kind == 'waypoint' else 'on'} {where} ({_numbers(item)})"
 
 
 def _over(item: Finding) -> bool:
@@ -79,9 +72,9 @@ def _over(item: Finding) -> bool:
 
 
 def _numbers(item: Finding) -> str:
-    """Worse of planned and flown against the limit, if that is what failed; else the reason's first clause."""
+    """Worse of planned and flown against the limit, if that is what failed; else the reason in brief."""
     if item.limit is None or item.rule == "speed":
-        return _clause(item.reason)
+        return shortened(item.brief)
     values = [value for value in (item.flown, item.planned) if value is not None]
     unit = _UNITS.get(item.unit, "")
     if item.rule == "loiter" and item.planned is not None and item.planned < item.limit:
@@ -90,22 +83,17 @@ def _numbers(item: Finding) -> str:
         low = min(values, default=None)
         if item.flown is not None:
             low = item.flown
-        return _clause(item.reason) if low is None else f"{low:.1f}{unit} < {item.limit:.1f}{unit}"
+        return shortened(item.brief) if low is None else f"{low:.1f}{unit} < {item.limit:.1f}{unit}"
     worst = max(values, key=abs, default=None)
     if worst is None or abs(worst) <= abs(item.limit):
-        return _clause(item.reason)
+        return shortened(item.brief)
     return f"{worst:.1f}{unit} {'>' if worst > 0.0 else '<'} {item.limit:.1f}{unit}"
 
 
-def _clause(reason: str) -> str:
-    text = reason.split("; ")[0].split(" (")[0]
-    return text if len(text) <= 80 else text[:77] + "..."
-
-
-def summary_text(
+def summary_lines(
     findings: Sequence[Finding], flyable: bool, setup: FlightSetup, level: str, prediction: Prediction | None = None
-) -> str:
-    """Write the summary: the answer; how the flight started; what was not judged; what is not flown as written."""
+) -> tuple[str, ...]:
+    """Lines of the summary: the answer; how the flight started; what was not judged; what is not flown as written."""
     lines = [headline(findings, flyable)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
@@ -122,7 +110,7 @@ def summary_text(
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     if prediction is not None:
         lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
-    return "\n".join(lines)
+    return tuple(lines)
 
 
 def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
@@ -143,8 +131,8 @@ def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
 
 
 def _agreement(prediction: Prediction) -> str:
-    told = prediction.disagreements
-    if not told:
+    differing = prediction.disagreements
+    if not differing:
         return "flight and geometry agree on every finding"
-    more = f", +{len(told) - _NAMED} more" if len(told) > _NAMED else ""
-    return "; ".join(told[:_NAMED]) + more
+    more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
+    return "; ".join(map(disagreement_text, differing[:_NAMED])) + more

@@ -26,6 +26,7 @@ from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.wording import place_text
 from planfly.airframe import Airframe, load_airframe
 from planfly.open_mission import open_mission
 from planfly.pipeline import make_setup
@@ -194,4 +195,4 @@ def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
 
 def _heading(item: Finding) -> str:
     """Rule and place, the place once."""
-    return item.rule if item.reason.startswith(item.where) else f"{item.rule} at {item.where}"
+    return item.rule if item.placed else f"{item.rule} at {place_text(item.place)}"

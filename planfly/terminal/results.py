@@ -9,37 +9,25 @@ from flight.mission_files.formats import mission_kind, mission_text
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import LogEvent
-from logs.verdict.findings import Finding, Verdict, verdict_json
+from logs.verdict.findings import RULES, Finding, Verdict, verdict_json
+from logs.verdict.wording import place_text, suggestions_text
 from world.atomic_files import write_whole
 
-# Findings of a passing rule are many; the terminal shows the closest one of each.
-_RULE_TITLES = {
-    "mission": "mission",
-    "turn": "turns",
-    "loiter": "loiters",
-    "slope": "slopes",
-    "clearance": "clearance",
-    "threat": "threats",
-    "bounds": "bounds",
-    "waypoint": "waypoints",
-    "speed": "airspeed",
-    "energy": "energy",
-    "departure": "departure",
-    "completion": "completion",
-}
+# Failed findings that are listed one by one.
+_LISTED = 12
 
 
 def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
-    """The verdict on the terminal: the sentence first, then what fails, then the tightest of each rule."""
+    """The verdict on the terminal: the summary first, then what fails, then the tightest finding of each rule."""
     print(verdict.summary)
     failed = [finding for finding in verdict.findings if finding.ok is False]
-    for finding in failed[:12]:
-        print(f"  failed  {finding.rule} at {finding.where}: {finding.reason}")
-        if finding.suggestion:
-            print(f"          would pass: {finding.suggestion}")
-    if len(failed) > 12:
-        print(f"  failed  and {len(failed) - 12} more")
-    for rule, title in _RULE_TITLES.items():
+    for finding in failed[:_LISTED]:
+        print(f"  failed  {finding.rule} at {place_text(finding.place)}: {finding.reason}")
+        if finding.suggestions:
+            print(f"          would pass: {suggestions_text(finding.suggestions)}")
+    if len(failed) > _LISTED:
+        print(f"  failed  and {len(failed) - _LISTED} more")
+    for rule, title in RULES.items():
         mine = [finding for finding in verdict.findings if finding.rule == rule]
         if mine:
             print(f"  {title:<11}{_state(mine)}")
@@ -60,7 +48,7 @@ def _state(findings: list[Finding]) -> str:
         value = tightest.flown if tightest.flown is not None else tightest.planned
         if value is not None and tightest.limit is not None:
             text += (
-                f"; tightest at {tightest.where}: {value:.4g} {tightest.unit}"
+                f"; tightest at {place_text(tightest.place)}: {value:.4g} {tightest.unit}"
                 f" against {tightest.limit:.4g} ({tightest.limit_source})"
             )
     return text

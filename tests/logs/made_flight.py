@@ -12,6 +12,7 @@ from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import Track
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import Place
 from planner.plan import Certificate, Plan
 from world.scenario import from_spec
 
@@ -132,8 +133,8 @@ def make_track(seconds: float = 8.0, rate_hz: float = 60.0) -> Track:
 
 
 def make_verdict() -> Verdict:
-    finding = Finding("turn", "waypoint 1", 40.0, 41.0, 45.0, "scenario", 1.0, 4.0, "deg", "fit", True, "")
-    return Verdict((finding,), flyable=True, complete=True, summary="flyable", level="flown")
+    finding = Finding("turn", Place("waypoint", 1), 40.0, 41.0, 45.0, "scenario", 1.0, 4.0, "deg", "fit", True, "")
+    return Verdict((finding,), flyable=True, complete=True, lines=("flyable",), level="flown")
 
 
 def record(path: Path, setup: FlightSetup, track: Track, *, rows_a_block: int = 60, ended: str = "completed") -> Path:

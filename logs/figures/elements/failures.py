@@ -1,18 +1,16 @@
 """Where a verdict's failures lie on a route, and how far along it a flight has come."""
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
-from logs.verdict.findings import Verdict
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import Kind
 from world.geometry import leg_runs
 
 Floats = NDArray[np.float64]
-
-_PLACE = re.compile(r"(waypoint|leg) (\d+)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,20 +27,22 @@ class Failures:
 
 def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
     """Find the failing places of a verdict; places that the route does not have are left out."""
-    found: dict[str, dict[int, list[str]]] = {"leg": {}, "waypoint": {}}
-    for finding in verdict.findings if verdict is not None else ():
-        place = _PLACE.match(finding.where)
-        if finding.ok is not False or place is None:
-            continue
-        kind, number = place.group(1), int(place.group(2))
-        if number < waypoint_count - (kind == "leg"):
-            rules = found[kind].setdefault(number, [])
+    failed = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
+    return Failures(
+        legs=_rules_at(failed, "leg", waypoint_count - 1), waypoints=_rules_at(failed, "waypoint", waypoint_count)
+    )
+
+
+def _rules_at(failed: list[Finding], kind: Kind, count: int) -> dict[int, tuple[str, ...]]:
+    """Rules that failed at the first so many places of a kind, by the place's number."""
+    found: dict[int, list[str]] = {}
+    for finding in failed:
+        place = finding.place
+        if place.kind == kind and place.index is not None and place.index < count:
+            rules = found.setdefault(place.index, [])
             if finding.rule not in rules:
                 rules.append(finding.rule)
-    return Failures(
-        legs={number: tuple(rules) for number, rules in sorted(found["leg"].items())},
-        waypoints={number: tuple(rules) for number, rules in sorted(found["waypoint"].items())},
-    )
+    return {number: tuple(rules) for number, rules in sorted(found.items())}
 
 
 def route_distance(waypoints: Floats) -> Floats:

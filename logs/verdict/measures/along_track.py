@@ -9,17 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.verdict.tolerances import FARTHEST, TOUCH
 from world.frames import PolyMapRecord
 from world.geometry import sphere_window
 from world.kernels import compiled
 from world.terrain import Heights, Terrain, segment_clearance
 
 Floats = NDArray[np.float64]
-
-# A track further out than this (m) is garbage and meets nothing.
-_FARTHEST = 1e7
-# Windows of neighbouring segments that touch to within this (s) are one.
-_TOUCH = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +51,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
         start, end = time[k] + enter[k] * step[k], time[k] + leave[k] * step[k]
         last = k == len(step) - 1 and leave[k] >= 1.0
         here = Passage(float(start), float(end), float(closest[k]), float(time[k]), not last)
-        if found and start - found[-1].end <= _TOUCH:
+        if found and start - found[-1].end <= TOUCH:
             before = found.pop()
             nearer = here if here.closest < before.closest else before
             here = Passage(before.start, here.end, nearer.closest, nearer.closest_time, here.whole)
@@ -79,7 +75,7 @@ def _clearances(
     low = np.full(count, math.nan)
     at = np.zeros(count)
     for k in range(count):
-        if np.abs(position[k : k + 2]).max() <= _FARTHEST:
+        if np.abs(position[k : k + 2]).max() <= FARTHEST:
             low[k], at[k] = segment_clearance(heights, to_pixel, position[k], position[k + 1])
     return low, at
 
@@ -91,6 +87,6 @@ def _windows(position: Floats, centre: Floats, radius: float) -> tuple[Floats, F
     enter = np.zeros(count)
     leave = np.zeros(count)
     for k in range(count):
-        if np.abs(position[k : k + 2]).max() <= _FARTHEST:
+        if np.abs(position[k : k + 2]).max() <= FARTHEST:
             closest[k], enter[k], leave[k] = sphere_window(position[k], position[k + 1], centre, radius)
     return closest, enter, leave

@@ -23,8 +23,8 @@ def with_legs(setup: FlightSetup, track: Track) -> Track:
     usable rows is all on leg 0.
     """
     places = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _ASIDE})
-    flown = lay_track(route_demands(setup), places)
-    if flown is None:
+    aligned = lay_track(route_demands(setup), places)
+    if aligned is None:
         return replace(track, leg=np.zeros(len(track), dtype=np.int32))
-    ends = np.where(flown.passed, flown.track.time[flown.rows], math.inf)[1:-1]
+    ends = np.where(aligned.passed, aligned.track.time[aligned.rows], math.inf)[1:-1]
     return replace(track, leg=np.searchsorted(ends, track.time, side="right").astype(np.int32))

@@ -5,6 +5,7 @@ they would be passed at.  Both are judged by the same code, exact on each straig
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,64 +41,89 @@ def path_clearance(
     return low, at
 
 
+class SphereVisits(NamedTuple):
+    """How a path meets each of m spheres, (m,) each.
+
+    inside: s.
+    exposure: s, the integral over that time of (scale/d)^4.
+    closest: m to the centre at the least; inf for no sphere.
+    closest_time: s.
+    entry_time: s, of the first entry; NaN where it never enters.
+    """
+
+    inside: Floats
+    exposure: Floats
+    closest: Floats
+    closest_time: Floats
+    entry_time: Floats
+
+
+class _Boxes(NamedTuple):
+    """Least and greatest corner of each block of segments, (blocks, 3) m, and its diagonal, (blocks,) m."""
+
+    low: Floats
+    high: Floats
+    diagonal: Floats
+
+
 @compiled
 def path_spheres(
     points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats
-) -> Floats:  # pragma: no cover - compiled
-    """How a path meets each of m spheres, (m, 5).
+) -> SphereVisits:  # pragma: no cover - compiled
+    """How a path meets each of m spheres.  A radius of 0 is no sphere.
 
-    Columns: s inside; the integral over that time of (scale/d)^4, s; closest distance to the centre, m; the time of
-    that; the time of first entry (NaN where it never enters).  A radius of 0 is no sphere.
+    points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
     """
     boxes = _boxes(points)
-    out = np.zeros((centres.shape[0], 5))
-    for m in range(centres.shape[0]):
-        out[m, 2] = math.inf
-        out[m, 4] = math.nan
+    count = centres.shape[0]
+    out = SphereVisits(
+        np.zeros(count), np.zeros(count), np.full(count, math.inf), np.zeros(count), np.full(count, math.nan)
+    )
+    for m in range(count):
         if radii[m] <= 0.0 or points.shape[0] < 2:
             continue
         nearest = 0
         nearest_box = math.inf
-        for block in range(boxes.shape[0]):
-            low, _ = _box_distances(boxes[block], centres[m])
+        for block in range(boxes.diagonal.shape[0]):
+            low, _ = _box_distances(boxes, block, centres[m])
             if low < nearest_box:
                 nearest_box, nearest = low, block
-        _closest(points, time, nearest, centres[m], out[m])
-        for block in range(boxes.shape[0]):
-            low, high = _box_distances(boxes[block], centres[m])
-            if low < out[m, 2]:
-                _closest(points, time, block, centres[m], out[m])
+        _closest(points, time, nearest, centres[m], m, out)
+        for block in range(boxes.diagonal.shape[0]):
+            low, high = _box_distances(boxes, block, centres[m])
+            if low < out.closest[m]:
+                _closest(points, time, block, centres[m], m, out)
             if low <= radii[m]:
-                whole = high <= radii[m] and low > _FAR * boxes[block, 6]
-                _inside(points, time, block, _JOINED if whole else 1, centres[m], radii[m], scales[m], out[m])
+                whole = high <= radii[m] and low > _FAR * boxes.diagonal[block]
+                _inside(points, time, block, _JOINED if whole else 1, centres[m], radii[m], scales[m], m, out)
     return out
 
 
 @compiled
-def _boxes(points: Floats) -> Floats:  # pragma: no cover - compiled
-    """Least and greatest corner of each block of segments, and its diagonal, (blocks, 7)."""
+def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
     segments = max(0, points.shape[0] - 1)
-    out = np.empty(((segments + _BLOCK - 1) // _BLOCK, 7))
-    for block in range(out.shape[0]):
+    count = (segments + _BLOCK - 1) // _BLOCK
+    out = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
+    for block in range(count):
         first, last = block * _BLOCK, min(segments, (block + 1) * _BLOCK)
         diagonal2 = 0.0
-        for k in range(3):
+        for axis in range(3):
             low, high = math.inf, -math.inf
             for row in range(first, last + 1):
-                low, high = min(low, points[row, k]), max(high, points[row, k])
-            out[block, k], out[block, 3 + k] = low, high
+                low, high = min(low, points[row, axis]), max(high, points[row, axis])
+            out.low[block, axis], out.high[block, axis] = low, high
             diagonal2 += (high - low) ** 2
-        out[block, 6] = math.sqrt(diagonal2)
+        out.diagonal[block] = math.sqrt(diagonal2)
     return out
 
 
 @compiled
-def _box_distances(box: Floats, centre: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Least and greatest distance of a box from a point."""
+def _box_distances(boxes: _Boxes, block: int, centre: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Least and greatest distance of a block's box from a point."""
     low2 = 0.0
     high2 = 0.0
-    for k in range(3):
-        below, above = box[k] - centre[k], centre[k] - box[3 + k]
+    for axis in range(3):
+        below, above = boxes.low[block, axis] - centre[axis], centre[axis] - boxes.high[block, axis]
         out = max(0.0, below, above)
         low2 += out * out
         far = max(abs(below), abs(above))
@@ -106,8 +132,10 @@ def _box_distances(box: Floats, centre: Floats) -> tuple[float, float]:  # pragm
 
 
 @compiled
-def _closest(points: Floats, time: Floats, block: int, centre: Floats, out: Floats) -> None:  # pragma: no cover
-    """Bring the closest distance and its time up to date with one block."""
+def _closest(
+    points: Floats, time: Floats, block: int, centre: Floats, m: int, out: SphereVisits
+) -> None:  # pragma: no cover - compiled
+    """Bring the closest distance to sphere m and its time up to date with one block."""
     for k in range(block * _BLOCK, min(points.shape[0] - 1, (block + 1) * _BLOCK)):
         length2 = 0.0
         along = 0.0
@@ -117,16 +145,24 @@ def _closest(points: Floats, time: Floats, block: int, centre: Floats, out: Floa
             along += step * (centre[axis] - points[k, axis])
         f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
         away, _, _ = sphere_window(points[k], points[k + 1], centre, 0.0)
-        if away < out[2]:
-            out[2] = away
-            out[3] = time[k] + f * (time[k + 1] - time[k])
+        if away < out.closest[m]:
+            out.closest[m] = away
+            out.closest_time[m] = time[k] + f * (time[k + 1] - time[k])
 
 
 @compiled
 def _inside(
-    points: Floats, time: Floats, block: int, step: int, centre: Floats, radius: float, scale: float, out: Floats
+    points: Floats,
+    time: Floats,
+    block: int,
+    step: int,
+    centre: Floats,
+    radius: float,
+    scale: float,
+    m: int,
+    out: SphereVisits,
 ) -> None:  # pragma: no cover - compiled
-    """Add one block's time and exposure inside the sphere."""
+    """Add one block's time and exposure inside sphere m."""
     last = min(points.shape[0] - 1, (block + 1) * _BLOCK)
     k = block * _BLOCK
     while k < last:
@@ -134,9 +170,9 @@ def _inside(
         share, mean = segment_exposure(points[k], points[end], centre, radius, scale)
         if share > 0.0:
             lasts = time[end] - time[k]
-            if math.isnan(out[4]):
+            if math.isnan(out.entry_time[m]):
                 _, enter, _ = sphere_window(points[k], points[end], centre, radius)
-                out[4] = time[k] + enter * lasts
-            out[0] += share * lasts
-            out[1] += mean * lasts
+                out.entry_time[m] = time[k] + enter * lasts
+            out.inside[m] += share * lasts
+            out.exposure[m] += mean * lasts
         k = end

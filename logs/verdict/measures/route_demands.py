@@ -1,4 +1,4 @@
-"""What a route asks of the aircraft and what the aircraft can: the planned side of every finding."""
+"""What a route asks of the aircraft and what the aircraft's limits are: the planned side of every finding."""
 
 import math
 from dataclasses import dataclass
@@ -6,75 +6,84 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import (
-    BLEND_ACCELERATION,
-    Limits,
-    PerformanceTable,
-    aircraft_slopes,
-    downwind,
-    fly_over_run,
-    ground_speed_on,
-    roll_reversal_length,
-    turn_radius_between,
-)
+from aircraft.path_limits import BLEND_ACCELERATION, Limits, PerformanceTable, aircraft_slopes, ground_speed_on
+from flight.guidance.fly_by_path import fly_by_path, path_polyline
+from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
-from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
+from logs.verdict.measures.turn_demands import TurnDemands, performance_tables, turn_demands
+from logs.verdict.places import Place
+from logs.verdict.tolerances import LARGEST_CUT
+from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes
 
 Floats = NDArray[np.float64]
 
-# A leg shorter than this is a climb on the spot, with no course of its own, m.
-ON_THE_SPOT = 0.5
-# A turn sharper than this has no useful tangent length; a U-turn's is infinite.
-_U_TURN = math.pi - 1e-6
-# The distance by which a fly-by passes its waypoint is capped at this many radii (a turn of about 176 degrees).
-_LARGEST_CUT = 30.0
+
+@dataclass(frozen=True, slots=True)
+class PlannedPath:
+    """The fly-by path as a chain of n points.
+
+    points: (n, 3) m.
+    legs: (n - 1,) leg of each segment.
+    times: (n,) s at which each point is passed.
+    """
+
+    points: Floats
+    legs: NDArray[np.int64]
+    times: Floats
 
 
 @dataclass(frozen=True, slots=True)
 class RouteDemands:
-    """A route's turns and legs in numbers, and the aircraft's limits at each.
+    """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
 
-    For w waypoints: points (w, 3) m; runs (w - 1,) horizontal m; courses, slopes (w - 1,) rad; turns (w,) rad,
-    positive to the right, 0 at the ends; radius (w,) m of the arc, at the bank limit or of a loiter's circle; tightest
-    (w,) m, the arc at the bank limit; before, after (w,) m of leg that the turn uses on either side, inf for a U-turn;
-    reversal (w - 1,) m of leg that the roll from a turn into one the other way round uses;
-    blend (w,) m of leg beyond them on which the slope still changes;
-    sag (w,) m by which such a blend may pass above or below its corner; cut (w,) m by which the fly-by passes the
-    waypoint; turn_limit (w,) rad, the sharpest turn there that fits both legs
-    beside the neighbouring turns, inf where the envelope is left out;
-    climb, dive (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out;
-    ground_speed (w - 1,) m/s, NaN where the wind leaves no way.
+    For w waypoints:
+
+    points: (w, 3) m.
+    runs: (w - 1,) m, horizontal.
+    courses, slopes: (w - 1,) rad.
+    turns, tightest, radius, before, after, reversal: as of `TurnDemands`.
+    blend: (w,) m of leg beyond each turn on which the slope still changes.
+    blend_deviation: (w,) m by which such a blend may pass above or below its corner.
+    fly_by_offset: (w,) m by which the fly-by passes the waypoint.
+    turn_limit: (w,) rad, as `TurnDemands.limit`; inf where the envelope is left out.
+    climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
+    ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
     """
 
     setup: FlightSetup
-    limits: Limits
     points: Floats
     runs: Floats
     courses: Floats
     slopes: Floats
     turns: Floats
+    tightest: Floats
     radius: Floats
     before: Floats
     after: Floats
     reversal: Floats
     blend: Floats
-    sag: Floats
-    cut: Floats
-    tightest: Floats
+    blend_deviation: Floats
+    fly_by_offset: Floats
     turn_limit: Floats
     climb: Floats
     dive: Floats
     ground_speed: Floats
+    path: PlannedPath
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of scenario and aircraft."""
+        return self.setup.limits
 
     @property
     def legs(self) -> int:
         """How many legs there are."""
         return len(self.runs)
 
-    def waypoint(self, index: int) -> str:
-        """Name of a waypoint in findings."""
+    def waypoint(self, index: int) -> Place:
+        """A waypoint as the place of a finding."""
         item = int(self.setup.route.items[index])
-        return f"waypoint {index}" if item < 0 else f"waypoint {index} (item {item})"
+        return Place("waypoint", index, None if item < 0 else item)
 
     def leg_unit(self, leg: int) -> Floats:
         """East and north components of a leg's course, (2,)."""
@@ -84,151 +93,99 @@ class RouteDemands:
         """Where the fly-by path passes each waypoint: the middles of the arcs, (w, 3) m."""
         out = self.points.copy()
         for i in range(1, len(out) - 1):
-            if self.cut[i] > 0.0:
+            if self.fly_by_offset[i] > 0.0:
                 inward = self.leg_unit(i) - self.leg_unit(i - 1)
-                out[i, :2] += self.cut[i] * inward / max(1e-9, math.hypot(inward[0], inward[1]))
+                out[i, :2] += self.fly_by_offset[i] * inward / max(1e-9, math.hypot(inward[0], inward[1]))
                 # Halfway between the heights at the arc's ends.
-                reach = min(self.before[i], self.runs[i - 1], self.runs[i])
-                out[i, 2] += 0.5 * reach * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
+                tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
+                out[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
         return out
 
 
 def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
-    """Work out a route's shape.  ``envelope=False`` leaves the aircraft's limits out, for flown evidence alone."""
+    """Work out what a setup's route asks for.
+
+    envelope: False leaves the aircraft's limits out, for flown evidence alone.
+    """
     route, limits = setup.route, setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
-    count, legs = len(points), len(points) - 1
-    tables = {float(v): limits.performance(float(v)) for v in route.airspeed}
+    tables = performance_tables(route, limits)
+    turning = turn_demands(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
-    turns = np.zeros(count)
-    if count > 2:
-        turns[1:-1] = signed_turns(points)
-    tightest, radius, before, after = (np.zeros(count) for _ in range(4))
-    for i in range(1, count - 1):
-        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
-        tightest[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
-        radius[i] = route.arcs[i] or tightest[i]
-        before[i], after[i] = turn_room(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
-    climb, dive, speeds = np.full(legs, math.inf), np.full(legs, math.inf), np.zeros(legs)
+    climb, dive, speeds = _leg_limits(route, tables, points, courses)
+    if not envelope:
+        climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
+    blend, deviation = _blends(setup, points, runs, turning)
+    return RouteDemands(
+        setup=setup,
+        points=points,
+        runs=runs,
+        courses=courses,
+        slopes=leg_slopes(points),
+        turns=turning.turns,
+        tightest=turning.tightest,
+        radius=turning.radius,
+        before=turning.before,
+        after=turning.after,
+        reversal=turning.reversal,
+        blend=blend,
+        blend_deviation=deviation,
+        fly_by_offset=_fly_by_offsets(route, turning),
+        turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
+        climb=climb,
+        dive=dive,
+        ground_speed=speeds,
+        path=_planned_path(route, limits, speeds),
+    )
+
+
+def _planned_path(route: Route, limits: Limits, ground_speed: Floats) -> PlannedPath:
+    points, legs = path_polyline(fly_by_path(route, limits))
+    speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
+    run = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(run / speed[legs])]))
+
+
+def _leg_limits(
+    route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Climb and dive over the ground, rad, and ground speed, m/s, that the aircraft has all along each leg."""
+    legs = len(courses)
+    climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
     for leg in range(legs):
         table, course = tables[float(route.airspeed[leg])], float(courses[leg])
         heights = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
         speeds[leg] = min(ground_speed_on(table, course, up) for up in heights)
         if any(math.isnan(ground_speed_on(table, course, up)) for up in heights):
             speeds[leg] = math.nan
-        if envelope:
-            climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
-    reversal = _reversals(setup, tables, courses, turns, radius, points[:, 2])
-    blend, sag = _blends(setup, points, runs, turns, radius, after)
-    cut = np.zeros(count)
-    for i in np.flatnonzero(np.isfinite(radius) & ~route.fly_over).tolist():
-        cut[i] = min(fly_by_offset(abs(float(turns[i])), float(radius[i])), _LARGEST_CUT * float(radius[i]))
-    return RouteDemands(
-        setup=setup,
-        limits=limits,
-        points=points,
-        runs=runs,
-        courses=courses,
-        slopes=leg_slopes(points),
-        turns=turns,
-        radius=radius,
-        before=before,
-        after=after,
-        reversal=reversal,
-        blend=blend,
-        sag=sag,
-        cut=cut,
-        tightest=tightest,
-        turn_limit=_turn_limits(setup, runs, tightest, before, after, reversal)
-        if envelope
-        else np.full(count, math.inf),
-        climb=climb,
-        dive=dive,
-        ground_speed=speeds,
-    )
+        climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
+    return climb, dive, speeds
 
 
-def _blends(
-    setup: FlightSetup, points: Floats, runs: Floats, turns: Floats, radius: Floats, after: Floats
-) -> tuple[Floats, Floats]:
+def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
+    """Distance by which the fly-by passes each waypoint, (w,) m."""
+    out = np.zeros(len(turning.radius))
+    for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
+        radius = float(turning.radius[i])
+        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_CUT * radius)
+    return out
+
+
+def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDemands) -> tuple[Floats, Floats]:
     """Length of leg beside each turn on which the slope still changes, and its distance from the corner, (w,) m.
 
     A parabola about each end of the arc, or about the waypoint where there is none.
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
-    blend, sag = np.zeros(len(points)), np.zeros(len(points))
+    blend, deviation = np.zeros(len(points)), np.zeros(len(points))
     speed = float(setup.route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
         steps = [abs(rise[i] - rise[i - 1])]
-        arc = radius[i] * abs(turns[i])
-        if 0.0 < arc < math.inf and math.isfinite(after[i]) and not setup.route.fly_over[i]:
+        arc = turning.radius[i] * abs(turning.turns[i])
+        if 0.0 < arc < math.inf and math.isfinite(turning.after[i]) and not setup.route.fly_over[i]:
             # The arc is shorter than its two tangents, so that its slope is steeper than the legs'.
-            on_arc = (rise[i - 1] + rise[i]) * after[i] / arc
+            on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc
             steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
         blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
-        sag[i] = 0.25 * max(steps) * blend[i]
-    return blend, sag
-
-
-def turn_room(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
-    """Length of leg (m) that a turn (rad) uses before and after its waypoint; a fly-over only after it."""
-    if turn < 1e-9:
-        return 0.0, 0.0
-    if fly_over:
-        return 0.0, radius * fly_over_run(turn)
-    if turn > _U_TURN:
-        return math.inf, math.inf
-    reach = tangent_length(turn, radius)
-    return reach, reach
-
-
-def _reversals(
-    setup: FlightSetup,
-    tables: dict[float, PerformanceTable],
-    courses: Floats,
-    turns: Floats,
-    radius: Floats,
-    up: Floats,
-) -> Floats:
-    """Length of each leg that the roll from one bank into the other uses, (w - 1,) m; 0 between turns of one side."""
-    out = np.zeros(len(courses))
-    for leg in range(1, len(courses) - 1):
-        flown_by = not setup.route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
-        if turns[leg] * turns[leg + 1] < 0.0 and flown_by:
-            table = tables[float(setup.route.airspeed[leg])]
-            ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
-            lower = float(min(up[leg], up[leg + 1]))
-            out[leg] = roll_reversal_length(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
-    return out
-
-
-def _turn_limits(
-    setup: FlightSetup, runs: Floats, radius: Floats, before: Floats, after: Floats, reversal: Floats
-) -> Floats:
-    """Sharpest turn at each waypoint that fits its legs beside the neighbouring turns, (w,) rad.
-
-    Of a leg too short for its two turns the one that takes more than half of it is at fault, or both are.
-    """
-    out = np.full(len(radius), math.pi)
-    for i in range(1, len(radius) - 1):
-        if not math.isfinite(radius[i]):
-            out[i] = 0.0
-            continue
-        behind = max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1]
-        ahead = max(runs[i] - before[i + 1], 0.5 * runs[i]) - reversal[i]
-        if setup.route.fly_over[i]:
-            out[i] = _sharpest_fly_over(ahead / radius[i])
-        else:
-            out[i] = 2.0 * math.atan(min(behind, ahead) / radius[i])
-    return out
-
-
-def _sharpest_fly_over(room: float) -> float:
-    """Sharpest fly-over turn (rad) whose run fits ``room`` radii, by bisection."""
-    low, high = 0.0, math.pi
-    if fly_over_run(high) <= room:
-        return high
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if fly_over_run(middle) <= room else (low, middle)
-    return low
+        deviation[i] = 0.25 * max(steps) * blend[i]
+    return blend, deviation

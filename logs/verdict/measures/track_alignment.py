@@ -13,32 +13,34 @@ from numpy.typing import NDArray
 from flight.simulation.track import Track
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, FARTHEST, FASTEST
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
-# A waypoint further than this from the track draws no row to itself, m.
-REACH = 500.0
 # Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
 _CELLS = 40_000_000
 # Rows are thinned to no less than this many seconds for the assignment.
 _CHORD = 0.25
-# No position or speed of ours is larger; what is, is garbage.
-_FARTHEST, _FASTEST = 1e7, 1e4
 
 
 @dataclass(frozen=True, slots=True)
 class AlignedTrack:
-    """A track laid beside a route.
+    """A track laid beside a route of w waypoints; t usable rows.
 
-    track: its usable rows.  bad_rows: how many had no finite, plausible numbers or no later time than the row
-    before; first_bad: their first time, s (NaN where there is none).  rows: (w,) the row nearest to each waypoint's
-    apex, never decreasing; the last row for a waypoint that the flight did not get to.  distance: (w,) m from
-    there to the apex.  passed: (w,) bool, the flight went by.  course: (t,) rad over the ground, unwrapped.
-    distance_run: (t,) m along the ground track.  low, low_at: (t - 1,) least height above ground between a row and the
-    next, m, and the fraction of the way where it is; NaN off the known terrain, and without any.
+    track: the usable rows.
+    bad_rows: how many rows had no finite, plausible numbers or no later time than the row before.
+    first_bad: time of the first of them, s; NaN where there is none.
+    rows: (w,) the row nearest to each waypoint's apex, never decreasing; the last row for a waypoint that the flight
+    did not get to.
+    distance: (w,) m from there to the apex.
+    passed: (w,) bool, the flight went by.
+    course: (t,) rad over the ground, unwrapped.
+    distance_run: (t,) m along the ground track.
+    low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the way where
+    it is; NaN off the known terrain, and without any.
     """
 
     track: Track
@@ -71,7 +73,7 @@ class AlignedTrack:
         return slice(start, int(np.searchsorted(time, time[last] + seconds, side="right")))
 
 
-def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
+def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     """Lay a track beside a route; None where it has fewer than two usable rows."""
     good = _usable(track)
     if int(good.sum()) < 2:
@@ -81,14 +83,14 @@ def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
     else:
         first_bad = float(track.time[int(np.argmin(good))])
         clean = Track(*(getattr(track, item.name)[good] for item in fields(track)))
-    apexes = shape.apexes()
+    apexes = demands.apexes()
     rows, distance = _assign(clean, apexes)
     last = len(clean) - 1
-    passed = (rows < last) | (distance <= shape.cut + 10.0)
+    passed = (rows < last) | (distance <= demands.fly_by_offset + ARRIVED)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
-    ground = shape.setup.scenario.terrain
+    ground = demands.setup.scenario.terrain
     low, low_at = np.full(last, math.nan), np.zeros(last)
     if ground is not None:
         low, low_at = path_clearance(ground.heights, ground.to_pixel.record, clean.position)
@@ -106,21 +108,21 @@ def lay_track(shape: RouteDemands, track: Track) -> AlignedTrack | None:
     )
 
 
-def along_across(shape: RouteDemands, leg: int, position: Floats) -> tuple[Floats, Floats]:
+def along_across(demands: RouteDemands, leg: int, position: Floats) -> tuple[Floats, Floats]:
     """Distance along a leg from its start and to the right of its line, m, of positions (n, 3)."""
-    east, north = position[:, 0] - shape.points[leg, 0], position[:, 1] - shape.points[leg, 1]
-    ux, uy = math.sin(shape.courses[leg]), math.cos(shape.courses[leg])
+    east, north = position[:, 0] - demands.points[leg, 0], position[:, 1] - demands.points[leg, 1]
+    ux, uy = math.sin(demands.courses[leg]), math.cos(demands.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
-def approaches(position: Floats, place: Floats) -> tuple[Floats, Floats]:
-    """Least horizontal distance of each segment of a track from a place, m, and the fraction where that is.
+def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
+    """Least horizontal distance of each segment of a track from a target, m, and the fraction where that is.
 
-    position: (n, 3).  place: (2,) or (3,).  Returns (n - 1,) twice.
+    position: (n, 3).  target: (2,) or (3,).  Returns (n - 1,) twice.
     """
     start = position[:-1, :2]
     step = position[1:, :2] - start
-    away = place[:2] - start
+    away = target[:2] - start
     length2 = np.maximum((step * step).sum(axis=1), 1e-12)
     fraction = np.clip((step * away).sum(axis=1) / length2, 0.0, 1.0)
     rest = away - fraction[:, None] * step
@@ -133,8 +135,8 @@ def _usable(track: Track) -> NDArray[np.bool_]:
     for name in ("airspeed", "current", "energy"):
         good &= np.isfinite(getattr(track, name))
     for name, largest in (
-        ("position", _FARTHEST),
-        ("velocity", _FASTEST),
+        ("position", FARTHEST),
+        ("velocity", FASTEST),
         ("attitude", 1e3),
         ("controls", 1e3),
         ("wind", 1e3),
@@ -151,7 +153,7 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
     step = max(1, int(_CHORD / tick), -(-len(track) * count // _CELLS))
-    chords, capped = _align(position, apexes, step, REACH)
+    chords, capped = _align(position, apexes, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)
     # Missed waypoints lie between their neighbours; those after the last one met lie at the end.
@@ -177,11 +179,11 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
 
 @compiled
 def _align(
-    position: Floats, marks: Floats, step: int, reach: float
+    position: Floats, marks: Floats, step: int, capture: float
 ) -> tuple[Rows, NDArray[np.bool_]]:  # pragma: no cover - compiled
-    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, reach)^2.
+    """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
 
-    By dynamic programming; of equal assignments the earliest.  Also which marks are out of reach of their chord.
+    By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures.
     """
     last = position.shape[0] - 1
     chords = (last + step - 1) // step
@@ -203,7 +205,7 @@ def _align(
                 start2 += out * out
             f = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 0.0
             away2 = max(0.0, start2 - 2.0 * f * along + f * f * length2)
-            total = best[j] + min(away2, reach * reach)
+            total = best[j] + min(away2, capture * capture)
             if total < lowest:
                 lowest = total
                 fresh[i, j] = 1
@@ -221,5 +223,5 @@ def _align(
             for k in range(3):
                 away2 += (marks[i, k] - position[row, k]) ** 2
             nearest2 = min(nearest2, away2)
-        capped[i] = nearest2 >= reach * reach
+        capped[i] = nearest2 >= capture * capture
     return chosen, capped

@@ -8,25 +8,23 @@ from aircraft.envelope import ground_speed
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.rules.world_rules import planned_path
-
-# Reserve of the battery or the tank.
-RESERVE = 0.2
+from logs.verdict.places import FLIGHT
+from logs.verdict.tolerances import RESERVE
 
 
-def energy_findings(shape: RouteDemands, flown: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
     """One finding: the energy used against the battery less its reserve."""
-    setup = shape.setup
+    setup = demands.setup
     usable = (1.0 - RESERVE) * setup.battery
-    predicted, peak = predicted_energy(shape)
+    predicted, peak = predicted_energy(demands)
     used, current = predicted, peak
     if not geometric:
-        used = math.nan if flown is None else float(flown.track.energy.max())
-        current = math.nan if flown is None else float(flown.track.current.max())
+        used = math.nan if aligned is None else float(aligned.track.energy.max())
+        current = math.nan if aligned is None else float(aligned.track.current.max())
     if math.isnan(used):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
     else:
-        reason = _said(shape, used, current) + (" by prediction" if geometric else "")
+        reason = _used_text(demands, used, current) + (" by prediction" if geometric else "")
         if not geometric and math.isfinite(predicted):
             reason += f"; {predicted:.1f} Wh by prediction"
         if used > usable:
@@ -34,7 +32,7 @@ def energy_findings(shape: RouteDemands, flown: AlignedTrack | None, *, geometri
     return [
         make_finding(
             "energy",
-            "flight",
+            FLIGHT,
             ok=None if math.isnan(used) else used <= usable,
             reason=reason,
             planned=predicted,
@@ -49,39 +47,39 @@ def energy_findings(shape: RouteDemands, flown: AlignedTrack | None, *, geometri
     ]
 
 
-def _said(shape: RouteDemands, used: float, current: float) -> str:
+def _used_text(demands: RouteDemands, used: float, current: float) -> str:
     """Energy used (Wh) and the peak current (A), or what an aircraft without a battery has instead."""
-    whole = shape.setup.battery
-    if shape.setup.envelope.power_level.size and not shape.setup.envelope.volts:
+    whole = demands.setup.battery
+    if demands.setup.envelope.power_level.size and not demands.setup.envelope.volts:
         share = used / whole
         return f"{used:.0f} Wh of {whole:.0f} Wh of fuel heat used, {share:.1%} of the fuel; no battery, so no current"
     peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
     return f"{used:.1f} Wh of {whole:.0f} Wh used{peak}"
 
 
-def predicted_energy(shape: RouteDemands) -> tuple[float, float]:
+def predicted_energy(demands: RouteDemands) -> tuple[float, float]:
     """Energy (Wh) and peak current (A) of steady flight along a route, NaN where the envelope knows no power.
 
     Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
     and gusts take beside that is a few per cent.
     """
-    envelope, route = shape.setup.envelope, shape.setup.route
-    if not np.isfinite(shape.ground_speed).all():
+    envelope, route = demands.setup.envelope, demands.setup.route
+    if not np.isfinite(demands.ground_speed).all():
         return math.nan, math.nan
-    _, legs, times = planned_path(shape)
     total, most = 0.0, 0.0
-    for leg, seconds in enumerate(np.bincount(legs, weights=np.diff(times), minlength=shape.legs)):
-        speed, up = float(route.airspeed[leg]), float(0.5 * (shape.points[leg, 2] + shape.points[leg + 1, 2]))
-        power = envelope.power(speed, up, air_angle(shape, leg, speed, up))
+    seconds_on = np.bincount(demands.path.legs, weights=np.diff(demands.path.times), minlength=demands.legs)
+    for leg, seconds in enumerate(seconds_on):
+        speed, up = float(route.airspeed[leg]), float(0.5 * (demands.points[leg, 2] + demands.points[leg + 1, 2]))
+        power = envelope.power(speed, up, air_angle(demands, leg, speed, up))
         total += power * float(seconds) / 3600.0
         most = max(most, power) if math.isfinite(power) else math.nan
     return total, most / envelope.volts if envelope.volts else math.nan
 
 
-def air_angle(shape: RouteDemands, leg: int, speed: float, up: float) -> float:
+def air_angle(demands: RouteDemands, leg: int, speed: float, up: float) -> float:
     """Path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
-    tail, cross = shape.setup.scenario.wind.along(float(shape.courses[leg]), up)
-    rise, angle = math.tan(float(shape.slopes[leg])), 0.0
+    tail, cross = demands.setup.scenario.wind.along(float(demands.courses[leg]), up)
+    rise, angle = math.tan(float(demands.slopes[leg])), 0.0
     for _ in range(4):
         along = ground_speed(speed * math.cos(angle), tail, cross)
         angle = math.asin(min(1.0, max(-1.0, rise * along / speed)))

@@ -25,17 +25,20 @@ from flight.mission.items import (
     command_name,
 )
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import Finding, Message, make_finding, message
+from logs.verdict.places import Place
+from logs.verdict.tolerances import (
+    PX4_ACCEPTANCE,
+    PX4_BETWEEN_WAYPOINTS,
+    PX4_FIRST_WAYPOINT,
+    PX4_GATE_APART,
+    PX4_LANDING_ANGLE,
+    PX4_MOST_PWM,
+    PX4_MOST_SERVO,
+)
 from world.frames import GeoOrigin, to_map
 
 C = Command
-ACCEPTANCE = 10.0
-LANDING_ANGLE = math.radians(5.0 + 0.1)
-FIRST_WAYPOINT = 10_000.0
-# MIS_DIST_WPS of the releases that had it.
-BETWEEN_WAYPOINTS = 900.0
-# A condition gate nearer than this to a waypoint, m, is at its place.
-GATE_APART = 0.05
 
 # Commands that PX4 takes in a mission, by number: idle, delay, condition gate, winch, gripper, cameras, gimbals.
 _PX4 = frozenset(
@@ -46,7 +49,6 @@ _PX4 = frozenset(
 _ARDUPLANE = frozenset(
     {18, 30, 83, 92, 94, 112, 114, 115, 181, 182, 184, 186, 207, 208, 210, 212, 216, 218, 222, 223, 600, 601}
 )
-_MOST_SERVO, _MOST_PWM = 5, 2000.0
 
 
 def mission_findings(setup: FlightSetup) -> list[Finding]:
@@ -63,25 +65,28 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
         ("checkIfBelowHomeAltitude", _below_home(mission)),
         ("checkGeofence", _fence(setup)),
     )
-    return [_finding(name, list(said)) for name, said in checks]
+    return [_finding(name, list(remarks)) for name, remarks in checks]
 
 
-# What a check says: the verdict on it, the item (None: the whole mission), and why.
-_Said = tuple[bool | None, int | None, str]
+# What a check remarks: the verdict on it, the item (None: the whole mission), and why.
+_Remark = tuple[bool | None, int | None, str | Message]
 
 
-def _finding(check: str, said: list[_Said]) -> Finding:
-    # A failure speaks first, then what could not be decided, then remarks.
-    said.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
-    ok, item, reason = said[0] if said else (True, None, "nothing to object to")
-    more = f" (+{len(said) - 1} more)" if len(said) > 1 else ""
+def _finding(check: str, remarks: list[_Remark]) -> Finding:
+    # A failure comes first, then what could not be decided, then what is only remarked.
+    remarks.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
+    ok, item, why = remarks[0] if remarks else (True, None, "nothing to object to")
+    first = why if isinstance(why, Message) else message(why)
+    more = f" (+{len(remarks) - 1} more)" if len(remarks) > 1 else ""
     return make_finding(
         "mission",
-        "mission" if item is None else f"item {item}",
+        Place("mission", item=item),
         ok=ok,
-        reason=f"{reason}{more} (PX4 {check})",
+        reason=f"{first.text}{more} (PX4 {check})",
+        faults=[first],
         source="PX4",
         method="mission items",
+        check=check,
     )
 
 
@@ -90,7 +95,7 @@ def _positions(mission: Mission) -> list[MissionItem]:
     return [item for item in mission.items if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position]
 
 
-def _validity(mission: Mission) -> Iterator[_Said]:
+def _validity(mission: Mission) -> Iterator[_Remark]:
     for item in mission.items:
         name = command_name(item.command)
         if item.command not in _PX4:
@@ -102,10 +107,14 @@ def _validity(mission: Mission) -> Iterator[_Said]:
                 item.seq,
                 f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
             )
-        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= _MOST_SERVO:
-            yield False, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{_MOST_SERVO}"
-        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= _MOST_PWM:
-            yield False, item.seq, f"actuator value {item.params[1]:g} is out of bounds -{_MOST_PWM:g}..{_MOST_PWM:g}"
+        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MOST_SERVO:
+            yield False, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MOST_SERVO}"
+        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MOST_PWM:
+            yield (
+                False,
+                item.seq,
+                f"actuator value {item.params[1]:g} is out of bounds -{PX4_MOST_PWM:g}..{PX4_MOST_PWM:g}",
+            )
     if mission.items and mission.items[0].command == C.NAV_LAND:
         yield False, mission.items[0].seq, "starts with landing"
 
@@ -117,19 +126,19 @@ def _over_home(mission: Mission, item: MissionItem) -> float:
     return item.alt - mission.home.alt if mission.home is not None else math.nan
 
 
-def _takeoff(mission: Mission) -> Iterator[_Said]:
+def _takeoff(mission: Mission) -> Iterator[_Remark]:
     placed = False
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _over_home(mission, item)
-            if height - 1.0 < ACCEPTANCE:
-                yield False, item.seq, f"takeoff altitude {height:.1f} m too low: at least {ACCEPTANCE + 1.0:.0f} m"
+            if height - 1.0 < PX4_ACCEPTANCE:
+                yield False, item.seq, f"takeoff altitude {height:.1f} m too low: at least {PX4_ACCEPTANCE + 1.0:.0f} m"
             if placed:
                 yield False, item.seq, "takeoff is not the first waypoint item"
         placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
-def _landing(mission: Mission) -> Iterator[_Said]:
+def _landing(mission: Mission) -> Iterator[_Remark]:
     commands = [item.command for item in mission.items]
     starts = [k for k, command in enumerate(commands) if command == C.DO_LAND_START]
     lands = [k for k, command in enumerate(commands) if command in LANDINGS]
@@ -145,7 +154,7 @@ def _landing(mission: Mission) -> Iterator[_Said]:
         yield False, seq[starts[0]], "invalid land start: no landing follows"
 
 
-def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     for before, item in zip(mission.items, mission.items[1:], strict=False):
         if item.command != C.NAV_LAND or before.command not in PLACES | TAKEOFFS or not before.has_position:
             continue
@@ -167,11 +176,11 @@ def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
             yield False, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
         angle = math.atan2(rise, run)
-        if angle > LANDING_ANGLE:
+        if angle > PX4_LANDING_ANGLE:
             yield False, item.seq, f"the landing glide slope {math.degrees(angle):.1f}° is steeper than 5.0°"
 
 
-def _available(mission: Mission) -> Iterator[_Said]:
+def _available(mission: Mission) -> Iterator[_Remark]:
     takeoff = any(item.command in TAKEOFFS for item in mission.items)
     land = any(item.command in LANDINGS for item in mission.items)
     has = [name for name, there in (("takeoff", takeoff), ("landing", land)) if there]
@@ -183,22 +192,22 @@ def _apart(a: MissionItem, b: MissionItem, origin: GeoOrigin) -> float:
     return float(math.hypot(float(np.diff(east)[0]), float(np.diff(north)[0])))
 
 
-def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     places = _positions(mission)
     if mission.home is None or not places:
         yield True, None, "no home, so no distance to the first waypoint"
         return
     home = MissionItem(0, int(C.NAV_WAYPOINT), 0, (0.0,) * 4, mission.home.lat_deg, mission.home.lon_deg, 0.0)
     away = _apart(home, places[0], origin)
-    if not away < FIRST_WAYPOINT:
+    if not away < PX4_FIRST_WAYPOINT:
         yield (
             False,
             places[0].seq,
-            f"first waypoint too far away: {away:.0f} m from home, maximum {FIRST_WAYPOINT:.0f} m",
+            f"first waypoint too far away: {away:.0f} m from home, maximum {PX4_FIRST_WAYPOINT:.0f} m",
         )
 
 
-def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     """A condition gate at the place of the waypoint before or after it."""
     places = [
         item
@@ -207,11 +216,11 @@ def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
     ]
     for before, after in itertools.pairwise(places):
         gates = C.CONDITION_GATE in (before.command, after.command)
-        if gates and _apart(before, after, origin) < GATE_APART:
+        if gates and _apart(before, after, origin) < PX4_GATE_APART:
             yield False, after.seq, "distance between waypoint and gate too close"
 
 
-def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
+def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     yield from _gates(mission, origin)
     places = _positions(mission)
     if len(places) < 2:
@@ -219,12 +228,12 @@ def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Said]:
     east, north = to_map(origin, [item.lat_deg for item in places], [item.lon_deg for item in places])
     runs = np.hypot(np.diff(east), np.diff(north))
     k = int(np.argmax(runs))
-    if runs[k] > BETWEEN_WAYPOINTS:
+    if runs[k] > PX4_BETWEEN_WAYPOINTS:
         reason = f"{runs[k]:.0f} m between waypoints; PX4 releases with MIS_DIST_WPS refuse more than"
-        yield True, places[k + 1].seq, f"{reason} {BETWEEN_WAYPOINTS:.0f} m by default, today's have no limit"
+        yield True, places[k + 1].seq, f"{reason} {PX4_BETWEEN_WAYPOINTS:.0f} m by default, today's have no limit"
 
 
-def _below_home(mission: Mission) -> Iterator[_Said]:
+def _below_home(mission: Mission) -> Iterator[_Remark]:
     for item in _positions(mission):
         if item.frame in OVER_HOME and mission.home is None:
             reason = "the file has no home, and heights over it: PX4 refuses them until the vehicle has one"
@@ -234,12 +243,14 @@ def _below_home(mission: Mission) -> Iterator[_Said]:
             yield True, item.seq, f"waypoint {item.seq} below home: a warning"
 
 
-def _fence(setup: FlightSetup) -> Iterator[_Said]:
+def _fence(setup: FlightSetup) -> Iterator[_Remark]:
     if not setup.mission.fences:
         yield True, None, "the mission has no geofence"
         return
     origin, route = setup.scenario.origin, setup.route
-    for place, item in zip(route.waypoints, route.items, strict=True):
-        problem = fence_problem(setup.mission.fences, origin, float(place[0]), float(place[1]))
+    for point, item in zip(route.waypoints, route.items, strict=True):
+        problem = fence_problem(setup.mission.fences, origin, float(point[0]), float(point[1]))
         if problem is not None:
-            yield False, int(item) if item >= 0 else None, f"geofence violation: {problem}"
+            broken, fence_item = problem
+            why = message(f"geofence violation: {broken}", f" (fence item {fence_item})")
+            yield False, int(item) if item >= 0 else None, why

@@ -7,6 +7,7 @@ import numpy as np
 from flight.simulation.track import COLUMNS, Track
 from logs.figures.elements.failures import route_distance
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import Place
 from world.scenario import Scenario, from_spec
 
 # A right angle and a climb, in round numbers: legs of 1,000, 800 and 600 m.
@@ -43,14 +44,14 @@ def make_track(route: np.ndarray = ROUTE, rate: float = 2.0) -> Track:
     return Track(**values)  # type: ignore[arg-type]  # the track gives each column its type
 
 
-def make_verdict(*bad: tuple[str, str]) -> Verdict:
-    findings = [Finding("slope", "leg 0", 2.0, 2.0, 8.0, "aircraft", 0.1, 6.0, "deg", "fit", True, "")]
+def make_verdict(*bad: tuple[str, Place]) -> Verdict:
+    findings = [Finding("slope", Place("leg", 0), 2.0, 2.0, 8.0, "aircraft", 0.1, 6.0, "deg", "fit", True, "")]
     findings += [
-        Finding(rule, where, 9.0, 9.0, 8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, "") for rule, where in bad
+        Finding(rule, place, 9.0, 9.0, 8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, "") for rule, place in bad
     ]
-    return Verdict(tuple(findings), not bad, True, "flyable" if not bad else "not flyable", "flown")
+    return Verdict(tuple(findings), not bad, True, ("flyable" if not bad else "not flyable",), "flown")
 
 
 ALL = {"plan_waypoints": ROUTE, "route_waypoints": ROUTE}
 NONE_TERRAIN = {"terrain": {"kind": "none"}, "threats": []}
-FAILED = make_verdict(("slope", "leg 1"), ("turn", "waypoint 2 (item 3)"))
+FAILED = make_verdict(("slope", Place("leg", 1)), ("turn", Place("waypoint", 2, 3)))

@@ -12,6 +12,7 @@ import pytest
 from logs.figures.draw_all import draw_map, draw_profile, write_png
 from logs.figures.elements.style import FAIL, png_bytes
 from logs.verdict.findings import Verdict
+from logs.verdict.places import Place
 from tests.logs.figures.figure_data import ALL, FAILED, NONE_TERRAIN, ROUTE, make_scenario, make_track, make_verdict
 
 DRAWERS = [draw_map, draw_profile]
@@ -70,9 +71,9 @@ def test_failing_places_are_marked_and_only_those(draw: Any) -> None:
 
     assert marks(None) == 0
     assert marks(make_verdict()) == 0
-    assert marks(make_verdict(("slope", "leg 1"))) == 1
+    assert marks(make_verdict(("slope", Place("leg", 1)))) == 1
     assert marks(FAILED) == 2
-    assert marks(make_verdict(("turn", "waypoint 99"), ("energy", "flight"))) == 0
+    assert marks(make_verdict(("turn", Place("waypoint", 99)), ("energy", Place("flight")))) == 0
 
 
 def test_settings_of_the_caller_come_back_and_do_not_matter(tmp_path: Path) -> None:

@@ -14,6 +14,8 @@ from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.wording import place_text
 from world.scenario import from_spec
 
 ROUTE = np.array([[-900.0, -400.0, 300.0], [100.0, -400.0, 340.0], [100.0, 400.0, 380.0], [700.0, 400.0, 360.0]])
@@ -83,18 +85,19 @@ def make_track() -> Track:
     return Track(**values)  # type: ignore[arg-type]  # the track gives each column its type
 
 
-def finding(rule: str, where: str, ok: bool | None, margin: float | None, **changes: Any) -> Finding:
-    base = Finding(rule, where, 4.0, 4.25, 7.8, "aircraft", 0.1, margin, "deg", "least squares", ok, f"why {where}")
+def finding(rule: str, place: Place, ok: bool | None, margin: float | None, **changes: Any) -> Finding:
+    reason = f"why {place_text(place)}"
+    base = Finding(rule, place, 4.0, 4.25, 7.8, "aircraft", 0.1, margin, "deg", "least squares", ok, reason)
     return replace(base, **changes)
 
 
 FINDINGS = (
-    finding("turn", "waypoint 1 (item 2)", True, 12.3),
-    finding("slope", "leg 0", True, 3.5),
-    finding("slope", "leg 1", False, -3.45, flown=11.25),
-    finding("bounds", "flight", None, None, planned=None, flown=None, limit=None, reason="no scenario was given"),
+    finding("turn", Place("waypoint", 1, 2), True, 12.3),
+    finding("slope", Place("leg", 0), True, 3.5),
+    finding("slope", Place("leg", 1), False, -3.45, flown=11.25),
+    finding("bounds", FLIGHT, None, None, planned=None, flown=None, limit=None, reason="no scenario was given"),
 )
-VERDICT = Verdict(FINDINGS, False, True, "not flyable: slope on leg 1\nStart: in the air", "flown")
+VERDICT = Verdict(FINDINGS, False, True, ("not flyable: slope on leg 1", "Start: in the air"), "flown")
 ARGUMENTS: dict[str, Any] = {
     "ended": "completed",
     "versions": {"planfly": "0.1.0", "jsbsim": "1.3.3"},

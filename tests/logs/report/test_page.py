@@ -16,6 +16,7 @@ from flight.simulation.track import Track
 from logs.figures.draw_all import FIGURE_FILES
 from logs.report.page import report_html, write_report
 from logs.verdict.findings import Verdict
+from logs.verdict.places import Place
 from tests.logs.report.report_data import ARGUMENTS, EVIL, FINDINGS, PNG, VERDICT, Page, finding, make_setup, make_track
 
 
@@ -94,9 +95,8 @@ def test_verdict_comes_first_then_what_fails() -> None:
 def test_hostile_names_stay_text() -> None:
     setup = make_setup(name=EVIL, description=EVIL)
     setup = replace(setup, mission=replace(setup.mission, source=EVIL, warnings=(EVIL,)), aircraft=EVIL)
-    verdict = Verdict(
-        (finding("slope", EVIL, False, -1.0, reason=EVIL, method=EVIL, unit=EVIL),), False, False, EVIL, EVIL
-    )
+    evil = finding("threat", Place("missile", 0, name=EVIL), False, -1.0, reason=EVIL, method=EVIL, unit=EVIL)
+    verdict = Verdict((evil,), False, False, (EVIL,), EVIL)
     html = report_html(setup, make_track(), verdict, ended=EVIL, versions={EVIL: EVIL}, command=EVIL)
     assert len(re.findall("<script", html)) == 2
     assert len(re.findall("</script", html)) == 2
@@ -109,7 +109,7 @@ def test_hostile_names_stay_text() -> None:
 @pytest.mark.usefixtures("undrawn")
 def test_a_plan_that_was_not_flown_has_a_report() -> None:
     setup = make_setup(terrain={"kind": "none"}, threats=[])
-    verdict = Verdict(FINDINGS, False, False, "no feasible plan: slope", "plan")
+    verdict = Verdict(FINDINGS, False, False, ("no feasible plan: slope",), "plan")
     for track in (None, make_track().rows(0, 0)):
         html = report_html(setup, track, verdict, ended=None, versions={}, command="planfly run small")
         text = Page(html).text()

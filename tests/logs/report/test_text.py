@@ -8,6 +8,8 @@ from hypothesis import strategies as st
 
 from logs.report.text import badge_of, finding_rows, number, quantity, rule_rows
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.wording import place_text
 from tests.logs.report.report_data import FINDINGS, finding
 
 
@@ -18,14 +20,14 @@ from tests.logs.report.report_data import FINDINGS, finding
         (True, True, "geometric", FINDINGS[:2], "Flyable on paper, not flown"),
         (False, True, "flown", FINDINGS, "Not flyable"),
         (False, False, "flown", FINDINGS, "Not flyable, and incomplete"),
-        (False, False, "flown", (finding("completion", "flight", False, None),), "Incomplete, so not flyable"),
+        (False, False, "flown", (finding("completion", FLIGHT, False, None),), "Incomplete, so not flyable"),
         (False, False, "plan", FINDINGS, "Not flyable: no feasible plan"),
     ],
 )
 def test_badge_states_the_verdict(
     flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], label: str
 ) -> None:
-    badge = badge_of(Verdict(findings, flyable, complete, "", level))
+    badge = badge_of(Verdict(findings, flyable, complete, (), level))
     assert badge.word == label
     assert badge.state == ("pass" if flyable else "fail")
 
@@ -47,20 +49,20 @@ def test_numbers_are_shown_with_their_units() -> None:
     assert number(-0.001, digits=1) == "0.0"
     assert quantity(math.pi / 6, "rad") == "30.0°"
     assert quantity(4.0, "m/s") == "4.00\u00a0m/s"
-    (row,) = finding_rows([finding("turn", "waypoint 1", True, 0.1, unit="rad", planned=0.5, tolerance=0.01)])
+    (row,) = finding_rows([finding("turn", Place("waypoint", 1), True, 0.1, unit="rad", planned=0.5, tolerance=0.01)])
     assert (row.planned, row.margin, row.unit) == ("28.6", "+5.73", "°")
     assert row.method == "least squares (±\u00a00.57°)"
 
 
 @given(st.lists(st.tuples(st.sampled_from([True, False, None]), st.floats(-10, 10)), min_size=1, max_size=12))
 def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) -> None:
-    findings = [finding("slope", f"leg {k}", ok, margin) for k, (ok, margin) in enumerate(kinds)]
+    findings = [finding("slope", Place("leg", k), ok, margin) for k, (ok, margin) in enumerate(kinds)]
     (row,) = rule_rows(findings)
     judged = [item for item in findings if item.ok is not None]
     failed = [item for item in judged if item.ok is False]
     assert row.state == ("fail" if failed else "pass" if judged else "unjudged")
     if judged:
         worst = min(item.margin or 0.0 for item in (failed or judged))
-        assert findings[int(row.where.removeprefix("leg "))].margin == worst
+        assert row.where in [place_text(item.place) for item in findings if item.margin == worst]
     states = [item.state for item in finding_rows(findings)]
     assert states == sorted(states, key=["fail", "pass", "unjudged"].index)

@@ -1,4 +1,4 @@
-"""What the verdict tests share: a route, judging it, and finding one finding."""
+"""What the verdict tests share: a route, judging it, places, and finding one finding."""
 
 import math
 from typing import Any
@@ -9,6 +9,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict, verdict_json
 from logs.verdict.judge_flight import judge_flight
+from logs.verdict.places import Change, Place
 from planner.plan import Certificate, Plan
 
 ROUTE = [[0, 0, 300], [0, 2000, 300], [1500, 3500, 380], [1500, 6000, 300], [3500, 6500, 300]]
@@ -20,14 +21,47 @@ def judge(setup: FlightSetup, track: Track, **how: Any) -> Verdict:
     return verdict
 
 
-def of(verdict: Verdict, rule: str, where: str = "") -> Finding:
-    found = [item for item in verdict.findings if item.rule == rule and item.where.startswith(where)]
-    assert found, f"no finding {rule} {where}"
+def leg(number: int) -> Place:
+    return Place("leg", number)
+
+
+def waypoint(number: int) -> Place:
+    return Place("waypoint", number)
+
+
+def missile(name: str) -> Place:
+    return Place("missile", name=name)
+
+
+def radar(name: str) -> Place:
+    return Place("radar", name=name)
+
+
+def bare(place: Place) -> Place:
+    """A place without its mission item, a threat by its name alone."""
+    return Place(place.kind, None if place.name else place.index, name=place.name)
+
+
+def of(verdict: Verdict, rule: str, place: Place | None = None) -> Finding:
+    found = [item for item in verdict.findings if item.rule == rule and place in (None, bare(item.place))]
+    assert found, f"no finding {rule} {place}"
     return found[0]
 
 
-def failing(verdict: Verdict) -> set[tuple[str, str]]:
-    return {(item.rule, item.where.split(" (")[0]) for item in verdict.findings if item.ok is False}
+def failing(verdict: Verdict) -> set[tuple[str, Place]]:
+    return {(item.rule, bare(item.place)) for item in verdict.findings if item.ok is False}
+
+
+def suggested(item: Finding, what: str, place: Place | None = None) -> Change:
+    """The first change of this quantity that a finding suggests."""
+    found = [
+        change
+        for suggestion in item.suggestions
+        for change in suggestion
+        if change.what == what and place in (None, bare(change.place))
+    ]
+    assert found, f"no {what} in {item.suggestions}"
+    return found[0]
 
 
 def bad_plan(setup: FlightSetup) -> Plan:

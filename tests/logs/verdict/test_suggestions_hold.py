@@ -2,7 +2,6 @@
 
 import math
 import os
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,7 +12,8 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from tests.logs.verdict.judging import of
+from logs.verdict.places import Suggestion
+from tests.logs.verdict.judging import bare, of
 from tests.missions import KINDS, MadeMission, infeasible
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
@@ -23,36 +23,27 @@ FLOWN = range(100) if SOAK else range(len(KINDS))
 Floats = NDArray[np.float64]
 
 
-def taken(setup: FlightSetup, item: Finding, change: str) -> FlightSetup:
-    """The setup with one suggested change of the plan."""
+def taken(setup: FlightSetup, suggestion: Suggestion) -> FlightSetup:
+    """The setup with one suggestion taken: all of its changes of the plan."""
     points, speeds = setup.route.waypoints.copy(), setup.route.airspeed.copy()
-    at = int(item.where.split()[1])
-    done = False
-    for rise, leg in re.findall(r"(?:climb|fall) (\d+) m on leg (\d+)", change):
-        k = int(leg)
-        now = points[k + 1, 2] - points[k, 2]
-        points[k + 1 :, 2] += math.copysign(float(rise), now) - now
-        done = True
-    for leg, length in re.findall(r"leg (\d+) (\d+) m long", change):
-        k = int(leg)
-        step = points[k + 1, :2] - points[k, :2]
-        run = math.hypot(*step)
-        points[k + 1 :, :2] += step / run * (float(length) - run)
-        done = True
-    if found := re.search(r"fly it at ([\d.]+) m/s", change):
-        speeds[at if item.rule == "slope" else slice(at - 1, at + 1)] = float(found[1])
-        done = True
-    if found := re.search(r"turn at most ([\d.]+)°", change):
-        points = turned(points, at, math.radians(float(found[1])))
-        done = True
-    if found := re.search(r"fly leg \d+ (\d+) m higher", change):
-        points[:, 2] += float(found[1])
-        done = True
-    if found := re.search(r"command ([\d.]+) to ([\d.]+) m/s on leg (\d+)", change):
-        low, high = float(found[1]), float(found[2])
-        speeds[int(found[3])] = low if speeds[int(found[3])] < low else high
-        done = True
-    assert done, change
+    for change in suggestion:
+        k = change.place.index
+        assert k is not None, change
+        if change.what == "rise":
+            points[k + 1 :, 2] += change.wanted - (points[k + 1, 2] - points[k, 2])
+        elif change.what == "length":
+            step = points[k + 1, :2] - points[k, :2]
+            run = math.hypot(*step)
+            points[k + 1 :, :2] += step / run * (change.wanted - run)
+        elif change.what == "airspeed" and change.most is not None:
+            speeds[k] = change.wanted if speeds[k] < change.wanted else change.most
+        elif change.what == "airspeed":
+            speeds[k if change.place.kind == "leg" else slice(k - 1, k + 1)] = change.wanted
+        elif change.what == "turn":
+            points = turned(points, k, math.radians(change.wanted))
+        else:
+            assert change.what == "height", change
+            points[:, 2] += change.wanted
     return replace(setup, route=replace(setup.route, waypoints=points, airspeed=speeds))
 
 
@@ -76,11 +67,11 @@ def failed(made: MadeMission, verdict: Verdict) -> list[Finding]:
 def test_each_way_passes_the_geometry(number: int) -> None:
     made = infeasible(number, 0.2)
     wrong = failed(made, judge_geometry(made.setup))
-    assert any(item.suggestion for item in wrong)
+    assert any(item.suggestions for item in wrong)
     for item in wrong:
-        for change in filter(None, item.suggestion.split(", or ")):
-            again = judge_geometry(taken(made.setup, item, change))
-            assert of(again, item.rule, item.where).ok is True, (item.where, change, of(again, item.rule, item.where))
+        for suggestion in item.suggestions:
+            again = of(judge_geometry(taken(made.setup, suggestion)), item.rule, bare(item.place))
+            assert again.ok is True, (item.place, suggestion, again)
 
 
 @pytest.mark.parametrize("number", FLOWN)
@@ -92,7 +83,7 @@ def test_taken_until_none_is_left_the_mission_flies(number: int) -> None:
         wrong = failed(made, judge_geometry(setup))
         if not wrong:
             break
-        setup = taken(setup, wrong[0], wrong[0].suggestion.split(", or ")[0])
+        setup = taken(setup, wrong[0].suggestions[0])
     flown = simulate(setup, made.airframe.aircraft)
     still = failed(made, judge_flight(setup, flown.track, flown.ended))
     assert not still, [item.reason for item in still]

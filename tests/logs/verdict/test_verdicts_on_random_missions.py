@@ -10,6 +10,7 @@ import pytest
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from tests.logs.verdict.judging import bare
 from tests.missions import KINDS, MadeMission, feasible, infeasible
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
@@ -35,7 +36,7 @@ def test_beyond_one_limit_is_not_flyable_and_the_rule_is_named(number: int, marg
     for level, verdict in levels(made).items():
         named = [item for item in verdict.findings if item.ok is False and item.rule == made.rule]
         assert not verdict.flyable, (made.kind, level)
-        assert {item.where.split(" (")[0] for item in named} & set(made.where), (made.kind, level, verdict.summary)
+        assert {bare(item.place) for item in named} & set(made.places), (made.kind, level, verdict.summary)
 
 
 @pytest.mark.parametrize("margin", MARGINS)

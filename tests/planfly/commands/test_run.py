@@ -51,7 +51,8 @@ def test_the_verdict_file_has_findings_of_every_rule(demo: Path) -> None:
     assert verdict["complete"] is True
     assert {finding["rule"] for finding in verdict["findings"]} == set(RULES) - {"mission", "loiter"}
     numbers = ["planned", "flown", "limit", "tolerance", "margin", "unit"]
-    keys = ["rule", "where", *numbers, "limit_source", "method", "ok", "reason", "suggestion"]
+    words, data = ["where", "reason", "brief", "suggestion"], ["place", "placed", "suggestions", "check"]
+    keys = ["rule", *numbers, "limit_source", "method", "ok", *words, *data]
     assert all(sorted(finding) == sorted(keys) for finding in verdict["findings"])
     assert all(finding["ok"] is True for finding in verdict["findings"])
 

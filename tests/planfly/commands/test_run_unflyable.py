@@ -1,7 +1,6 @@
 """`steep` and `tight`: the flight fails where the plan asks too much, and only there."""
 
 import dataclasses
-import re
 
 import pytest
 
@@ -26,10 +25,9 @@ def failing_legs(verdict: Verdict, legs: int) -> set[int]:
     """Legs that a failed finding names, and those beside the waypoints that one names."""
     out: set[int] = set()
     for finding in verdict.findings:
-        named = re.match(r"(leg|waypoint) (\d+)", finding.where)
-        if finding.ok is False and named:
-            number = int(named[2])
-            out |= {number} if named[1] == "leg" else {number - 1, number}
+        kind, number = finding.place.kind, finding.place.index
+        if finding.ok is False and number is not None:
+            out |= {number} if kind == "leg" else {number - 1, number} if kind == "waypoint" else set()
     return {leg for leg in out if 0 <= leg < legs}
 
 

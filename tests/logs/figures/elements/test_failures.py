@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from flight.simulation.track import COLUMNS, Track
 from logs.figures.elements.failures import failures, paths_differ, route_distance, track_distance
+from logs.verdict.places import Place
 from tests.logs.figures.figure_data import ROUTE, make_track, make_verdict
 
 
@@ -40,7 +41,8 @@ def test_paths_that_lie_on_each_other_do_not_differ() -> None:
 
 
 def test_failures_are_found_at_their_legs_and_waypoints() -> None:
-    found = failures(make_verdict(("slope", "leg 1"), ("clearance", "leg 1"), ("turn", "waypoint 3 (item 7)")), 4)
+    bad = ("slope", Place("leg", 1)), ("clearance", Place("leg", 1)), ("turn", Place("waypoint", 3, 7))
+    found = failures(make_verdict(*bad), 4)
     assert found.legs == {1: ("slope", "clearance")}
     assert found.waypoints == {3: ("turn",)}
-    assert not failures(make_verdict(("slope", "leg 3"), ("turn", "waypoint 4")), 4)
+    assert not failures(make_verdict(("slope", Place("leg", 3)), ("turn", Place("waypoint", 4))), 4)

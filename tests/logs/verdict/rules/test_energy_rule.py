@@ -15,9 +15,10 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.places import FLIGHT
 from logs.verdict.rules.energy_rule import air_angle, predicted_energy
-from tests.logs.verdict.judging import of
-from tests.synthetic import make_scenario, make_setup
+from tests.logs.verdict.judging import failing, judge, of
+from tests.synthetic import fly_path, make_scenario, make_setup
 from world.scenario import Scenario
 
 AEROSONDE = load_aircraft("aerosonde")
@@ -58,8 +59,15 @@ def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:
         item = of(judge_geometry(replace(real_setup(), battery=battery)), "energy")
         assert item.ok is ok
         assert item.limit == pytest.approx(0.8 * battery)
-        assert ("times as large" in item.suggestion) is not ok
+        assert ("battery" in [change.what for one in item.suggestions for change in one]) is not ok
         assert "peak current" in item.reason
+
+
+def test_a_battery_with_less_than_its_reserve_left_fails(setup: FlightSetup) -> None:
+    small = replace(setup, battery=30.0)
+    verdict = judge(small, fly_path(small))
+    assert failing(verdict) == {("energy", FLIGHT)}
+    assert of(verdict, "energy").limit == pytest.approx(24.0)
 
 
 def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() -> None:
@@ -67,8 +75,8 @@ def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() 
     scenario = make_scenario(ROUTE, wind={"speed_mps": 8.0, "from_deg": 20.0})
     against, _ = predicted_energy(route_demands(real_setup(scenario=scenario)))
     assert against > 1.2 * calm
-    shape = route_demands(real_setup())
-    assert air_angle(shape, 1, 25.0, 650.0) == pytest.approx(float(shape.slopes[1]), abs=1e-3)
+    demands = route_demands(real_setup())
+    assert air_angle(demands, 1, 25.0, 650.0) == pytest.approx(float(demands.slopes[1]), abs=1e-3)
 
 
 def test_what_is_not_known_is_not_judged() -> None:

@@ -4,6 +4,7 @@ import pytest
 
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.places import Place
 from tests.mission_lines import setup_of, wp
 
 GOOD = (wp(0, 500, command=22), wp(0, 1500), wp(1500, 1500))
@@ -13,7 +14,7 @@ HOME_FAR = "36.5 -84.0 300"
 def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
     """The finding of one check."""
     verdict = judge_geometry(setup_of(*lines, home=home))
-    found = [item for item in verdict.findings if item.rule == "mission" and item.reason.endswith(f"(PX4 {check})")]
+    found = [item for item in verdict.findings if item.rule == "mission" and item.check == check]
     assert len(found) == 1, verdict.findings
     assert not (verdict.flyable and found[0].ok is False)
     return found[0]
@@ -83,7 +84,7 @@ def test_px4_refuses(case: str) -> None:
     check, lines, item, words = REFUSED[case]
     finding = of(check, *lines)
     assert finding.ok is False
-    assert finding.where == f"item {item}"
+    assert finding.place == Place("mission", item=item)
     assert words in finding.reason
 
 
@@ -138,6 +139,6 @@ def test_geofence() -> None:
         (fence(5002, 3, (-100, 1400), (100, 1400), (0, 1700)), "inside an exclusion polygon"),
     ):
         fenced = replace(setup, mission=replace(setup.mission, fences=fences))
-        (finding,) = [item for item in judge_geometry(fenced).findings if "(PX4 checkGeofence)" in item.reason]
+        (finding,) = [item for item in judge_geometry(fenced).findings if item.check == "checkGeofence"]
         assert finding.ok == (words is None)
         assert words is None or words in finding.reason

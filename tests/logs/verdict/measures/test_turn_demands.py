@@ -1,4 +1,4 @@
-"""A leg between a left and a right turn holds the roll from one bank into the other, for planner and check alike."""
+"""A leg between a left and a right turn holds the roll from one bank into the other, for planner and verdict alike."""
 
 import math
 
@@ -10,8 +10,12 @@ from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_demands import route_demands
 from planner.evaluation.certify_kernels import turn_and_roll_lengths
 from planner.evaluation.problem import make_problem
-from tests.logs.verdict.judging import of
-from tests.synthetic import bank_radius, make_scenario, make_setup
+from tests.logs.verdict.judging import of, waypoint
+from tests.synthetic import (
+    bank_radius,
+    make_scenario,
+    make_setup,
+)
 
 
 def zigzag(turn_deg: float, run: float, *, same_way: bool, course_deg: float = 20.0) -> np.ndarray:
@@ -37,10 +41,10 @@ def test_planner_and_check_need_the_same(turn: float, wind: float, same_way: boo
         points = zigzag(turn, 900.0, same_way=same_way)
         scenario = make_scenario(points, wind={"speed_mps": wind, "from_deg": from_deg})
         setup = make_setup(points, scenario=scenario)
-        shape = route_demands(setup)
+        demands = route_demands(setup)
         needs, rolls = turn_and_roll_lengths(make_problem(scenario, setup.limits).certified, points)
-        np.testing.assert_allclose(needs, shape.after[:-1] + shape.before[1:], atol=1e-6)
-        np.testing.assert_allclose(rolls, shape.reversal, atol=1e-6)
+        np.testing.assert_allclose(needs, demands.after[:-1] + demands.before[1:], atol=1e-6)
+        np.testing.assert_allclose(rolls, demands.reversal, atol=1e-6)
         assert (rolls.max() == 0.0) or not same_way
 
 
@@ -49,5 +53,5 @@ def test_a_leg_a_little_short_of_the_roll_fails_and_one_longer_passes() -> None:
     roll = 25.0 * ROLL_TIME * math.radians(30.0)
     for spare, ok in ((-1.0, False), (1.0, True)):
         setup = make_setup(zigzag(60.0, arcs + roll + spare, same_way=False))
-        assert of(judge_geometry(setup), "turn", "waypoint 1").ok is ok
+        assert of(judge_geometry(setup), "turn", waypoint(1)).ok is ok
     assert judge_geometry(make_setup(zigzag(60.0, arcs + 1.0, same_way=True))).flyable

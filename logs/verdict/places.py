@@ -1,0 +1,76 @@
+"""Where a finding lies, what of a plan could be changed, and where two levels differ, as data.
+
+`logs.verdict.wording` makes words of it.
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+# "flight", "mission" and "plan" are the whole of it; "missile" and "radar" are a threat's two spheres.
+Kind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar"]
+
+# What a change is of.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", a "turn" at
+# most.  By a step: "height" of a leg, "inset" of the path from the area's edges, "distance" from a missile,
+# "duration" of the flight.  By a factor: the "battery" or the "tank".
+Quantity = Literal[
+    "length", "rise", "airspeed", "turn", "height", "inset", "distance", "duration", "battery", "tank"
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where something was judged.
+
+    kind: what it is.
+    index: of the leg, waypoint or threat, from 0 as the route and the scenario have them; None for the whole.
+    item: number of the mission item that a waypoint comes from, or that a check names; None where there is none.
+    name: of the threat, "" for every other kind.
+
+    >>> Place("waypoint", 3, item=4)
+    Place(kind='waypoint', index=3, item=4, name='')
+    """
+
+    kind: Kind
+    index: int | None = None
+    item: int | None = None
+    name: str = ""
+
+
+FLIGHT, MISSION, PLAN = Place("flight"), Place("mission"), Place("plan")
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One change of a plan: of what, where, from which value, to which.
+
+    what: the quantity.
+    place: where it is to change.
+    current: its value now; None where `wanted` is a step or a factor, or the value now does not matter.
+    wanted: the value that passes, the step (higher, further, shorter, positive), or the factor.
+    unit: of both.
+    most: where a range passes, its upper end; `wanted` is then the lower one.
+
+    >>> Change("length", Place("leg", 1), 300.0, 400.0, "m").wanted
+    400.0
+    """
+
+    what: Quantity
+    place: Place
+    current: float | None
+    wanted: float
+    unit: str
+    most: float | None = None
+
+
+# Changes to make together; a finding holds alternatives of these, any of which would pass.
+Suggestion = tuple[Change, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """A rule at a place that the geometric and the flown level judge differently; True: passes."""
+
+    rule: str
+    place: Place
+    geometric: bool
+    flown: bool

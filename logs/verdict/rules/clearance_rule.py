@@ -1,0 +1,111 @@
+"""The clearance rule: the least height above ground on each leg, planned and flown."""
+
+import math
+
+import numpy as np
+
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.measures.path_sweeps import path_clearance
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.tolerances import HEIGHT_ROUNDING
+
+
+def clearance_findings(
+    demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
+    """Judge the least height above ground on each leg."""
+    ground = demands.setup.scenario.terrain
+    limit = demands.limits.min_clearance
+    if ground is None:
+        reason = "no terrain was given, so heights above ground are not known"
+        return [make_finding("clearance", FLIGHT, ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
+    legs = demands.path.legs
+    low, _ = path_clearance(ground.heights, ground.to_pixel.record, demands.path.points)
+    planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(demands.legs)]
+    out = []
+    for leg in range(demands.legs):
+        if geometric:
+            out.append(_planned_clearance(leg, planned[leg], limit, ground.vertical_error))
+        else:
+            out.append(_flown_clearance(demands, aligned, leg, planned[leg], limit))
+    return out
+
+
+def _less_error(clearance: float, limit: float, error: float | None) -> str:
+    """A clearance (m) less the terrain's stated error, in words; "" where none is stated."""
+    if error is None or math.isnan(clearance):
+        return ""
+    short = f", less than the {limit:.0f} m required" if limit - HEIGHT_ROUNDING > clearance - error else ""
+    return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
+
+
+def _planned_clearance(leg: int, planned: float, limit: float, error: float | None) -> Finding:
+    reason = f"{planned:.1f} m above ground at the lowest"
+    if math.isnan(planned):
+        reason = "the leg leaves the known terrain"
+    return make_finding(
+        "clearance",
+        Place("leg", leg),
+        ok=None if math.isnan(planned) else planned >= limit - HEIGHT_ROUNDING,
+        reason=reason
+        + ("" if math.isnan(planned) or planned >= limit - HEIGHT_ROUNDING else f"; {limit:.0f} m are required")
+        + _less_error(planned, limit, error),
+        planned=planned,
+        limit=limit,
+        source="scenario",
+        tolerance=HEIGHT_ROUNDING,
+        margin=planned - limit,
+        unit="m",
+        method="exact along the fly-by path",
+    )
+
+
+def _flown_clearance(
+    demands: RouteDemands, aligned: AlignedTrack | None, leg: int, planned: float, limit: float
+) -> Finding:
+    least, ok, reason = math.nan, None, "the leg was not flown"
+    if aligned is not None and aligned.flew(leg):
+        # The first leg has what came before it, the last what came after.
+        first = 0 if leg == 0 else int(aligned.rows[leg])
+        last = len(aligned.track) - 1 if leg + 1 == demands.legs else int(aligned.rows[leg + 1])
+        span = aligned.low[first:last]
+        known = np.isfinite(span)
+        if known.any():
+            k = first + int(np.nanargmin(span))
+            least = float(aligned.low[k])
+            reason = f"{least:.1f} m above ground {_moment(aligned, k, float(aligned.low_at[k]))}"
+            ok = least >= limit - HEIGHT_ROUNDING
+        if not known.all():
+            k = first + int(np.argmin(known))
+            reason = ("" if math.isnan(least) else reason + "; ") + f"off the known terrain {_moment(aligned, k, 0.0)}"
+            ok = None if ok is not False else False
+        if ok is False:
+            reason += f"; {limit:.0f} m are required"
+        ground = demands.setup.scenario.terrain
+        reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
+    if planned < limit - HEIGHT_ROUNDING:
+        reason += f"; the planned path comes down to {planned:.1f} m"
+    return make_finding(
+        "clearance",
+        Place("leg", leg),
+        ok=ok,
+        reason=reason,
+        planned=planned,
+        flown=least,
+        limit=limit,
+        source="scenario",
+        tolerance=HEIGHT_ROUNDING,
+        margin=least - limit,
+        unit="m",
+        method="exact along the flown track",
+    )
+
+
+def _moment(aligned: AlignedTrack, k: int, fraction: float) -> str:
+    """When and where the aircraft was at this fraction of a segment, in words."""
+    time, position = aligned.track.time, aligned.track.position
+    when = time[k] + fraction * (time[k + 1] - time[k])
+    where = position[k] + fraction * (position[k + 1] - position[k])
+    return f"at {when:.1f} s, east {where[0]:.0f} m, north {where[1]:.0f} m"

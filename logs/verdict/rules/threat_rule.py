@@ -1,0 +1,129 @@
+"""The threat rule: time and exposure inside each missile's and radar's sphere, planned and flown."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from logs.verdict.findings import Finding, make_finding
+from logs.verdict.measures.path_sweeps import SphereVisits, path_spheres
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT, Place
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+Side = Literal["missile", "radar"]
+
+_METHOD = "time inside, exact on each segment"
+
+
+def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge each missile and radar sphere that plan or flight touches, or say that there is none."""
+    scenario = demands.setup.scenario
+    if scenario.external:
+        reason = "the mission came without a scenario, so threats are not known"
+        return [make_finding("threat", FLIGHT, ok=None, reason=reason, unit="s")]
+    threats = scenario.threats
+    touched: list[Finding] = []
+    nearest = math.inf
+    for side in ("missile", "radar"):
+        radii, scales = _spheres(threats, side)
+        plan = path_spheres(demands.path.points, demands.path.times, threats.position, radii, scales)
+        track = None
+        if aligned is not None:
+            track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
+        for m, name in enumerate(threats.names):
+            if radii[m] <= 0.0:
+                continue
+            if side == "missile":
+                judged = plan if geometric or track is None else track
+                nearest = min(nearest, float(judged.closest[m] - radii[m]))
+            if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
+                visit = None if geometric else _visit(track, m)
+                touched.append(_touched(Place(side, m, name=name), _visit(plan, m), visit, float(radii[m])))
+    if not any(item.place.kind == "missile" for item in touched):
+        touched.insert(0, _untouched(len(threats), nearest, aligned is not None or geometric))
+    return touched
+
+
+def _spheres(threats: Threats, side: Side) -> tuple[Floats, Floats]:
+    """Radii and scales of every threat's missile or radar, (m,) m each."""
+    if side == "missile":
+        return threats.kill_radius, threats.kill_scale
+    return threats.detection_radius, threats.detection_scale
+
+
+@dataclass(frozen=True, slots=True)
+class _Visit:
+    """How one sphere is met: s inside, exposure in s, m from its centre at the least and when; NaN where not flown."""
+
+    inside: float = math.nan
+    exposure: float = math.nan
+    closest: float = math.nan
+    closest_time: float = math.nan
+
+
+def _visit(visits: SphereVisits | None, m: int) -> _Visit:
+    if visits is None:
+        return _Visit()
+    columns = (visits.inside, visits.exposure, visits.closest, visits.closest_time)
+    return _Visit(*(float(column[m]) for column in columns))
+
+
+def _untouched(count: int, nearest: float, judged: bool) -> Finding:
+    reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
+    if math.isfinite(nearest):
+        reason += f"; the nearest stays {nearest:.0f} m away"
+    return make_finding(
+        "threat",
+        FLIGHT,
+        ok=True if judged else None,
+        reason=reason if judged else "nothing was flown",
+        planned=0.0,
+        flown=0.0 if judged else None,
+        limit=0.0,
+        source="scenario",
+        tolerance=0.0,
+        margin=0.0,
+        unit="s",
+        method=_METHOD,
+    )
+
+
+def _touched(place: Place, plan: _Visit, track: _Visit | None, radius: float) -> Finding:
+    judged = plan if track is None else track
+    missing = math.isnan(judged.closest)
+    facts = f"planned {plan.inside:.1f} s inside {radius:.0f} m, exposure {plan.exposure:.3g} s"
+    if track is not None and not missing:
+        facts += f"; flown {track.inside:.1f} s, exposure {track.exposure:.3g} s, nearest {track.closest:.0f} m"
+        facts += f" at {track.closest_time:.1f} s"
+    flown = None if track is None else track.inside
+    if place.kind == "radar":
+        return make_finding(
+            "threat",
+            place,
+            ok=True,
+            reason=f"reported; detection has no limit: {facts}",
+            planned=plan.inside,
+            flown=flown,
+            unit="s",
+            method=_METHOD,
+        )
+    ok = None if missing else judged.closest > radius
+    return make_finding(
+        "threat",
+        place,
+        ok=ok,
+        reason=facts if ok is not False else f"inside the missile's reach: {facts}",
+        planned=plan.inside,
+        flown=flown,
+        limit=0.0,
+        source="scenario",
+        tolerance=0.0,
+        margin=-judged.inside,
+        unit="s",
+        method=_METHOD,
+    )

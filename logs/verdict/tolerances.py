@@ -1,0 +1,167 @@
+"""Every tolerance and threshold of the verdict: its unit, its reason, its source.
+
+Where no source is named the figure is chosen: our own judgement of what matters to a flight.  Limits of scenario and
+aircraft are not here: they come with the flight.
+"""
+
+import math
+
+# What a plan's numbers are known to
+
+# rad.  A planned angle: 1e-7 degrees of latitude (1 cm) on a 130 m leg, and rounding.
+PLAN_TOLERANCE = math.radians(0.01)
+# m.  A mission file's 1e-7 degrees move a waypoint by up to 1 cm in each direction.
+ROUNDING = 0.02
+# m.  The same on steep ground is this much height.
+HEIGHT_ROUNDING = 0.1
+# m.  A loiter's radius: 1e-7 degrees at the circle's middle.
+RADIUS_TOLERANCE = 0.02
+# m.  A leg shorter than this is a climb on the spot, with no course of its own.
+ON_THE_SPOT = 0.5
+# rad.  A turn sharper than this has no useful tangent length; a U-turn's is infinite.
+U_TURN = math.pi - 1e-6
+# Radii.  Most by which a fly-by is taken to pass its waypoint, which is a turn of about 176 degrees.
+LARGEST_CUT = 30.0
+
+# The turn rule
+
+# rad.  Bank beyond the limit, as a mean over a second: the roll of a gust is not the turn's.
+BANK_TOLERANCE = math.radians(5.0)
+# m.  How far outside its arc a turn may be flown.
+OVERSHOOT = 5.0
+# m.  Mean distance from the next leg in its last second.
+SETTLED = 1.0
+# m, by turbulence.  What gusts may add to that distance.
+GUST_OFFSET = {"none": 0.0, "light": 0.5, "moderate": 1.0}
+# Share, and m by turbulence.  How much closer than the arc at the bank limit a turn may pass its waypoint, which is as
+# far as an aircraft with good guidance may be from its path.
+CLOSER_SHARE = 0.01
+CLOSER = {"none": 0.6, "light": 0.8, "moderate": 1.0}
+# Standard deviations.  How far navigation may be off.
+NAVIGATION_SIGMAS = 3.0
+# s.  How long after its arc a turn is watched at most.
+WATCHED = 10.0
+
+# The slope rule
+
+# rad.  A fitted slope may differ from the plan's by this, beside the fit's own tolerance.
+OFF_SLOPE = math.radians(0.5)
+# m.  Height from the leg's line, away from the blends at its ends; more where no part of the leg is.
+OFF_HEIGHT, OFF_HEIGHT_SHORT = 10.0, 15.0
+# rad.  A leg within this of level is level.
+LEVEL = math.radians(0.5)
+# m/s.  Mean airspeed while the throttle is at a limit, or lost on an arc; a gust's standard deviation more in
+# turbulence.
+OFF_SPEED = 1.0
+# Share of the wind at 6 m.  Standard deviation of the gust along the track: MIL-F-8785C has 0.1 high up to 0.2 at the
+# ground.
+GUST_SHARE = 0.15
+# rad.  The ability that an aircraft showed may fall short of what a leg asks by this and `SURE` standard errors.
+SHOWN_TOLERANCE = math.radians(0.1)
+# Standard errors.  How far a measured ability may be out.
+SURE = 3.0
+
+# Slopes as measured
+
+# s.  Throttle at a limit for this long in one leg, with the mean airspeed of as long off, is not flyable: a moment's
+# saturation is normal.
+SATURATED = 5.0
+# s.  Rising air takes speed up with it on a held slope, by g w/V, until drag has eaten it up: about this long.
+SPEED_MEMORY = 12.0
+# Share of a window that counts as "at the limit throughout".
+THROUGHOUT = 0.8
+# Throttle 0..1, and battery current in A, that count as at a limit.
+FULL, IDLE, NO_CURRENT = 0.99, 0.01, 0.02
+# Throttle 0..1.  An aircraft's ability is seen at its whole throttle alone: 1 % of the Aerosonde's is 0.6 degrees of
+# climb.
+WHOLE_THROTTLE = 0.999
+# s.  Least time over which an ability is measured; how long after the throttle came to its limit; after how long
+# numbers are independent.
+SHOWN_OVER, SETTLED_AFTER, INDEPENDENT = 1.5, 0.5, 0.5
+# m/s of climb.  What speed and acceleration are known to.
+KNOWN_TO = 0.02
+# Condition number beyond which the moments of a plane do not determine it.
+SINGULAR = 1e7
+# rad.  A measured ability with a larger standard error says nothing.
+UNSURE = math.radians(0.3)
+# m/s^2.  What the aircraft is given to take up another commanded speed.
+ACCELERATION = 0.5
+
+# Courses and slopes by least squares
+
+# m.  Ends of a leg that are left out of a fit, beyond the turns' tangents.
+CLEAR_OF_TURN = 100.0
+# m.  The same beyond the blend of slopes, and at a route's first waypoint.
+CLEAR_OF_BLEND = 20.0
+# m.  Shortest piece of a leg that a course, a slope is fitted to.
+SHORTEST_COURSE, SHORTEST_SLOPE = 60.0, 100.0
+# s.  Shortest time that a slope is measured over: shorter ones over-read by degrees.
+SHORTEST_TIME = 4.0
+# rad.  What a fit in calm air cannot resolve, of a course and a slope, and the most that unsteadiness adds.
+COURSE_FLOOR, SLOPE_FLOOR, MOST_UNSTEADY = math.radians(0.02), math.radians(0.1), math.radians(0.5)
+# rad.  Uncertainty of a course, a slope that was not fitted.
+ROUGH_COURSE, ROUGH_SLOPE = math.radians(0.75), math.radians(0.5)
+
+# The rules about waypoints, speed, departure and completion
+
+# m.  A waypoint is passed within this of where the fly-by path passes it, and within this height of that path, beside
+# what the blend of slopes takes.
+PASS, PASS_HEIGHT = 10.0, 15.0
+# m/s.  Mean airspeed of a leg off its command.
+OFF_MEAN = 1.0
+# m.  Taking up another slope may put the aircraft this far ahead or behind: a short leg is mostly that.
+TAKE_UP = 10.0
+# s.  How long a gust lasts.
+GUST_TIME = 10.0
+# rad.  Bank beyond this is a departure.  The simulation's own threshold (flight/simulation/tick.py).
+MOST_BANK = math.radians(75.0)
+# m/s.  Airspeed below this is a departure of the Aerosonde, and this share of its slowest level speed, which for the
+# Aerosonde is the same, of every other aircraft.
+SLOWEST, SLOWEST_SHARE = 15.0, 0.94
+# m.  A leg counts as flown if the track keeps within this of its line, clear of the turns.
+CORRIDOR = 20.0
+# s.  A log with a pause this long between rows has lost some.
+LONGEST_GAP = 0.5
+# m/s.  By how much position and velocity of one tick may disagree before the record contradicts itself.
+CONTRADICTION = 10.0
+# Share of the battery or the tank that is to be left.
+RESERVE = 0.2
+
+# The track beside its route
+
+# m.  A waypoint further than this from the track draws no row to itself.
+CAPTURE_RADIUS = 500.0
+# m.  A waypoint that the track ends at is passed within this of its apex, beside the fly-by's own distance.
+ARRIVED = 10.0
+# m, m/s.  No position or speed of ours is larger; what is, is garbage.
+FARTHEST, FASTEST = 1e7, 1e4
+# s.  Stays in a sphere on neighbouring segments that touch to within this are one.  Rounding.
+TOUCH = 1e-6
+
+# PX4's checks: the defaults of the parameters that its `FeasibilityChecker` reads, by their names
+
+# m.  NAV_ACC_RAD.
+PX4_ACCEPTANCE = 10.0
+# rad.  FW_LND_ANG, and the 0.1 degrees that the checker adds.
+PX4_LANDING_ANGLE = math.radians(5.0 + 0.1)
+# m.  MIS_DIST_1WP.
+PX4_FIRST_WAYPOINT = 10_000.0
+# m.  MIS_DIST_WPS of the releases that had it.
+PX4_BETWEEN_WAYPOINTS = 900.0
+# m.  A condition gate nearer than this to a waypoint is at the same position.
+PX4_GATE_APART = 0.05
+# Highest actuator number and value of DO_SET_SERVO.
+PX4_MOST_SERVO, PX4_MOST_PWM = 5, 2000.0
+
+# Suggestions
+
+# rad, m, share.  A change is asked for with this much beyond what passes, so that rounding does not undo it.
+BUFFER_ANGLE, BUFFER_LENGTH, BUFFER_SPEED = math.radians(0.1), 1.0, 0.03
+# m/s.  Steps of a suggested speed.
+SPEED_STEP = 0.5
+# Share by which a suggested speed stays above the slowest level one.
+ABOVE_SLOWEST = 1.1
+# m.  Least rise that is worth suggesting.
+LEAST_RISE = 1.0
+# How often a gentler turn is tried.
+TRIES = 6

@@ -1,0 +1,58 @@
+"""Legs as climbed: height, throttle, and the steepest flight that the aircraft showed at its limit."""
+
+import math
+
+import numpy as np
+import pytest
+
+from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.slopes import Ability, SlopeMeasure, lifted_speed, measure_slope
+from logs.verdict.measures.track_alignment import lay_track
+from tests.synthetic import Profile, fly_path, make_setup
+
+CLIMB = [[0, 0, 300], [0, 1000, 300], [0, 3000, 510], [0, 4500, 510]]
+
+
+def measured(
+    throttle: Profile | None = None, airspeed: Profile | None = None, up: Profile | None = None
+) -> SlopeMeasure:
+    setup = make_setup(CLIMB)
+    demands = route_demands(setup)
+    aligned = lay_track(demands, fly_path(setup, throttle=throttle, airspeed=airspeed, up=up))
+    assert aligned is not None
+    return measure_slope(demands, aligned, 1)
+
+
+def test_a_clean_climb_has_its_slope_and_no_time_at_a_limit() -> None:
+    measure = measured()
+    assert measure.finished
+    assert measure.slope is not None
+    assert measure.slope.value == pytest.approx(math.atan(0.105), abs=1e-3)
+    assert measure.height_error == pytest.approx(0.0, abs=0.5)
+    assert (measure.at_full, measure.at_idle, measure.slow, measure.fast) == (0.0, 0.0, 0.0, 0.0)
+    assert measure.ability is None
+
+
+def test_height_off_the_leg_has_its_sign() -> None:
+    measure = measured(up=lambda s: -12.0 * np.exp(-0.5 * ((s - 2000.0) / 200.0) ** 2))
+    assert measure.height_error == pytest.approx(-12.0, abs=0.5)
+
+
+def test_throttle_at_its_limit_is_timed_with_the_speed_that_was_lost_meanwhile() -> None:
+    measure = measured(throttle=lambda s: 0.0 * s + 0.5, airspeed=lambda s: -2.0 * (s > 1000.0))
+    assert measure.at_full > 60.0
+    assert measure.slow == pytest.approx(2.0, abs=0.1)
+
+
+def test_an_ability_covers_what_it_exceeds_beyond_its_error() -> None:
+    ability = Ability(slope=0.10, error=0.01, seconds=20.0)
+    assert [ability.covers(slope) for slope in (0.06, -0.06, 0.08)] == [True, True, False]
+
+
+def test_rising_air_lends_speed_that_fades() -> None:
+    time = np.arange(0.0, 60.0, 0.1)
+    rising = np.where(time < 5.0, 1.0, 0.0).astype(np.float32)
+    speed = np.full(time.size, 25.0, dtype=np.float32)
+    gained = lifted_speed(time, speed, rising, time.size)
+    assert gained.max() == pytest.approx(9.81 / 25.0 * 5.0, rel=0.25)
+    assert gained[-1] < 0.05 * gained.max()

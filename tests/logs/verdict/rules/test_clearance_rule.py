@@ -1,0 +1,108 @@
+"""Clearance along the planned and the flown path, and less the terrain's stated error, where one is stated."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.reader import read_log
+from logs.recording.recorder import Recorder
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.places import FLIGHT
+from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
+from tests.synthetic import (
+    bump,
+    edited,
+    fly_path,
+    make_scenario,
+    make_setup,
+)
+from world.errors import ScenarioError
+from world.scenario_file import parse_scenario
+
+
+def test_clearance_is_exact_and_says_where() -> None:
+    hill_at = {"kind": "peaks", "peak": [{"east_m": 0.0, "north_m": 3000.0, "height_m": 260.0, "sigma_m": 400.0}]}
+    setup = make_setup([[0, 0, 300], [0, 2000, 300], [0, 6000, 300]], terrain=hill_at)
+    item = of(judge(setup, fly_path(setup)), "clearance", leg(1))
+    assert item.ok
+    ground = setup.scenario.terrain
+    assert ground is not None
+    least = 300.0 - float(ground.height(0.0, np.linspace(2900.0, 3100.0, 20001)).max())
+    assert least == pytest.approx(40.0, abs=0.5)  # the raster cuts the summit a little
+    assert item.flown == pytest.approx(least, abs=1e-3)
+    assert item.planned == pytest.approx(least, abs=1e-3)
+    assert int(item.reason.split("north ")[1].split(" m")[0]) == pytest.approx(3000, abs=20)
+    low = make_setup([[0, 0, 285], [0, 2000, 285], [0, 6000, 285]], terrain=hill_at)
+    assert failing(judge(low, fly_path(low))) == {("clearance", leg(1))}
+    assert failing(judge_geometry(low)) == {("clearance", leg(1))}
+    dive = fly_path(setup, up=bump(4500.0, -285.0, 300.0))
+    assert ("departure", FLIGHT) in failing(judge(setup, edited(dive, position=dive.position - [0, 0, 20.0])))
+
+
+def test_terrain_that_is_not_there_is_not_judged(setup: FlightSetup, track: Track) -> None:
+    blind = replace(setup, scenario=replace(setup.scenario, terrain=None, external=True))
+    verdict = judge(blind, track)
+    assert verdict.flyable
+    assert verdict.summary.split("\n")[0] == "flyable; terrain not judged"
+    assert [item.ok for item in verdict.findings if item.rule in ("clearance", "threat", "bounds")] == [None] * 3
+    assert "threat" in verdict.summary
+
+
+def test_off_the_known_terrain_is_not_judged() -> None:
+    setup = make_setup(ROUTE)
+    small = make_scenario(ROUTE[:2], area_margin=1000.0)
+    cut = replace(setup, scenario=replace(setup.scenario, terrain=small.terrain))
+    far = edited(fly_path(cut), position=fly_path(cut).position)
+    assert of(judge(cut, far), "clearance", leg(0)).ok is True
+    holed = small.terrain
+    assert holed is not None
+    heights = holed.heights.copy()
+    heights[:] = np.nan
+    nowhere = replace(cut, scenario=replace(cut.scenario, terrain=replace(holed, heights=heights)))
+    item = of(judge(nowhere, far), "clearance", leg(0))
+    assert item.ok is None
+    assert "off the known terrain" in item.reason
+
+
+LEVEL = [[0, 0, 300], [0, 3000, 300]]
+STATED = {"kind": "flat", "amsl_m": 230.0, "vertical_error_m": 16.0}
+
+
+def test_both_levels_show_it_and_it_decides_nothing() -> None:
+    setup = make_setup(LEVEL, terrain=STATED, limits={"min_clearance_m": 60.0})
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        item = of(verdict, "clearance", leg(0))
+        assert item.ok is True
+        assert "54.0 m less the terrain's stated error of 16 m, less than the 60 m required" in item.reason
+        assert "Terrain's stated error: 16 m; the least clearance is 70.0 m, 54.0 m less that error" in verdict.summary
+    high = make_setup(LEVEL, terrain=STATED, limits={"min_clearance_m": 50.0})
+    assert "than the 50 m required" not in of(judge_geometry(high), "clearance").reason
+
+
+def test_nothing_is_said_where_none_is_stated() -> None:
+    setup = make_setup(LEVEL, terrain={"kind": "flat", "amsl_m": 230.0})
+    verdict = judge_geometry(setup)
+    assert "stated error" not in verdict.summary + of(verdict, "clearance").reason
+
+
+def test_a_log_carries_it(tmp_path: Path) -> None:
+    setup = make_setup(LEVEL, terrain=STATED)
+    track = fly_path(setup)
+    with Recorder(tmp_path / "flight.mcap", setup) as recorder:
+        recorder.write(track)
+        recorder.finish("completed", judge_flight(setup, track, "completed"))
+    again = read_log(tmp_path / "flight.mcap").setup.scenario
+    assert again.terrain is not None
+    assert again.terrain.vertical_error == 16.0
+
+
+@pytest.mark.parametrize(("value", "said"), [("-1", "allowed 0..1000"), ('"16"', "number"), ("nan", "allowed 0..1000")])
+def test_a_bad_value_is_refused(value: str, said: str) -> None:
+    text = f'name = "x"\n[terrain]\nkind = "flat"\namsl_m = 0\nvertical_error_m = {value}\n'
+    with pytest.raises(ScenarioError, match=r"terrain\.vertical_error_m") as caught:
+        parse_scenario(text, "x.toml")
+    assert said in str(caught.value)

@@ -1,0 +1,55 @@
+"""A loiter's corners are one finding, its legs the worst of each rule."""
+
+from dataclasses import replace
+
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.rules.loiter_rule import circles
+from tests.logs.verdict.judging import of
+from tests.mission_lines import setup_of, wp
+
+
+def loiter(radius: float, wind: float = 0.0) -> FlightSetup:
+    setup = setup_of(wp(0, 500), wp(0, 2500, command=18, p=f"2 0 {radius:g} 0"), wp(2500, 2500))
+    scenario = replace(setup.scenario, wind=replace(setup.scenario.wind, speed=wind))
+    return replace(setup, scenario=scenario, limits=replace(setup.limits, wind=scenario.wind))
+
+
+def test_a_circle_has_its_item_radius_and_turns() -> None:
+    setup = loiter(200.0)
+    (circle,) = circles(route_demands(setup))
+    assert set(setup.route.items[circle.first : circle.last + 1].tolist()) == {2}
+    assert circle.radius == 200.0
+    assert circle.turns == pytest.approx(2.0, abs=0.5)
+
+
+def test_one_finding_a_loiter_and_none_of_its_corners() -> None:
+    verdict = judge_geometry(loiter(200.0))
+    item = of(verdict, "loiter")
+    assert (item.ok, item.planned, item.limit_source) == (True, 200.0, "aircraft")
+    corners = [one for one in verdict.findings if one.rule in ("turn", "waypoint") and one.place.item == 2]
+    assert corners == []
+
+
+def test_a_circle_too_small_for_the_bank_limit_fails_and_says_what_it_needs() -> None:
+    item = of(judge_geometry(loiter(70.0, wind=8.0)), "loiter")
+    assert item.ok is False
+    assert item.margin is not None
+    assert item.margin < 0.0
+    assert item.brief == item.reason.partition(" (")[0]
+    assert f"the aircraft needs {item.limit:.0f} m in this wind" in item.reason
+
+
+def test_legs_of_a_circle_give_the_worst_of_each_rule() -> None:
+    setup = loiter(200.0)
+    verdict = judge_geometry(setup)
+    (circle,) = circles(route_demands(setup))
+    for rule in ("slope", "speed"):
+        inside = [
+            one for one in verdict.findings if one.rule == rule and one.place.index in range(circle.first, circle.last)
+        ]
+        assert len(inside) == 1
+        assert inside[0].reason.endswith(f"; the worst of the circle's {circle.last - circle.first} legs")

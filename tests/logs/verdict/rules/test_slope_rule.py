@@ -1,0 +1,163 @@
+"""The slope rule on synthetic flights, passing and failing."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.judge_flight import judge_geometry
+from tests.logs.verdict.judging import failing, judge, leg, of
+from tests.synthetic import (
+    Profile,
+    bank_radius,
+    edited,
+    envelope,
+    fly_path,
+    make_setup,
+)
+
+
+def hill(slope_deg: float, run: float = 2000.0) -> list[list[float]]:
+    top = 300.0 + run * math.tan(math.radians(slope_deg))
+    return [[0, 0, 300], [0, 1000, 300], [0, 1000 + run, top], [0, 2500 + run, top]]
+
+
+@pytest.mark.parametrize(("slope", "ok"), [(13.2, True), (14.2, False), (-7.3, True), (-8.3, False)])
+def test_the_envelope_limits_a_slope(slope: float, ok: bool) -> None:
+    setup = make_setup([[e, n, u + 400] for e, n, u in hill(slope)])
+    for verdict in (judge(setup, fly_path(setup)), judge_geometry(setup)):
+        item = of(verdict, "slope", leg(1))
+        assert item.ok is ok
+        assert item.limit == pytest.approx(13.7 if slope > 0 else -7.8)
+        assert item.limit_source == "aircraft"
+        assert item.margin == pytest.approx(abs(item.limit or 0.0) - abs(slope), abs=0.1)
+
+
+def test_a_steep_leg_is_explained() -> None:
+    setup = make_setup(hill(18.3, 1400.0))
+    verdict = judge(setup, fly_path(setup))
+    assert verdict.summary.startswith("not flyable: slope on leg 1 (18.3° > 13.7°)")
+    reason = of(verdict, "slope", leg(1)).reason
+    assert reason.startswith("leg 1 climbs 18.3° for 1.4 km; at 25 m/s and 763 m the aircraft can 13.7° in calm air")
+
+
+def test_wind_flattens_the_limit_and_is_named() -> None:
+    # 10 m/s behind: tan = 25 sin 13.7 / (25 cos 13.7 + 10), 9.9 degrees; design document: about 10.0.
+    setup = make_setup(hill(11.0), wind={"speed_mps": 10.0, "from_deg": 180.0})
+    item = of(judge_geometry(setup), "slope", leg(1))
+    wanted = math.degrees(math.atan2(25 * math.sin(math.radians(13.7)), 25 * math.cos(math.radians(13.7)) + 10))
+    assert item.limit == pytest.approx(wanted, abs=0.01)
+    assert "13.7° in calm air but 9.8° in this 10 m/s tailwind" in item.reason
+    assert not judge_geometry(make_setup(hill(14.0), wind={"speed_mps": 8.0, "from_deg": 0.0})).summary.count("slope")
+
+
+def test_the_scenario_limits_a_slope_if_it_is_tighter() -> None:
+    setup = make_setup(hill(9.0), limits={"max_climb_deg": 8.0})
+    item = of(judge(setup, fly_path(setup)), "slope", leg(1))
+    assert (item.ok, item.limit, item.limit_source) == (False, 8.0, "scenario")
+
+
+def test_a_steep_leg_flown_shallow_fails_both_ways() -> None:
+    setup = make_setup(hill(12.0))
+    lost = math.tan(math.radians(12.0)) - math.tan(math.radians(9.0))
+    verdict = judge(setup, fly_path(setup, up=lambda s: -lost * np.clip(s - 1000.0, 0.0, 2000.0)), envelope=False)
+    assert of(verdict, "slope", leg(1)).flown == pytest.approx(9.0, abs=0.05)
+    assert ("slope", leg(1)) in failing(verdict)
+    assert "instead of +12.0°" in of(verdict, "slope", leg(1)).reason
+
+
+@pytest.mark.parametrize(
+    ("pushed", "slowed", "run", "ok"),
+    [
+        (0.5, -2.0, 2000.0, False),
+        (0.5, -0.5, 2000.0, True),
+        (0.0, -2.0, 2000.0, True),
+        (0.5, -2.0, 60.0, True),
+        (-0.7, 2.0, 2000.0, False),
+    ],
+)
+def test_saturated_throttle_with_the_speed_off(pushed: float, slowed: float, run: float, ok: bool) -> None:
+    setup = make_setup(hill(6.0))
+
+    def profile(value: float) -> Profile:
+        return lambda s: value * ((s > 1400.0) & (s < 1400.0 + run))
+
+    track = fly_path(setup, throttle=profile(pushed), airspeed=profile(slowed))
+    assert (("slope", leg(1)) not in failing(judge(setup, track, envelope=False))) is ok
+
+
+def test_speed_that_the_air_took_is_not_held_against_the_slope() -> None:
+    setup = make_setup(hill(6.0))
+    track = fly_path(setup, throttle=lambda s: 0.0 * s + 0.5, airspeed=lambda s: -2.0 * (s > 1400.0))
+    wind = np.zeros((len(track), 3), dtype=np.float32)
+    assert ("slope", leg(1)) in failing(judge(setup, edited(track, wind=wind), envelope=False))
+    # Air that sinks at 1 m/s costs g w / V = 0.4 m/s each second.
+    wind[:, 2] = -1.0
+    assert ("slope", leg(1)) not in failing(judge(setup, edited(track, wind=wind), envelope=False))
+    wind[:, 2] = 1.0
+    assert ("slope", leg(1)) in failing(judge(setup, edited(track, wind=wind), envelope=False))
+
+
+def test_a_short_leg_is_measured_over_four_seconds() -> None:
+    setup = make_setup([[0, 0, 300], [0, 1000, 300], [0, 1150, 310], [0, 2500, 310]])
+    item = of(judge(setup, fly_path(setup)), "slope", leg(1))
+    assert item.ok
+    assert "short leg" in item.method
+    assert item.flown == pytest.approx(math.degrees(math.atan2(10, 150)), abs=1.0)
+
+
+def test_a_big_corner_in_a_steep_descent_is_steeper_than_its_legs() -> None:
+    """-7 degrees on both legs fit the aircraft's -7.7; the arc of a 120 degree corner between them does not."""
+
+    def corner(turn_deg: float, slope_deg: float) -> list[list[float]]:
+        drop = -2000.0 * math.tan(math.radians(slope_deg))
+        turn = math.radians(turn_deg)
+        east, north = 2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn)
+        return [[0.0, 0.0, 1500.0], [0.0, 2000.0, 1500.0 - drop], [east, north, 1500.0 - 2.0 * drop]]
+
+    sharp = of(judge_geometry(make_setup(corner(120.0, -7.0))), "slope", leg(0))
+    assert sharp.ok is False
+    assert "the arc at waypoint 1" in sharp.reason
+    assert judge_geometry(make_setup(corner(30.0, -7.0))).flyable
+    assert judge_geometry(make_setup(corner(120.0, -4.0))).flyable
+
+
+def corner(turn_deg: float, slopes_deg: tuple[float, float]) -> np.ndarray:
+    turn = math.radians(turn_deg)
+    first, second = (2000.0 * math.tan(math.radians(slope)) for slope in slopes_deg)
+    east, north = 2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn)
+    return np.array([[0.0, 0.0, 1500.0], [0.0, 2000.0, 1500.0 + first], [east, north, 1500.0 + first + second]])
+
+
+def test_the_arc_and_both_legs_are_named() -> None:
+    item = of(judge_geometry(make_setup(corner(120.0, (-7.0, -6.0)))), "slope", leg(0))
+    turn = math.radians(120.0)
+    tangent = bank_radius() * math.tan(0.5 * turn)
+    # The heights at the arc's ends over its own length.
+    steep = math.atan(tangent * (math.tan(math.radians(7.0)) + math.tan(math.radians(6.0))) / (bank_radius() * turn))
+    length = bank_radius() * turn
+    asks = (
+        f"the arc at waypoint 1 (item 1) falls {math.degrees(steep):.1f}° for {length:.0f} m, where legs 0 and 1 have"
+    )
+    assert item.reason.startswith(asks)
+    assert item.brief == "the arc at waypoint 1"
+    assert "have 7.0° and 6.0°" in item.reason
+    assert "the aircraft can 7.8° there" in item.reason
+
+
+def test_its_suggestion_passes() -> None:
+    points = corner(120.0, (-7.0, -6.0))
+    item = of(judge_geometry(make_setup(points)), "slope", leg(0))
+    (suggestion,) = item.suggestions
+    assert [change.place for change in suggestion] == [leg(0), leg(1)]
+    for k, change in enumerate(suggestion):
+        points[k + 1 :, 2] += change.wanted - (points[k + 1, 2] - points[k, 2])
+    assert of(judge_geometry(make_setup(points)), "slope", leg(0)).ok is True
+
+
+def test_a_narrower_envelope_is_not_the_scenario(setup: FlightSetup) -> None:
+    weak = replace(setup, limits=replace(setup.limits, envelope=envelope(climb_deg=1.5)))
+    item = of(judge(weak, fly_path(weak)), "slope", leg(1))
+    assert (item.ok, item.limit_source) == (False, "aircraft")

@@ -1,0 +1,58 @@
+"""Time and exposure inside missiles and radars, exact at any rate of rows."""
+
+import math
+
+import pytest
+
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.places import FLIGHT
+from tests.logs.verdict.judging import failing, judge, missile, of, radar
+from tests.synthetic import (
+    bump,
+    fly_path,
+    make_setup,
+)
+
+MISSILE = {
+    "name": "Alfa",
+    "east_m": 300.0,
+    "north_m": 1000.0,
+    "amsl_m": 300.0,
+    "kill_radius_m": 500.0,
+    "kill_scale_m": 200.0,
+    "detection_radius_m": 700.0,
+    "detection_scale_m": 400.0,
+}
+
+
+@pytest.mark.parametrize("rate", [60.0, 30.0, 2.0])
+def test_time_and_exposure_inside_a_threat_are_exact(rate: float) -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300], [0, 4000, 300]], threats=[MISSILE])
+    verdict = judge(setup, fly_path(setup, rate=rate))
+    item = of(verdict, "threat", missile("Alfa"))
+    # A chord 300 m from the centre of a 500 m sphere is 800 m long.
+    assert item.ok is False
+    assert item.flown == pytest.approx(800.0 / 25.0, abs=1e-3)
+    assert item.planned == pytest.approx(800.0 / 25.0, abs=1e-6)
+    h, s = 300.0, 400.0
+    exposure = 2 * (s / (2 * h**2 * (h**2 + s**2)) + math.atan(s / h) / (2 * h**3)) * 200.0**4 / 25.0
+    assert f"exposure {exposure:.3g} s" in item.reason
+    seen = of(verdict, "threat", radar("Alfa"))
+    assert seen.ok is True
+    assert seen.limit is None
+    assert seen.flown == pytest.approx(2 * math.sqrt(700.0**2 - 300.0**2) / 25.0, abs=1e-3)
+    assert "threat Alfa (missile) (32.0 s inside)" in verdict.summary
+
+
+def test_threats_out_of_reach_give_one_finding() -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 1300.0}])
+    items = [item for item in judge(setup, fly_path(setup)).findings if item.rule == "threat"]
+    assert [(item.place, item.ok) for item in items] == [(FLIGHT, True)]
+    assert "800 m away" in items[0].reason
+
+
+def test_a_flight_into_a_sphere_that_the_plan_avoids_fails() -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 510.0}])
+    assert judge_geometry(setup).flyable
+    verdict = judge(setup, fly_path(setup, across=bump(1000.0, 14.0, 60.0)))
+    assert ("threat", missile("Alfa")) in failing(verdict)

@@ -1,0 +1,122 @@
+"""A verdict as data: the place of every kind of finding, what could be changed, and both in a verdict.json."""
+
+import json
+from dataclasses import asdict, replace
+
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.findings import RULES, SCHEMA, Finding, Verdict, make_finding, verdict_json
+from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
+from logs.verdict.places import FLIGHT, PLAN, Change, Disagreement, Place
+from logs.verdict.wording import place_text, suggestions_text
+from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
+from tests.mission_lines import setup_of, wp
+from tests.synthetic import fly_path, make_setup
+
+THREAT = {
+    "name": "Alfa",
+    "east_m": 300.0,
+    "north_m": 1000.0,
+    "amsl_m": 300.0,
+    "kill_radius_m": 500.0,
+    "kill_scale_m": 200.0,
+    "detection_radius_m": 700.0,
+    "detection_scale_m": 400.0,
+}
+
+
+def test_each_rule_names_its_places(setup: FlightSetup, track: Track) -> None:
+    verdict = judge(setup, track)
+    places = {rule: [item.place for item in verdict.findings if item.rule == rule] for rule in RULES}
+    legs = [Place("leg", k) for k in range(4)]
+    waypoints = [Place("waypoint", k, item=k) for k in range(5)]
+    assert places["slope"] == places["clearance"] == places["speed"] == legs
+    assert (places["turn"], places["waypoint"]) == (waypoints[1:-1], waypoints)
+    for rule in ("threat", "bounds", "energy", "departure", "completion"):
+        assert places[rule] == [FLIGHT]
+
+
+def test_a_threat_says_its_number_its_name_and_which_side() -> None:
+    far = THREAT | {"name": "far", "east_m": 9000.0}
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[far, THREAT])
+    places = [item.place for item in judge_geometry(setup).findings if item.rule == "threat"]
+    assert places == [Place("missile", 1, name="Alfa"), Place("radar", 1, name="Alfa")]
+
+
+def test_a_loiter_lies_at_its_first_corner_and_a_check_at_its_item() -> None:
+    setup = setup_of(wp(0, 500), wp(0, 1500, command=18, p="1 0 150 0"), wp(1500, 1500, command=82))
+    verdict = judge_geometry(setup)
+    loiter = of(verdict, "loiter")
+    assert (loiter.place.kind, loiter.place.item) == ("waypoint", 2)
+    missions = [item for item in verdict.findings if item.rule == "mission"]
+    assert Place("mission", item=3) in [item.place for item in missions if item.check == "checkMissionItemValidity"]
+    assert len({item.check for item in missions}) == len(missions)
+
+
+def test_a_plan_that_was_not_flown_is_the_place(setup: FlightSetup) -> None:
+    assert {item.place for item in judge_plan_only(bad_plan(setup)).findings} == {PLAN}
+
+
+def test_a_change_says_what_where_from_and_to() -> None:
+    steep = of(judge_geometry(make_setup([[0, 0, 300], [0, 2000, 300], [0, 3000, 600]])), "slope", leg(1))
+    assert suggested(steep, "length") == Change("length", leg(1), 1000.0, 1241.0, "m")
+    assert suggested(steep, "rise").current == 300.0
+    fast = of(judge_geometry(make_setup(ROUTE, airspeed=33.0)), "speed", leg(0))
+    assert fast.suggestions == ((Change("airspeed", leg(0), 33.0, 16.5, "m/s", most=31.0),),)
+    sharp = judge_geometry(make_setup([[0, 0, 300], [0, 1000, 300], [150, 1000, 300], [150, 2000, 300]]))
+    turn = suggested(of(sharp, "turn", waypoint(1)), "turn")
+    assert (turn.place, turn.current, turn.unit) == (Place("waypoint", 1, item=1), pytest.approx(90.0), "deg")
+
+
+def test_steps_have_no_value_now() -> None:
+    low = of(judge_geometry(make_setup([[0, 0, 50], [0, 3000, 50]], limits={"min_clearance_m": 60.0})), "clearance")
+    assert low.suggestions == ((Change("height", leg(0), None, 11.0, "m"),),)
+    setup = replace(make_setup(ROUTE), battery=30.0)
+    empty = of(judge(setup, fly_path(setup)), "energy")
+    assert [[change.what for change in one] for one in empty.suggestions] == [["duration"], ["battery"]]
+    high = of(judge_geometry(make_setup([[0, 0, 4900], [0, 3000, 5100], [0, 6000, 4900]])), "bounds")
+    assert high.suggestions == ((Change("inset", FLIGHT, None, 101.0, "m"),),)
+
+
+def test_both_legs_of_a_steep_arc_are_one_suggestion() -> None:
+    item = of(judge_geometry(make_setup([[0, 0, 1500], [0, 2000, 1254], [1732, 1000, 1044]])), "slope", leg(0))
+    (suggestion,) = item.suggestions
+    assert [(change.what, change.place, change.wanted < 0.0) for change in suggestion] == [
+        ("rise", leg(0), True),
+        ("rise", leg(1), True),
+    ]
+
+
+def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
+    slow = fly_path(setup, airspeed=lambda s: 0.0 * s - 4.0, stop=6000.0)
+    verdict = judge_flight(setup, slow, "ground contact")
+    written = json.loads(verdict_json(verdict))
+    assert written["schema"] == SCHEMA == "planfly.verdict/2"
+    assert written["summary"].splitlines() == list(verdict.lines)
+    for item, found in zip(verdict.findings, written["findings"], strict=True):
+        assert found["place"] == asdict(item.place)
+        assert found["where"] == place_text(item.place)
+        assert found["suggestions"] == [[asdict(change) for change in one] for one in item.suggestions]
+        assert found["suggestion"] == suggestions_text(item.suggestions)
+        assert found["reason"] == item.reason
+    assert verdict.prediction is not None
+    differences = [Disagreement("speed", leg(k), geometric=True, flown=False) for k in range(3)]
+    assert [one for one in verdict.prediction.disagreements if one.rule == "speed"] == differences
+    texts = [f"speed at leg {k} passes by geometry and fails in flight" for k in range(3)]
+    assert [text for text in written["geometric"]["disagreements"] if text in texts] == texts
+    assert len(written["geometric"]["differences"]) == len(written["geometric"]["disagreements"])
+
+
+def test_a_margin_that_says_the_opposite_is_left_out() -> None:
+    def margin(value: float, ok: bool) -> float | None:
+        return make_finding("turn", waypoint(1), ok=ok, reason="", margin=value).margin
+
+    assert (margin(2.0, True), margin(-2.0, False), margin(2.0, False)) == (2.0, -2.0, None)
+
+
+def test_a_verdict_without_lines_has_an_empty_headline() -> None:
+    finding = Finding("turn", waypoint(1), None, None, None, "none", None, None, "deg", "", None, "")
+    verdict = Verdict((finding,), False, False, (), "plan")
+    assert (verdict.headline, verdict.summary) == ("", "")

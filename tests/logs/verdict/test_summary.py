@@ -1,0 +1,49 @@
+"""The summary's first line: the answer, the worst of each rule, and no more than four of them."""
+
+from logs.verdict.findings import RULES, Finding, make_finding, message
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.summary import headline
+from tests.logs.verdict.judging import leg, missile, waypoint
+
+
+def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
+    return make_finding(rule, place, ok=False, reason="why", margin=margin, unit="deg", **numbers)
+
+
+def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
+    found = [failed(rule, FLIGHT, -1.0) for rule in RULES]
+    assert headline(found[-4:], False) == ("not flyable: departure (why), completion (why), speed (why), energy (why)")
+    assert headline(found, False).endswith(", +8 more")
+    assert headline(found, False).startswith("not flyable: departure (why), completion (why), mission (why), slope (")
+
+
+def test_the_worst_of_each_rule_comes_before_the_second_worst_of_any() -> None:
+    slopes = [failed("slope", leg(k), -float(k), planned=8.0 + k, limit=8.0) for k in range(1, 6)]
+    turn = failed("turn", waypoint(2), -0.1, planned=50.1, limit=50.0)
+    assert headline([*slopes, turn], False) == (
+        "not flyable: slope on leg 3 (11.0° > 8.0°), slope on leg 4 (12.0° > 8.0°), slope on leg 5 (13.0° > 8.0°),"
+        " turn at waypoint 2 (50.1° > 50.0°), +2 more"
+    )
+
+
+def test_evidence_without_a_number_beyond_its_limit_is_named_in_brief() -> None:
+    fault = message("overshoots its arc by 8 m", " (at most 5 m)")
+    item = make_finding(
+        "turn", waypoint(1), ok=False, reason=fault.text, faults=[fault], planned=30.0, limit=60.0, unit="deg"
+    )
+    assert headline([item], False) == "not flyable: turn at waypoint 1 (overshoots its arc by 8 m)"
+
+
+def test_a_threat_is_named_once() -> None:
+    items = [make_finding("threat", missile(name), ok=False, reason="", flown=3.0) for name in ("Alfa", "threat 2")]
+    assert headline(items, False) == (
+        "not flyable: threat Alfa (missile) (3.0 s inside), threat 2 (missile) (3.0 s inside)"
+    )
+
+
+def test_terrain_that_was_not_judged_is_named_where_all_else_passes() -> None:
+    known = make_finding("clearance", leg(0), ok=True, reason="")
+    unknown = make_finding("clearance", leg(1), ok=None, reason="")
+    assert headline([known], True) == "flyable"
+    assert headline([known, unknown], True) == "flyable; terrain not judged on 1 legs"
+    assert headline([unknown], True) == "flyable; terrain not judged"
