@@ -98,5 +98,9 @@ def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:
 
 
 def field_names(dtype: np.dtype[np.record]) -> tuple[str, ...]:
-    """Names of a record's fields, in order."""
+    """Names of a record's fields, in order.
+
+    >>> field_names(record_dtype("east", "north"))
+    ('east', 'north')
+    """
     return dtype.names or ()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import LocalMap
-from flight.simulation.track import TRACK_ROW
+from flight.simulation.track import THROTTLE, TRACK_ROW
 from world.frames import GeoOrigin, to_geo
 from world.kernels import Record
 
@@ -119,7 +119,7 @@ class SnapshotMaker:
             q=q,
             r=r,
             airspeed=float(row.airspeed),
-            throttle=float(row.controls[3]),
+            throttle=float(row.controls[THROTTLE]),
             wind_north=wind_north,
             wind_east=wind_east,
             current=float(row.current),

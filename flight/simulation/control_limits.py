@@ -36,10 +36,10 @@ def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.b
 
     low, high: its limits; none of the rows for NaN.
 
-    >>> from flight.simulation.track import TRACK_ROW, as_track
+    >>> from flight.simulation.track import THROTTLE, TRACK_ROW, as_track
     >>> rows = np.zeros(3, TRACK_ROW)
-    >>> rows["commands"][:, 3] = 0.5, 1.0, 0.9
-    >>> held_at_limit(as_track(rows), 3, 0.0, 1.0)
+    >>> rows["commands"][:, THROTTLE] = 0.5, 1.0, 0.9
+    >>> held_at_limit(as_track(rows), THROTTLE, 0.0, 1.0)
     array([False,  True, False])
     """
     command = track.commands[:, k].astype(np.float64)

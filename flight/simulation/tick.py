@@ -11,6 +11,7 @@ from flight.guidance.lateral import guide
 from flight.guidance.navigation_error import navigate
 from flight.guidance.path_kernels import Records
 from flight.simulation.dryden import step_gusts
+from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.workspace import OUTPUT
 from world.frames import polymap
 from world.geometry import wrap
@@ -160,10 +161,10 @@ def _fill(
     row.airspeed = state.airspeed
     flow, controls, commanded = row.flow, row.controls, row.commands
     flow[0], flow[1] = state.alpha, state.beta
-    controls[0], controls[1], controls[2] = state.elevator, state.aileron, state.rudder
-    controls[3] = state.throttle
-    commanded[0], commanded[1], commanded[2] = commands.elevator, commands.aileron, commands.rudder
-    commanded[3] = commands.throttle
+    controls[ELEVATOR], controls[AILERON], controls[RUDDER] = state.elevator, state.aileron, state.rudder
+    controls[THROTTLE] = state.throttle
+    commanded[ELEVATOR], commanded[AILERON], commanded[RUDDER] = commands.elevator, commands.aileron, commands.rudder
+    commanded[THROTTLE] = commands.throttle
     row.load_factor = state.load_factor
     row.current = state.current
     row.energy = energy

@@ -14,6 +14,9 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int32]
 Rows = NDArray[np.record]
 
+# Columns of `Track.controls` and `Track.commands`.
+ELEVATOR, AILERON, RUDDER, THROTTLE = range(4)
+
 # Binary digits after the point that a flown row keeps of each column: finer than any instrument, and a third of the log
 # less than with all that a float32 holds.  Positions are the finest: courses and slopes are taken between rows that are
 # 0.4 m apart, and 0.06 mm turns those by 0.01 degrees.  Time and leg are as they are.

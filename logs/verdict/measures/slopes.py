@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_slope
+from flight.simulation.track import THROTTLE
 from logs.verdict.measures.leg_fits import LegFit, leg_slope, straight_span
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
@@ -146,7 +147,7 @@ def _saturation(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple
 def _at_limits(demands: RouteDemands, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Which rows have the throttle at full, and which at idle."""
     track = aligned.track
-    throttle = track.controls[rows, 3]
+    throttle = track.controls[rows, THROTTLE]
     full = throttle >= FULL
     idle = throttle <= IDLE
     # An aircraft that burns fuel draws no current at all.
@@ -168,7 +169,7 @@ def measure_ability(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> A
     if rows.stop - rows.start < 3:
         return None
     full, idle = _at_limits(demands, aligned, rows)
-    full &= track.controls[rows, 3] >= WHOLE_THROTTLE
+    full &= track.controls[rows, THROTTLE] >= WHOLE_THROTTLE
     along, _ = along_across(demands, leg, track.position[rows])
     low, high = straight_span(demands, leg, 0.0)
     use = _held_for(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick()))
