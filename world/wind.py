@@ -7,8 +7,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import inlined
+from world.kernels import compiled, inlined
 
+Floats = NDArray[np.float64]
 Turbulence = Literal["none", "light", "moderate"]
 # Wind speed at 6 m (20 ft) of MIL-F-8785C's low-altitude model, m/s.
 W20 = {"none": 0.0, "light": 7.7, "moderate": 15.4}
@@ -20,6 +21,16 @@ def mean_wind_speed(
 ) -> float:  # pragma: no cover - compiled
     """Mean wind speed (m/s) at a height (m): linear in height from the reference, and never below 0."""
     return max(0.0, speed + gradient * (amsl - reference_amsl))
+
+
+@compiled
+def _mean_wind_speeds(
+    speed: float, gradient: float, reference_amsl: float, amsl: Floats
+) -> Floats:  # pragma: no cover - compiled
+    out = np.empty(amsl.size)
+    for k in range(amsl.size):
+        out[k] = mean_wind_speed(speed, gradient, reference_amsl, amsl[k])
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +65,17 @@ class Wind:
         speed = mean_wind_speed(self.speed, self.gradient, self.reference_amsl, amsl)
         return -speed * math.sin(self.from_course), -speed * math.cos(self.from_course)
 
-    def strongest(self, amsl: NDArray[np.float64]) -> float:
+    def at_each(self, amsl: Floats) -> Floats:
+        """East and north components of the mean wind at each of these heights (n,) m: (n, 2) m/s.
+
+        >>> Wind(6.0, from_course=0.0, gradient=0.01, reference_amsl=300.0).at_each(np.array([300.0, 700.0]))
+        array([[ -0.,  -6.],
+               [ -0., -10.]])
+        """
+        speeds = _mean_wind_speeds(self.speed, self.gradient, self.reference_amsl, amsl)
+        return np.column_stack([-speeds * math.sin(self.from_course), -speeds * math.cos(self.from_course)])
+
+    def strongest(self, amsl: Floats) -> float:
         """Highest mean wind speed at these heights (m), m/s."""
         return max(math.hypot(*self.at(float(up))) for up in amsl)
 

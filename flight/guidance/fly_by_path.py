@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits
+from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.path_kernels import NODE, PIECE, Records, profile
-from flight.guidance.reference_laws import WAYPOINT
 from flight.mission.route import Route
 from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length
 from world.kernels import Record
@@ -143,7 +143,7 @@ def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -
 
 
 def waypoint_records(route: Route) -> Records:
-    """(w,) of `flight.guidance.reference_laws.WAYPOINT`; the last one has its leg's airspeed before it."""
+    """(w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last one has its leg's airspeed before it."""
     waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
     waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
     waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))

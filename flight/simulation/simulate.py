@@ -13,7 +13,7 @@ from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import Trim, straight
 from flight.guidance.fly_by_path import FlyByPath, fly_by_path, waypoint_records
 from flight.guidance.gains import load_gains
-from flight.guidance.memory import CROSS_TRACK, L1, VECTOR_FIELD
+from flight.guidance.guidance_memory import CROSS_TRACK, L1, VECTOR_FIELD
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.simulation.dryden import start_gusts
 from flight.simulation.flight_setup import FlightSetup
@@ -117,7 +117,7 @@ class Flight:
 
     dt: of a tick, s.
     path: that it follows.
-    memory: guidance's, a record of `flight.guidance.memory.GUIDANCE_MEMORY`.
+    memory: guidance's, a record of `flight.guidance.guidance_memory.GUIDANCE_MEMORY`.
     fdm: the aircraft that flies.
     """
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.fly_by_path import FlyByPath
 from flight.guidance.gains import GAINS, Gains
-from flight.guidance.memory import GUIDANCE_MEMORY
+from flight.guidance.guidance_memory import GUIDANCE_MEMORY
+from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import MOTION, NAVIGATION_LAGS
 from flight.guidance.path_kernels import NODE, PIECE, Records
-from flight.guidance.reference_laws import WAYPOINT
 from flight.simulation.dryden import GUST_FILTERS
 from flight.simulation.track import TRACK_ROW
 from world.frames import POLYMAP

@@ -35,22 +35,22 @@ def fly_by_vertices(
     breaks downwards a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
     Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
     """
-    run_in = math.hypot(at[0] - before[0], at[1] - before[1])
-    run_out = math.hypot(after[0] - at[0], after[1] - at[1])
-    if run_in < 1e-6 or run_out < 1e-6:
+    run_before = math.hypot(at[0] - before[0], at[1] - before[1])
+    run_after = math.hypot(after[0] - at[0], after[1] - at[1])
+    if run_before < 1e-6 or run_after < 1e-6:
         return at.copy().reshape((1, 3))
     turn = turning_angle(before[0], before[1], at[0], at[1], after[0], after[1])
     tangent = radius * math.tan(0.5 * turn) if 1e-6 < turn < math.pi - 1e-6 else 0.0
-    if tangent > min(run_in, run_out):
+    if tangent > min(run_before, run_after):
         tangent = 0.0
-    ux, uy = (at[0] - before[0]) / run_in, (at[1] - before[1]) / run_in
-    vx, vy = (after[0] - at[0]) / run_out, (after[1] - at[1]) / run_out
-    slope_in, slope_out = (at[2] - before[2]) / run_in, (after[2] - at[2]) / run_out
+    ux, uy = (at[0] - before[0]) / run_before, (at[1] - before[1]) / run_before
+    vx, vy = (after[0] - at[0]) / run_after, (after[1] - at[1]) / run_after
+    slope_in, slope_out = (at[2] - before[2]) / run_before, (after[2] - at[2]) / run_after
     chords = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
     arc = radius * turn if chords > 0 else 0.0
     low, high = at[2] - tangent * slope_in, at[2] + tangent * slope_out
     slope = (high - low) / arc if chords > 0 else slope_out
-    available_in, available_out = 0.5 * (run_in - tangent), 0.5 * (run_out - tangent)
+    available_in, available_out = 0.5 * (run_before - tangent), 0.5 * (run_after - tangent)
     beside = 0.5 * arc if chords > 0 else min(available_in, available_out)
     available_in, available_out = min(available_in, beside), min(available_out, beside)
     blend = half_blend_length(aircraft, at[2])

@@ -219,7 +219,7 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) ->
 def _speed_in_mean_wind(demands: RouteDemands, aligned: AlignedTrack, rows: slice) -> Floats:
     """Speed that the air would see without gusts, m/s."""
     wind, track = demands.setup.scenario.wind, aligned.track
-    mean = np.array([wind.at(float(up)) for up in track.position[rows, 2]]).reshape(-1, 2)
+    mean = wind.at_each(np.ascontiguousarray(track.position[rows, 2]))
     east, north = track.velocity[rows, 0] - mean[:, 0], track.velocity[rows, 1] - mean[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))
 

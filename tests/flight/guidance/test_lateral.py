@@ -11,8 +11,8 @@ from aircraft.catalog import Aircraft
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.fly_by_path import fly_by_path, waypoint_records
 from flight.guidance.gains import Gains, load_gains
+from flight.guidance.guidance_memory import GUIDANCE_MEMORY
 from flight.guidance.lateral import guide
-from flight.guidance.memory import GUIDANCE_MEMORY
 from flight.guidance.navigation_error import MOTION
 from flight.simulation.flight_setup import FlightSetup
 from tests.setups import MakeSetup

@@ -57,7 +57,7 @@ def test_an_aircraft_that_differs_from_its_model() -> None:
         assert max(item.worst for item in found) <= 1.5, name
 
 
-def test_reference_laws_are_further_off_on_straight_legs() -> None:
+def test_lateral_reference_laws_are_further_off_on_straight_legs() -> None:
     found = bench.reference_laws(range(20 if SOAK else 1))
     least = {"L1, ArduPlane's defaults": 10.0, "L1, best-tuned": 3.0, "vector field, best-tuned": 3.0}
     assert found.keys() == least.keys()

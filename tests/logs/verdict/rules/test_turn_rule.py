@@ -31,8 +31,8 @@ def zigzag(turn_deg: float, leg: float, legs: int = 4) -> list[list[float]]:
 
 
 def test_the_aircraft_limits_a_turn_by_its_legs() -> None:
-    # 131 m legs at 25 m/s and 30 degrees of bank hold a row of equal turns of 61 degrees: 2 R tan(theta/2) = 130 m.  Where
-    # the turns go to and fro, the roll from one bank into the other takes 10.5 m more.
+    # 131 m legs at 25 m/s and 30 degrees of bank hold a row of equal turns of 61 degrees: 2 R tan(theta/2) = 130 m.
+    # Where the turns go to and fro, the roll from one bank into the other takes 10.5 m more.
     assert failing(judge_geometry(make_setup(zigzag(60.0, 139.0)))) == set()
     wrong = failing(judge_geometry(make_setup(zigzag(63.0, 131.0))))
     assert wrong == {("turn", waypoint(k)) for k in (1, 2, 3, 4)}

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft
+from flight.guidance.lateral_reference_laws import (
+    WAYPOINT,
+    field_course,
+    l1_acceleration,
+    l1_angles,
+    l1_length,
+    l1_reached,
+)
 from flight.guidance.navigation_error import MOTION
-from flight.guidance.reference_laws import WAYPOINT, field_course, l1_acceleration, l1_angles, l1_length, l1_reached
 from flight.simulation.simulate import simulate
 from tests.setups import MakeSetup
 from world.kernels import Record
