@@ -35,8 +35,8 @@ def replan(
 ) -> Plan:
     """Plan anew from the waypoint at which leg `leg` of an old plan begins; legs before it are flown and stay.
 
-    scenario: with the threats known now (`world.scenario_variants.with_threats`).  The turn at that waypoint counts from the
-    course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
+    scenario: with the threats known now (`world.scenario_variants.with_threats`).  The turn at that waypoint counts
+    from the course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
     The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
 
     >>> from planfly.airframe import load_airframe
