@@ -13,12 +13,16 @@ import pytest
 
 import planfly
 from planfly.cli import main
-from planfly.commands.registry import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 CODE = sorted(file for folder in (*PACKAGES, "tests", "examples") for file in (ROOT / folder).rglob("*.py"))
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
+# As the README lists them.
+COMMANDS = (
+    *("run", "plan", "export", "fly", "check", "aircraft", "serve", "replay", "recover", "report", "compare", "paper"),
+    "scenarios",
+)
 MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60
 KERNELS = {"compiled", "compiled_views", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.

@@ -62,7 +62,7 @@ def inlined(kernel: _Kernel) -> _Kernel:
     -2.283185
     """
     njit: Any = numba.njit  # its types leave this option out
-    return cast("_Kernel", njit(cache=True, error_model="numpy", forceinline=True, _nrt=False)(kernel))
+    return cast("_Kernel", njit(cache=True, error_model="numpy", forceinline=True)(kernel))
 
 
 def compiled_views(kernel: _Kernel) -> _Kernel:
@@ -75,7 +75,7 @@ def compiled_views(kernel: _Kernel) -> _Kernel:
     1.570796
     """
     njit: Any = numba.njit  # its types leave this option out
-    return cast("_Kernel", njit(cache=True, error_model="numpy", _nrt=False)(kernel))
+    return cast("_Kernel", njit(cache=True, error_model="numpy")(kernel))
 
 
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:

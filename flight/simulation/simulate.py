@@ -19,7 +19,7 @@ from flight.simulation.dryden import start_gusts
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.loop import make_loop
-from flight.simulation.tick import ENDS, tick
+from flight.simulation.tick import ENDS, tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows, quantised
 from flight.simulation.workspace import BLOCK_TICKS, READ_FIELDS, Workspace
 from world.errors import FlightError
@@ -259,7 +259,7 @@ class Flight:
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(tick, space.array, space.path, self._ground.heights),
+            partial(tick_in_block, space.block, self._ground.heights),
             space,
             access.run,
             self._steps,
