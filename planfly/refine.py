@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Change
+from logs.verdict.wording import threat_text
 from world.scenario import Scenario, from_spec
 
 Spec = dict[str, Any]
@@ -129,7 +130,7 @@ def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
             threat = spec["threats"][item.place.index]
             now = threat["kill_radius_m"]
             threat["kill_radius_m"] = now + step.wanted + MISSILE_BUFFER
-            changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], item.place.name))
+            changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], threat_text(item.place)))
     return changes
 
 

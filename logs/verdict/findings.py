@@ -115,7 +115,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A statement of a rule: in full, and how it begins, which is what a headline has room for.
+    """A statement of a rule: in full, and how it begins, which is what a headline takes.
 
     placed: whether it begins with the finding's place.
     """

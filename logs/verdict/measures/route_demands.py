@@ -12,7 +12,7 @@ from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.turn_demands import TurnDemands, performance_tables, turn_demands
 from logs.verdict.places import Place
-from logs.verdict.tolerances import LARGEST_CUT
+from logs.verdict.tolerances import LARGEST_OFFSET
 from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes
 
 Floats = NDArray[np.float64]
@@ -167,7 +167,7 @@ def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
     out = np.zeros(len(turning.radius))
     for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
         radius = float(turning.radius[i])
-        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_CUT * radius)
+        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_OFFSET * radius)
     return out
 
 
