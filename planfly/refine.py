@@ -58,7 +58,7 @@ def tightening_text(change: Tightening) -> str:
     return f"limits.{change.what}: {change.current} to {change.wanted}"
 
 
-def tighten(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
+def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
     """The scenario to plan in next, and what was changed; no changes where nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
     failed = [item for item in verdict.findings if item.ok is False]
@@ -165,7 +165,7 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
                 "next": "",
             }
         )
-        planned_in, changes = tighten(planned_in, verdict)
+        planned_in, changes = tighten_limits(planned_in, verdict)
         rounds[-1]["next"] = _next(verdict, flown, number == most, changes)
         if rounds[-1]["next"] != GO_ON:
             break

@@ -142,6 +142,16 @@ def test_no_function_is_longer_than_60_lines() -> None:
     assert {function: length for function, length in lengths.items() if length > LONGEST} == {}
 
 
+def test_no_two_modules_define_one_public_name() -> None:
+    """One name for one thing: a class or function of ours is found by its name alone."""
+    homes: dict[str, set[str]] = {}
+    for file in OURS:
+        for node in parsed(file).body:
+            if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, set()).add(name_of(file))
+    assert {name: sorted(files) for name, files in homes.items() if len(files) > 1} == {}
+
+
 def test_kernels_name_what_they_read() -> None:
     """Coordinates 0, 1 and 2 of a row are what they are; a column from 3 on is a field that has a name."""
     numbered = [

@@ -19,7 +19,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.attachment_names import RECOVERY, RESULT, SETUP, VERDICT
 from logs.recording.foxglove_scene import LEVELS
-from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, stream
+from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream
 from logs.recording.recorder import LONGEST
 from logs.recording.setup_attachments import unpack_setup
 from logs.recording.state_channel import (
@@ -34,7 +34,7 @@ from logs.recording.state_channel import (
     RowMatcher,
     Rows,
     decode_rows,
-    join_rows,
+    join_records,
     parse_row,
     state_class,
 )
@@ -113,10 +113,10 @@ class _MessageCollector:
                 at = self._message(data, at, start, end)
                 continue
             if opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream(data[start:end]))
+                schema = Schema.read(record_stream(data[start:end]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
-                self._channel(Channel.read(stream(data[start:end])))
+                self._channel(Channel.read(record_stream(data[start:end])))
             at = end
 
     def _channel(self, channel: Channel) -> None:
@@ -147,7 +147,7 @@ class _MessageCollector:
 
     def rows(self) -> Rows:
         """All state rows in the order of the file, (t,) of `RECORD`."""
-        return join_rows(self.parts, RECORD)
+        return join_records(self.parts, RECORD)
 
 
 def read_log(path: Path) -> FlightLog:

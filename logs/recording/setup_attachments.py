@@ -25,8 +25,8 @@ from logs.recording.setup_schema import (
     SetupModel,
     envelope_file,
     mission_file,
+    mission_of,
     read_envelope,
-    read_mission,
     read_route,
     route_file,
 )
@@ -162,7 +162,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     envelope = read_envelope(file.envelope, f"{source}: {SETUP}")
     setup = FlightSetup(
         scenario=scenario,
-        mission=read_mission(file.mission),
+        mission=mission_of(file.mission),
         mission_text=_text(listed, MISSION, source),
         route=read_route(file.route, f"{source}: {SETUP}"),
         limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),

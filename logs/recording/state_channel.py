@@ -203,7 +203,7 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> Rows:
     return records
 
 
-def join_rows(parts: list[Rows], kind: np.dtype[np.void]) -> Rows:
+def join_records(parts: list[Rows], kind: np.dtype[np.void]) -> Rows:
     """Join arrays of one structured type; as bytes, since numpy compares structured types name by name."""
     if not parts:
         return np.zeros(0, dtype=kind)
