@@ -35,9 +35,3 @@ class Threats:
     def __len__(self) -> int:
         """How many units there are."""
         return len(self.names)
-
-
-def no_threats() -> Threats:
-    """No threats at all."""
-    none = np.zeros(0)
-    return Threats((), np.zeros((0, 3)), none, none, none, none)
