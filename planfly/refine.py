@@ -18,7 +18,7 @@ Spec = dict[str, Any]
 CLEARANCE_BUFFER = 5.0
 MISSILE_BUFFER = 10.0
 # Where a limit is already the aircraft's and the flight failed all the same, this share of it is left.
-SHARE = 0.9
+TIGHTENED_SHARE = 0.9
 # Bank (deg) below which it is not tightened further.
 LEAST_BANK_DEG = 5.0
 # What follows a round that another follows.
@@ -87,7 +87,7 @@ def _slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
         by_aircraft = any(item.limit_source == "aircraft" and item.margin and item.margin < 0.0 for item in failed)
         tighter: float | str = "aircraft"
         if now == "aircraft" or not by_aircraft:
-            tighter = round(SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
+            tighter = round(TIGHTENED_SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
         _limits(spec)[key] = tighter
         changes.append(Tightening(key, now, tighter))
     return changes
@@ -102,7 +102,7 @@ def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tighte
         return [Tightening("max_turn_deg", now, "aircraft")]
     # Larger arcs to plan with, while the flight keeps its bank.
     bank = scenario.flight.max_bank_deg
-    tighter = round(SHARE * bank, 2)
+    tighter = round(TIGHTENED_SHARE * bank, 2)
     if tighter < LEAST_BANK_DEG:
         return []
     spec.setdefault("flight", {})["max_bank_deg"] = tighter
