@@ -44,9 +44,3 @@ def threat_label(name: str, index: int) -> str:
     ('Powell Valley', 'threat 3')
     """
     return name or f"threat {index + 1}"
-
-
-def no_threats() -> Threats:
-    """No threats at all."""
-    none = np.zeros(0)
-    return Threats((), np.zeros((0, 3)), none, none, none, none)

@@ -124,7 +124,7 @@ def mission_file(mission: Mission) -> MissionFile:
     )
 
 
-def read_mission(file: MissionFile) -> Mission:
+def read_mission_table(file: MissionFile) -> Mission:
     """Read the mission of a table."""
     return Mission(
         home=None if file.home is None else Home(file.home.lat_deg, file.home.lon_deg, file.home.amsl_m),

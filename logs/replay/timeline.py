@@ -93,12 +93,12 @@ def _printable(text: str) -> str:
 
 
 def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
-    """Cut the track where the leg changes, and leave out rows on no leg of the route."""
+    """Split the track where the leg changes, and leave out rows on no leg of the route."""
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]
-    cut = [_LegRows(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
-    return [part for part in cut if 0 <= part.leg < route.legs]
+    parts = [_LegRows(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
+    return [part for part in parts if 0 <= part.leg < route.legs]
 
 
 def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:

@@ -170,7 +170,7 @@ class ServedLog:
 
     def abandon(self) -> None:
         """Close the log as it is."""
-        self._recorder.__exit__(OSError, None, None)
+        self._recorder.abandon()
 
 
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:

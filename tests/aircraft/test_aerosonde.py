@@ -39,7 +39,7 @@ def _near(modes: NDArray[np.complex128], value: complex) -> complex:
 @pytest.mark.parametrize("climb_deg", [-4.0, 0.0, 3.0])
 def test_trim_is_the_reference_trim(airspeed: float, climb_deg: float) -> None:
     climb = math.radians(climb_deg)
-    states, commands = reference.trim(airspeed, climb, reference.BookAtmosphere())
+    states, commands = reference.book_trim(airspeed, climb, reference.BookAtmosphere())
     if not 0.0 < commands[3] < 1.0:
         assert straight(_flat(), airspeed, 100.0, climb) is None
         return
@@ -66,7 +66,7 @@ def test_modes_are_the_reference_modes(variation: Variation | None) -> None:
     world = reference.BookAtmosphere(parasite_drag=0.043 if variation is None else 0.0)
     fdm = _flat(variation)
     a, b = linearise(fdm, _trim(fdm, 25.0))
-    expected_a, expected_b = reference.linearise(*reference.trim(25.0, 0.0, world), world)
+    expected_a, expected_b = reference.book_linearise(*reference.book_trim(25.0, 0.0, world), world)
     expected = _modes(expected_a)
     assert np.abs((_modes(a) - expected) / expected).max() < 1e-5
     np.testing.assert_allclose(a, expected_a, rtol=1e-4, atol=1e-4)
@@ -184,4 +184,4 @@ def test_limits_of_the_envelope_balance_in_the_reference(motor_braking: bool) ->
 
 def test_reference_says_when_it_finds_no_trim() -> None:
     with pytest.raises(ValueError, match="no trim at"):
-        reference.trim(25.0, 0.0, reference.BookAtmosphere(density=0.1))
+        reference.book_trim(25.0, 0.0, reference.BookAtmosphere(density=0.1))

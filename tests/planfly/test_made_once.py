@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from planfly.cli import main
-from planfly.commands.registry import COMMANDS, find_command
+from planfly.commands.registry import COMMAND_NAMES, find_command
 
 STAGES = (
     "planfly.airframe:load_airframe",
@@ -43,7 +43,7 @@ def counted(function: Callable[..., Any], entered: Counter[str]) -> Callable[...
 def count(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Count:
     """Give a command; get the stages that it entered, and how often each."""
     # What a command imports by itself would keep the counting function after the test.
-    for name in COMMANDS:
+    for name in COMMAND_NAMES:
         find_command(name)
     entered: Counter[str] = Counter()
     for stage in STAGES:

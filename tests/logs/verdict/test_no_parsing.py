@@ -17,7 +17,7 @@ from logs.report.text import badge_of, rule_rows
 from logs.verdict import findings, wording
 from logs.verdict.findings import RULES, Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from planfly.refine import tighten
+from planfly.refine import tighten_limits
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bump, edited, fly_path, make_setup
 
@@ -63,7 +63,7 @@ def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     rows = [
         (row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in rule_rows(verdict.findings)
     ]
-    tighter, changes = tighten(setup.scenario, verdict)
+    tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [place_values(verdict.findings, rule) for rule in RULES]
     return [failures(verdict, len(setup.route.waypoints)), values, rows, badge_of(verdict), changes, tighter.to_json()]
 
