@@ -60,7 +60,7 @@ class RouteFile(SetupModel):
     """A `Route` as a table: a value a waypoint, and a value a leg for airspeed."""
 
     waypoints_east_north_amsl_m: Annotated[
-        list[Annotated[list[Finite], Field(min_length=3, max_length=3)]], Field(min_length=1)
+        list[Annotated[list[Finite], Field(min_length=3, max_length=3)]], Field(min_length=2)
     ]
     airspeed_mps: list[Finite]
     acceptance_m: Column
