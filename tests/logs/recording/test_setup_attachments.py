@@ -67,6 +67,7 @@ def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Att
     [
         (lambda data: data["route"]["items"].append(3), r"route\.items: 5 values: 4 are expected"),
         (lambda data: data["route"].update(waypoints_east_north_amsl_m=[[0.0, 0.0, 9.0]]), "waypoints"),
+        (lambda data: data["route"].update(waypoints_east_north_amsl_m=[[0.0, 0.0, 9.0]] * 4), "without horizontal"),
         (lambda data: data["envelope"]["climb_rad"].pop(), r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\]"),
         (lambda data: data["envelope"]["climb_rad"][0].pop(), r"envelope\.climb_rad: shape"),
         (lambda data: data["envelope"]["amsl_m"].reverse(), r"envelope\.amsl_m: not increasing"),
