@@ -66,7 +66,7 @@ def write_report(
     """
     from logs.figures.draw_all import FIGURE_FILES, draw_pictures
 
-    track = None if track is None or not len(track) else with_legs(setup, track)
+    track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
     pictures = draw_pictures(setup, track, verdict, svg=svg)
     page = _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)

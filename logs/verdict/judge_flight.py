@@ -75,7 +75,8 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     findings = with_suggestions(demands, aligned, findings)
     prediction = _predict(demands, findings) if envelope else None
     lines = summary_lines(findings, flyable, setup, "flown", prediction)
-    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes)
+    ends = () if aligned is None else aligned.leg_ends()
+    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes, ends)
 
 
 def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits, PerformanceTable, aircraft_slopes, ground_speed_on
-from flight.guidance.fly_by_path import fly_by_path, path_polyline
+from flight.guidance.fly_by_path import FlyByPath, path_polyline
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.turn_demands import TurnDemands, performance_tables, turn_demands
@@ -135,12 +135,12 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         climb=climb,
         dive=dive,
         ground_speed=speeds,
-        path=_planned_path(route, limits, speeds),
+        path=_planned_path(setup.path, route, speeds),
     )
 
 
-def _planned_path(route: Route, limits: Limits, ground_speed: Floats) -> PlannedPath:
-    points, legs = path_polyline(fly_by_path(route, limits))
+def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
+    points, legs = path_polyline(path)
     speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
     run = np.hypot(*np.diff(points[:, :2], axis=0).T)
     return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(run / speed[legs])]))

@@ -56,6 +56,11 @@ class AlignedTrack:
         """Rows between a leg's two waypoints, both included."""
         return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
 
+    def leg_ends(self) -> tuple[float, ...]:
+        """When each leg but the last ended, s: at the row nearest to its waypoint's apex; inf where it was not met."""
+        ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
+        return tuple(ends.tolist())
+
     def flew(self, leg: int) -> bool:
         """Whether any of a leg was flown."""
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]

@@ -6,18 +6,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.replay.instruments import make_instruments
 from logs.replay.timeline import TimelineEntry, entry_lines, timeline
-from logs.verdict.measures.leg_numbers import with_legs
+from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
 from tests.logs.made_flight import make_setup, make_track
 
 
 @pytest.fixture(scope="module")
 def log(log_file: Path) -> FlightLog:
     return read_log(log_file)
+
+
+def numbered(log: FlightLog, track: Track) -> NDArray[np.int32]:
+    return with_legs(track, find_leg_ends(log.setup, track)).leg
 
 
 def texts(entries: list[TimelineEntry], kind: str) -> list[str]:
@@ -47,7 +52,7 @@ def test_the_lowest_clearance_of_each_leg_is_that_of_a_fine_sampling(log: Flight
     fine = np.linspace(0.0, log.end_time, 40_001)
     position = np.stack([np.interp(fine, log.track.time, log.track.position[:, k]) for k in range(3)], axis=1)
     height = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    legs = with_legs(log.setup, log.track).leg
+    legs = numbered(log, log.track)
     leg = legs[np.searchsorted(log.track.time, fine, side="right") - 1]
     for k, entry in enumerate(sorted(entries, key=lambda item: item.text)):
         lowest = float(height[leg == k].min())
@@ -118,7 +123,7 @@ def test_one_row_and_unknown_numbers_have_a_timeline_too(log: FlightLog) -> None
 
 
 def test_legs_are_those_of_the_track_whatever_was_recorded(log: FlightLog) -> None:
-    found = with_legs(log.setup, log.track).leg
+    found = numbered(log, log.track)
     # The flight goes through each waypoint, 5.7 m a row; a leg ends within a few rows of it, at the fly-by's apex.
     for index, waypoint in enumerate(log.setup.route.waypoints[1:-1], 1):
         nearest = int(np.argmin(np.linalg.norm(log.track.position - waypoint, axis=1)))
@@ -128,7 +133,7 @@ def test_legs_are_those_of_the_track_whatever_was_recorded(log: FlightLog) -> No
     assert make_instruments(dataclasses.replace(log, track=lying)).frame(6.0) == make_instruments(log).frame(6.0)
     # What was never reached begins no leg, and a track of nothing is on the first.
     half = log.track.rows(0, len(log.track) // 2)
-    assert with_legs(log.setup, half).leg.max() == found[: len(half)].max()
-    assert not with_legs(log.setup, log.track.rows(0, 1)).leg.any()
+    assert numbered(log, half).max() == found[: len(half)].max()
+    assert not numbered(log, log.track.rows(0, 1)).any()
     gone = dataclasses.replace(log.track, position=np.full((len(log.track), 3), math.nan))
-    assert not with_legs(log.setup, gone).leg.any()
+    assert not numbered(log, gone).any()

@@ -100,7 +100,9 @@ FINDINGS = (
     finding("slope", Place("leg", 1), False, -3.45, flown=11.25),
     finding("bounds", FLIGHT, None, None, planned=None, flown=None, limit=None, reason="no scenario was given"),
 )
-VERDICT = Verdict(FINDINGS, False, True, ("not flyable: slope on leg 1", "Start: in the air"), "flown")
+VERDICT = Verdict(
+    FINDINGS, False, True, ("not flyable: slope on leg 1", "Start: in the air"), "flown", leg_ends=(40.0, 72.0)
+)
 ARGUMENTS: dict[str, Any] = {
     "ended": "completed",
     "versions": {"planfly": "0.1.0", "jsbsim": "1.3.3"},
