@@ -117,18 +117,7 @@ def test_one_row_and_unknown_numbers_have_a_timeline_too(log: FlightLog) -> None
     assert any("peak bank nan" in text for text in texts(entries, "turn"))
 
 
-def test_legs_are_those_of_the_track_whatever_was_recorded(log: FlightLog) -> None:
-    found = with_legs(log.setup, log.track).leg
-    # The flight goes through each waypoint, 5.7 m a row; a leg ends within a few rows of it, at the fly-by's apex.
-    for index, waypoint in enumerate(log.setup.route.waypoints[1:-1], 1):
-        nearest = int(np.argmin(np.linalg.norm(log.track.position - waypoint, axis=1)))
-        assert abs(int(np.searchsorted(found, index)) - nearest) < 12
+def test_the_recorded_legs_are_not_believed(log: FlightLog) -> None:
     lying = dataclasses.replace(log.track, leg=np.zeros(len(log.track), dtype=np.int32))
     assert timeline(dataclasses.replace(log, track=lying)) == timeline(log)
     assert make_instruments(dataclasses.replace(log, track=lying)).frame(6.0) == make_instruments(log).frame(6.0)
-    # What was never reached begins no leg, and a track of nothing is on the first.
-    half = log.track.rows(0, len(log.track) // 2)
-    assert with_legs(log.setup, half).leg.max() == found[: len(half)].max()
-    assert not with_legs(log.setup, log.track.rows(0, 1)).leg.any()
-    gone = dataclasses.replace(log.track, position=np.full((len(log.track), 3), math.nan))
-    assert not with_legs(log.setup, gone).leg.any()
