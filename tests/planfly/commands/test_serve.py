@@ -4,8 +4,6 @@ import math
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -19,7 +17,7 @@ from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from tests.planfly.conftest import FIELD, Served
+from tests.planfly.conftest import Served
 from tests.stations import UdpStation, item
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
