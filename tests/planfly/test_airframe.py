@@ -15,10 +15,10 @@ def test_the_scenario_goes_before_the_aircrafts_own_numbers() -> None:
     assert own.aircraft.name == "aerosonde"
     assert own.airspeed == own.aircraft.airspeed
     assert own.battery == pytest.approx(own.aircraft.battery_energy / 3600.0)
-    table = {"airspeed_mps": 22.0, "max_bank_deg": 35.0, "battery_wh": 42.0}
+    table = {"airspeed_mps": 22.0, "max_bank_deg": 21.0, "battery_wh": 42.0}
     given = load_airframe(small_scenario(flight=table))
     assert (given.airspeed, given.battery) == (22.0, 42.0)
-    assert given.max_bank == pytest.approx(math.radians(35.0))
+    assert given.max_bank == pytest.approx(math.radians(21.0))
 
 
 @pytest.mark.parametrize(

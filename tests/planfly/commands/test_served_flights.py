@@ -82,5 +82,7 @@ def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOpt
     assert read.recorded_verdict is not None
     assert read.recorded_verdict["flyable"] is judged.flyable is False
     assert (options.logs / "flight-001.mcap").read_bytes() == b"another's"
-    flights.open_log(setup).abandon()
+    cut = flights.open_log(setup)
+    cut.write(track)
+    cut.abandon()
     assert not read_log(options.logs / "flight-003.mcap").complete
