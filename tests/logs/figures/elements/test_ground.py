@@ -14,7 +14,7 @@ def drawn(**changes: Any) -> tuple[Any, Any, list[Any]]:
     figure = style.new_figure(6.0)
     axes = figure.add_axes((0.1, 0.1, 0.7, 0.8))
     axes.set(xlim=(-1200.0, 1200.0), ylim=(-800.0, 800.0))
-    return figure, axes, draw_ground(figure, axes, make_scenario(**changes).terrain, 8.7, 0.5)
+    return figure, axes, draw_ground(figure, axes, make_scenario(threats=[], **changes).terrain, 8.7, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -25,14 +25,14 @@ def test_ground_without_shape_has_a_note(terrain: dict[str, Any], note: str) -> 
     figure, axes, handles = drawn(terrain=terrain)
     assert [text.get_text() for text in figure.texts] == [note]
     assert handles == []
-    assert axes.collections == []
+    assert not axes.collections
 
 
 def test_a_hill_is_brighter_where_it_faces_north_west() -> None:
     _, axes, _ = drawn()
     picture = np.asarray(axes.images[0].get_array())[..., :3].sum(axis=-1)
     rows, columns = picture.shape
-    # The hill of figure_data stands in the middle, 250 m high: 300 m up and 300 m aside of it are as high as each other.
+    # figure_data's hill stands in the middle: what is 300 m up and 300 m aside of it is of one height.
     up, aside = round(300.0 / 1600.0 * rows), round(300.0 / 2400.0 * columns)
     north_west = picture[rows // 2 + up, columns // 2 - aside]
     south_east = picture[rows // 2 - up, columns // 2 + aside]

@@ -51,10 +51,10 @@ def test_a_label_keeps_off_a_line_that_it_is_told_of(axes: Any) -> None:
 def test_an_optional_label_gives_way_and_one_without_a_place_is_left_out(axes: Any) -> None:
     placer = LabelPlacer(axes)
     placer.place("nowhere", np.nan, 50.0)
-    assert axes.texts == []
+    assert not axes.texts
     placer.boxes.append((-1e6, -1e6, 1e6, 1e6))
     placer.place("optional", 50.0, 50.0, optional=True)
-    assert axes.texts == []
+    assert not axes.texts
     placer.place("needed", 50.0, 50.0)
     assert [text.get_text() for text in axes.texts] == ["needed"]
 
