@@ -1,10 +1,18 @@
 """Words of places and changes, as terminal, report and verdict.json have them."""
 
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Place
 from logs.verdict.wording import change_text, place_text, shortened, suggestion_text, suggestions_text
-from tests.logs.verdict.judging import leg, missile, waypoint
+from tests.logs.verdict.judging import leg, missile, of, suggested, waypoint
+from tests.synthetic import envelope, make_setup
 
 LONGER = Change("length", leg(1), 150.0, 300.0, "m")
 
@@ -64,3 +72,67 @@ def test_changes_together_and_alternatives() -> None:
 def test_a_headline_takes_eighty_characters_of_a_statement() -> None:
     assert shortened("m" * 80) == "m" * 80
     assert shortened("m" * 81) == "m" * 77 + "..."
+
+
+STEEP = [[0, 0, 300], [0, 2000, 300], [0, 3000, 600], [0, 6000, 600]]
+SHORT = [[0, 0, 300], [0, 1000, 300], [150, 1000, 300], [150, 2000, 300]]
+STRAIGHT = [[0, 0, 300], [0, 6000, 300]]
+MISSILE = {"name": "Alfa", "east_m": 300.0, "north_m": 3000.0, "amsl_m": 300.0, "kill_radius_m": 500.0}
+
+
+def powered(volts: float) -> FlightSetup:
+    """A route that takes more energy than its aircraft carries."""
+    watts = {
+        f"power_{name}": np.full((5, 3), value) for name, value in (("idle", 0.0), ("level", 300.0), ("full", 9e2))
+    }
+    return replace(make_setup(STRAIGHT, table=replace(envelope(), volts=volts, **watts)), battery=10.0)
+
+
+# A failing route, its rule and place; where the number stands in the text of what is suggested, and its decimals.
+SUGGESTED = {
+    "rise": (lambda: make_setup(STEEP), "slope", leg(1), r"climb ([\d.]+) m on leg 1 instead of 300 m", 0),
+    "fall": (lambda: make_setup(STEEP[::-1]), "slope", leg(1), r"fall ([\d.]+) m on leg 1 instead of 300 m", 0),
+    "length": (lambda: make_setup(STEEP), "slope", leg(1), r"make leg 1 ([\d.]+) m long instead of 1000 m", 0),
+    "airspeed": (lambda: make_setup(SHORT), "turn", waypoint(1), r"fly it at ([\d.]+) m/s instead of 25 m/s", 1),
+    "range": (
+        lambda: make_setup(STRAIGHT, airspeed=33.0),
+        "speed",
+        leg(0),
+        r"command ([\d.]+) to [\d.]+ m/s on leg 0",
+        1,
+    ),
+    "turn": (lambda: make_setup(SHORT), "turn", waypoint(1), r"turn at most ([\d.]+)° there", 1),
+    "height": (lambda: make_setup([[0, 0, 20], [0, 6000, 20]]), "clearance", leg(0), r"fly leg 0 ([\d.]+) m higher", 0),
+    "inset": (
+        lambda: make_setup([[0, 0, 4900], [0, 3000, 5040], [0, 6000, 4900]]),
+        "bounds",
+        None,
+        r"bring the path ([\d.]+) m further inside",
+        0,
+    ),
+    "distance": (
+        lambda: make_setup(STRAIGHT, threats=[MISSILE | {"kill_scale_m": 100.0}]),
+        "threat",
+        missile("Alfa"),
+        r"pass Alfa ([\d.]+) m further away",
+        0,
+    ),
+    "duration": (lambda: powered(44.4), "energy", None, r"shorten the flight by ([\d.]+) %", 0),
+    "battery": (lambda: powered(44.4), "energy", None, r"take a battery ([\d.]+) times as large", 2),
+    "tank": (lambda: powered(0.0), "energy", None, r"take a tank ([\d.]+) times as large", 2),
+}
+
+
+@pytest.mark.parametrize("case", SUGGESTED)
+def test_a_suggestions_text_has_the_number_of_its_data(case: str) -> None:
+    make, rule, place, pattern, digits = SUGGESTED[case]
+    item = of(judge_geometry(make()), rule, place)
+    assert item.ok is False
+    change = suggested(item, {"fall": "rise", "range": "airspeed"}.get(case, case))
+    printed = re.search(pattern, suggestions_text(item.suggestions))
+    assert printed is not None, suggestions_text(item.suggestions)
+    assert float(printed[1]) == pytest.approx(abs(change.wanted), abs=0.5 * 10.0**-digits + 1e-9)
+    if case in ("rise", "fall"):
+        assert math.copysign(1.0, change.wanted) == (1.0 if case == "rise" else -1.0)
+    if case == "range":
+        assert f" to {change.most:.1f} m/s" in printed[0]

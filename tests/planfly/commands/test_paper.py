@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 from planfly.cli import main
-from planfly.paper.files import file_names, table_text
-from planfly.paper.seeded_plans import SeededPlan, exposure_probability, plan_section, problem_name, table
+from planfly.paper.files import file_names
 from planfly.terminal.targets import prepare_folder
-from tests.setups import small_scenario
-from world.scenario import load_scenario
 
 STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")
 
@@ -93,36 +90,3 @@ def test_an_unknown_algorithm_is_refused_before_anything_is_written(
     assert main(["paper", "--algorithm", "simplex", "--out", str(tmp_path / "out")]) == 2
     assert "simplex" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_the_table_counts_plans_in_the_order_they_were_made() -> None:
-    def run(algorithm: str, seed: int, length: float, kill: float, bad: int = 0) -> SeededPlan:
-        numbers = ((bad, 0, 0, 0), (length, kill, 2.0 * seed, 5.0), kill == 0.0, 0.1 * (kill > 0), 0.2)
-        return SeededPlan(7, algorithm, seed, np.zeros((3, 3)), *numbers, 100, np.zeros((2, 3)), float(seed))
-
-    rows = table([run("a", 1, 1.2, 0.0), run("a", 2, 1.1, 0.0), run("a", 3, 1.0, 0.5), run("b", 1, 1.0, 0.0, bad=1)])
-    assert [(row.algorithm, row.runs, row.safe, row.certified) for row in rows] == [("a", 3, 2, 2), ("b", 1, 0, 1)]
-    assert rows[0].length_median == pytest.approx(1.15)
-    assert (rows[0].length_worst, rows[0].kill_worst, rows[0].detection_median) == (1.2, 0.5, 4.0)
-    assert rows[1].length_median is None
-    text = table_text(rows).splitlines()
-    assert "2/3" in text[1]
-    assert " - " in text[2]
-    assert problem_name(7) == "paper-07"
-
-
-def test_probability_of_one_unit_by_hand() -> None:
-    unit = {"east_m": 0, "north_m": 500, "amsl_m": 150, "kill_radius_m": 700, "kill_scale_m": 250}
-    scenario = small_scenario(threats=[unit], start={"east_m": 0, "north_m": 0, "amsl_m": 150})
-    far = np.array([[0.0, 0.0, 150.0], [60_000.0, 0.0, 150.0]])
-    # One of the seven points lies within reach, at 500 m: (250 / 500)^4.
-    assert exposure_probability(scenario, far, "kill") == pytest.approx(1 / 16)
-    assert exposure_probability(scenario, far, "detection") == 0.0
-    # Two points at that distance.
-    assert exposure_probability(scenario, far[[0, 0]], "kill") == pytest.approx(1 - (15 / 16) ** 7)
-
-
-def test_runs_of_another_algorithm_stand_beside_the_baselines() -> None:
-    done = plan_section([7], 1, "umda-polar", jobs=1)
-    assert [item.algorithm for item in done] == ["umda-polar", "umda-cartesian"]
-    assert load_scenario(problem_name(7)).planner.algorithm == "umda"

@@ -4,8 +4,6 @@ import math
 import os
 import random
 import signal
-import subprocess
-import sys
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -19,7 +17,7 @@ from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
 from planfly.cli import main
-from tests.planfly.conftest import FIELD, Served
+from tests.planfly.conftest import Served
 from tests.stations import UdpStation, item
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
@@ -37,21 +35,6 @@ STEEP = [*ROUTE[:3], item(3, LAT, LON + 65_000, 300.0)]
 
 def done(message: object) -> bool:
     return message.get_type() == "MISSION_CURRENT" and message.mission_state == 5
-
-
-@pytest.fixture
-def served_log(tmp_path: Path) -> Path:
-    """A flight log of the route above, made without a vehicle."""
-    (tmp_path / "f.toml").write_text(FIELD, encoding="utf-8")
-    rows = [(0, LAT, LON, 0.0, 0), *((one.seq, one.x, one.y, one.z, one.frame) for one in ROUTE[1:])]
-    lines = [
-        f"{k}\t{int(k == 0)}\t{frame}\t16\t0\t0\t0\t0\t{x / 1e7:.7f}\t{y / 1e7:.7f}\t{z}\t1"
-        for k, x, y, z, frame in rows
-    ]
-    (tmp_path / "m.waypoints").write_text("\n".join(["QGC WPL 110", *lines]) + "\n", encoding="ascii")
-    log = tmp_path / "played.mcap"
-    assert main(["fly", str(tmp_path / "m.waypoints"), "--scenario", str(tmp_path / "f.toml"), "--log", str(log)]) == 0
-    return log
 
 
 def test_a_served_flight_is_the_flight_of_fly_at_real_time(serve: Callable[..., Served]) -> None:
@@ -165,28 +148,6 @@ def test_the_vehicle_outlives_the_process_that_flies(serve: Callable[..., Served
     assert vehicle.stop() == 0
 
 
-def test_a_log_is_played_into_a_station(tmp_path: Path, served_log: Path) -> None:
-    """Heartbeats call it; positions, modes and the end come as they were flown."""
-    log = read_log(served_log)
-    with UdpStation(9) as station:
-        port = station.socket.getsockname()[1]
-        play = subprocess.Popen(
-            [sys.executable, "-m", "planfly", "replay", str(served_log), "--to", f"127.0.0.1:{port}", "--speed", "8"],
-            cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
-        station.socket.settimeout(60.0)
-        _, station.to = station.socket.recvfrom(4096)
-        station.socket.settimeout(0.01)
-        station.until(done)
-        _, errors = play.communicate(timeout=20.0)
-    assert play.returncode == 0, errors
-    east = [m.lon for m in station.log if m.get_type() == "GLOBAL_POSITION_INT"]
-    assert len(set(east)) > 15
-    assert max(east) - min(east) > 0.95 * (ROUTE[3].y - ROUTE[1].y)
-    assert log.ended in station.texts()
-    assert main(["replay", str(served_log), "--to", "127.0.0.1:9", "--wait", "0.3"]) == 2
-
-
 def test_ctrl_c_in_flight_closes_the_log(serve: Callable[..., Served], tmp_path: Path) -> None:
     """The mission is from a file, with a gap in its numbers, and is given to stations that ask for it."""
     lines = ["0 1 0 16 0 0 0 0 46 8 0 1", "3 0 0 16 0 0 0 0 46 8 100 1", "7 0 3 16 0 0 0 0 46 8.03 100 1"]
@@ -225,7 +186,6 @@ def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path)
 
 
 def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
-    """And a log is played into a station as it was flown."""
     vehicle = serve()
     with UdpStation(vehicle.port) as station:
         place = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT")

@@ -1,14 +1,19 @@
 """Of a fly-by arc too steep for the aircraft: its slope, and the limit on the mean of both legs' courses."""
 
 import math
+import re
 
 import numpy as np
+import pytest
 
+from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.measures.tighter_limits import steep_arc
-from tests.synthetic import (
-    make_setup,
-)
+from tests.logs.verdict.judging import leg, of
+from tests.synthetic import CALM_CLIMB, make_setup
+
+# Degrees of climb of both legs: each is within what the aircraft can there, the arc between them is not.
+SLOPE = 10.5
 
 
 def corner(turn_deg: float, slopes_deg: tuple[float, float]) -> np.ndarray:
@@ -18,15 +23,24 @@ def corner(turn_deg: float, slopes_deg: tuple[float, float]) -> np.ndarray:
     return np.array([[0.0, 0.0, 1500.0], [0.0, 2000.0, 1500.0 + first], [east, north, 1500.0 + first + second]])
 
 
-def test_what_the_other_leg_can_counts_too() -> None:
+def limit_by_hand(course_deg: float, wind: float, from_deg: float) -> float:
+    """Tangent of the steepest climb over the ground, at 25 m/s, of an aircraft that climbs 13.7 degrees in calm air."""
+    level = 25.0 * math.cos(math.radians(CALM_CLIMB))
+    off = math.radians(from_deg + 180.0 - course_deg)
+    tail, cross = wind * math.cos(off), wind * math.sin(off)
+    return 25.0 * math.sin(math.radians(CALM_CLIMB)) / (math.sqrt(level**2 - cross**2) + tail)
+
+
+@pytest.mark.parametrize("from_deg", [180.0, 280.0])
+def test_the_other_legs_limit_counts_too(from_deg: float) -> None:
     """With the wind behind on one leg and ahead on the other, half of the arc has either's limit."""
-    points = corner(100.0, (10.5, 10.5))
-    behind, ahead = (make_setup(points, wind={"speed_mps": 9.0, "from_deg": from_deg}) for from_deg in (180.0, 280.0))
-    first, second = route_demands(behind), route_demands(ahead)
-    assert first.climb[0] < first.climb[1]
-    assert second.climb[0] > second.climb[1]
-    for setup in (behind, ahead):
-        demands = route_demands(setup)
-        found = steep_arc(demands, 0)
-        assert found is None or abs(found.limit - float(np.tan(demands.climb).mean())) < 1e-12
-    assert steep_arc(first, 0) is not None
+    setup = make_setup(corner(100.0, (SLOPE, SLOPE)), wind={"speed_mps": 9.0, "from_deg": from_deg})
+    limits = [limit_by_hand(course, 9.0, from_deg) for course in (0.0, 100.0)]
+    assert (limits[0] < limits[1]) is (from_deg == 180.0)
+    item = of(judge_geometry(setup), "slope", leg(0))
+    printed = re.search(r"the aircraft can ([\d.]+)° there", item.reason)
+    assert printed is not None, item.reason
+    assert abs(math.tan(math.radians(float(printed[1]))) - sum(limits) / 2.0) < 2e-3
+    found = steep_arc(route_demands(setup), 0)
+    assert found is not None
+    assert abs(found.limit - sum(limits) / 2.0) < 1e-4

@@ -1,0 +1,57 @@
+"""Two flights in one picture: each line is its own flight's."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_both_over_distance
+from tests.logs.report.report_data import make_setup, make_track
+
+FIRST = NamedFlight("first.mcap", make_setup(), make_track())
+
+
+def shorter() -> NamedFlight:
+    """The first half, 10 m higher and 2 m/s slower."""
+    half = FIRST.track.rows(0, 49)
+    raised = half.position + np.array([0.0, 0.0, 10.0])
+    return NamedFlight("second.mcap", FIRST.setup, replace(half, position=raised, airspeed=half.airspeed - 2.0))
+
+
+def line(axes: Any, label: str) -> Any:
+    return next(one for one in axes.lines if one.get_label() == label)
+
+
+def test_the_map_has_both_tracks_and_no_line_that_joins_them() -> None:
+    second = shorter()
+    axes = draw_both_on_map((FIRST, second)).axes[0]
+    for flight in (FIRST, second):
+        drawn = line(axes, flight.name).get_xydata()
+        np.testing.assert_array_equal(drawn, flight.track.position[:, :2])
+    assert "flown track" not in [one.get_label() for one in axes.lines]
+    assert axes.get_legend() is not None
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["first.mcap", "second.mcap"]
+
+
+def test_panels_run_over_the_distance_flown_and_end_with_each_flight() -> None:
+    figure = draw_both_over_distance((FIRST, shorter()))
+    height, above, airspeed, *_ = figure.axes
+    assert len(figure.axes) == 6
+    first, second = line(height, "first.mcap"), line(height, "second.mcap")
+    # The route is 2.4 km long; 48 s at 25 m/s are half of it: 1.2 km, less the corner cut by a row.
+    assert first.get_xdata()[-1] == pytest.approx(2.4, abs=0.02)
+    known = np.isfinite(second.get_ydata())
+    assert second.get_xdata()[known].max() == pytest.approx(1.2, abs=0.02)
+    # Half a kilometre on, the first leg is half way from 300 m to 340 m; the ground is level at 200 m.
+    assert np.interp(0.5, *first.get_xydata().T) == pytest.approx(320.0, abs=0.1)
+    assert np.interp(0.5, *second.get_xydata()[known].T) == pytest.approx(330.0, abs=0.1)
+    assert np.interp(0.5, *line(above, "first.mcap").get_xydata().T) == pytest.approx(120.0, abs=0.1)
+    assert np.nanmax(line(airspeed, "second.mcap").get_ydata()) == pytest.approx(23.0)
+
+
+def test_without_terrain_the_height_above_it_is_empty() -> None:
+    bare = make_setup(terrain={"kind": "none"}, threats=[])
+    flight = replace(FIRST, setup=bare)
+    above = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes[1]
+    assert not np.isfinite(line(above, "second.mcap").get_ydata()).any()

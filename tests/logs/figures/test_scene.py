@@ -1,0 +1,76 @@
+"""The 3-D picture: a parallel projection, seen from aside of the route."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logs.figures.elements.style import png_bytes
+from logs.figures.scene import Projection, draw_scene
+from logs.verdict.places import Place
+from tests.logs.figures.figure_data import make_verdict
+from tests.logs.report.report_data import make_setup, make_track
+
+# The viewer looks down by this much.
+DOWN = math.radians(36.0)
+
+
+def test_seen_from_the_south_east_is_right_and_north_is_up_and_away() -> None:
+    projection = Projection(-math.pi / 2.0, np.array([100.0, 200.0, 300.0]), 2.0)
+    middle = np.array([100.0, 200.0, 300.0])
+    east, north, up = projection.project(middle + np.eye(3))
+    np.testing.assert_allclose(projection.project(middle), 0.0, atol=1e-12)
+    np.testing.assert_allclose(east, [1.0, 0.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(north, [0.0, math.sin(DOWN), -math.cos(DOWN)], atol=1e-12)
+    # Heights are stretched twofold.
+    np.testing.assert_allclose(up, [0.0, 2.0 * math.cos(DOWN), 2.0 * math.sin(DOWN)], atol=1e-12)
+
+
+@pytest.mark.parametrize("azimuth", [-2.5, -0.7, 1.9])
+@pytest.mark.parametrize("stretch", [1.0, 3.0])
+def test_a_step_to_the_viewer_stays_on_its_spot_and_comes_nearer(azimuth: float, stretch: float) -> None:
+    projection = Projection(azimuth, np.zeros(3), stretch)
+    point = np.array([[120.0, -40.0, 77.0], [0.0, 9.0, 5.0]])
+    here, there = projection.project(point), projection.project(point + 50.0 * projection.toward)
+    np.testing.assert_allclose(there[:, :2], here[:, :2], atol=1e-9)
+    assert (there[:, 2] > here[:, 2]).all()
+    # One metre on the ground.
+    assert math.hypot(*projection.toward[:2]) == pytest.approx(1.0)
+
+
+def legend(figure: Any) -> set[str]:
+    return {text.get_text() for text in figure.legends[0].get_texts()}
+
+
+def test_what_is_there_is_drawn_and_named() -> None:
+    flown = draw_scene(make_setup(), make_track(), make_verdict(("slope", Place("leg", 1))))
+    # From (-900, -400) to (700, 400): seen from the south-south-east, the nearest of eight names of which is the south.
+    assert flown.axes[0].get_title(loc="left").startswith("small: seen from the south")
+    assert {"planned path", "flown track", "missile's reach", "waypoint above the ground"} <= legend(flown)
+    assert "leg that fails a rule" in legend(flown)
+    names = {text.get_text() for text in flown.axes[0].texts}
+    assert {"start", "destination", "1", "2"} <= names
+    planned = draw_scene(make_setup(terrain={"kind": "none"}, threats=[]), None, None)
+    assert "no terrain: level at mid height" in legend(planned)
+    assert not {"flown track", "missile's reach", "leg that fails a rule"} & legend(planned)
+    assert png_bytes(planned).startswith(b"\x89PNG")
+
+
+def test_a_path_behind_a_ridge_is_drawn_dashed() -> None:
+    """A ridge of 400 m stands 500 m south of a path at 120 m: from the south, 36 degrees down, it is hidden."""
+    ridge = [{"east_m": east, "north_m": -900, "height_m": 400, "sigma_m": 200} for east in range(-1200, 1201, 150)]
+
+    def dashed(setup: Any) -> int:
+        lines = draw_scene(setup, None, None).axes[0].lines
+        thin = [line for line in lines if line.get_linewidth() == pytest.approx(1.8)]
+        return sum(int(np.isfinite(line.get_ydata()).sum()) for line in thin)
+
+    area = {"east_m": [-1200, 1200], "north_m": [-1500, 800], "ceiling_amsl_m": 900}
+    hidden = make_setup(area=area, terrain={"kind": "peaks", "peak": ridge}, threats=[])
+    way = hidden.route.waypoints.copy()
+    way[:, 1], way[:, 2] = -500.0, 120.0
+    way[:, 0] = np.linspace(-900.0, 900.0, 4)
+    assert dashed(replace(hidden, route=replace(hidden.route, waypoints=way))) > 100
+    assert dashed(make_setup(terrain={"kind": "flat", "amsl_m": 0}, threats=[])) == 0

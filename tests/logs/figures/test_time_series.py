@@ -1,0 +1,71 @@
+"""Time plots show the track's columns in the units of their labels, and energy by its own sums."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logs.figures.time_series import draw_controls, draw_energy, draw_time_plots
+from tests.logs.report.report_data import make_setup, make_track
+
+SETUP, TRACK = make_setup(), make_track()
+
+
+def line(axes: Any, label: str) -> Any:
+    return next(one for one in axes.lines if one.get_label() == label)
+
+
+def panel(figure: Any, title: str) -> Any:
+    return next(axes for axes in figure.axes if axes.get_ylabel().startswith(title))
+
+
+def test_bank_and_height_above_ground_are_those_of_track_and_terrain() -> None:
+    figure = draw_time_plots(SETUP, TRACK)
+    assert len(figure.axes) == 6
+    bank = panel(figure, "bank")
+    # Half a radian to the left at 41 s; the limit is 30 degrees either way.
+    assert np.interp(41.0, *line(bank, "flown").get_xydata().T) == pytest.approx(-math.degrees(0.5))
+    assert line(bank, "limit").get_ydata()[0] == pytest.approx(30.0)
+    above = line(panel(figure, "height above"), "from track and terrain")
+    # The ground is level at 200 m; the route starts at 300 m and ends at 360 m.
+    assert above.get_ydata()[[0, -1]] == pytest.approx([100.0, 160.0])
+    cross = line(panel(figure, "cross-track"), "as guidance saw it")
+    assert cross.get_ydata().min() == -3.25
+
+
+def test_without_terrain_there_is_no_panel_of_clearance() -> None:
+    figure = draw_time_plots(make_setup(terrain={"kind": "none"}, threats=[]), TRACK)
+    assert len(figure.axes) == 5
+    assert not any("ground" in axes.get_ylabel() for axes in figure.axes)
+
+
+def test_controls_are_in_degrees_and_the_throttle_in_percent() -> None:
+    count = len(TRACK)
+    commands = np.zeros((count, 4), dtype=np.float32)
+    commands[:, 0], commands[:, 3] = math.radians(10.0), 0.5
+    commands[30:60, 3] = 1.0
+    track = replace(TRACK, commands=commands, controls=0.5 * commands)
+    figure = draw_controls(SETUP, track)
+    assert [axes.get_ylabel().split("\n")[0] for axes in figure.axes] == ["elevator", "aileron", "rudder", "throttle"]
+    assert line(figure.axes[0], "commanded").get_ydata() == pytest.approx(10.0, abs=1e-5)
+    assert line(figure.axes[0], "as it stood").get_ydata() == pytest.approx(5.0, abs=1e-5)
+    assert line(figure.axes[3], "commanded").get_ydata().max() == 100.0
+    # Held at full throttle from 30 to 59 s.
+    (band,) = [one for one in figure.axes[3].collections if one.get_label() == "held at its limit"]
+    corners = band.get_paths()[0].vertices[:, 0]
+    assert (corners.min(), corners.max()) == (30.0, 59.0)
+    assert not figure.axes[1].collections
+
+
+def test_power_and_energy_as_height_are_the_tracks() -> None:
+    figure = draw_energy(SETUP, TRACK)
+    # Half a watt-hour each second is 1800 W.
+    power = panel(figure, "power").lines[0].get_ydata()
+    assert power[np.isfinite(power)] == pytest.approx(1800.0)
+    height = panel(figure, "energy as")
+    whole = line(height, "height and speed").get_ydata()
+    # 25^2 / (2 9.80665) = 31.87 m above the height itself, at the start 300 m.
+    assert whole[0] == pytest.approx(300.0 + 31.866, abs=0.01)
+    assert line(height, "height alone").get_ydata()[0] == 300.0

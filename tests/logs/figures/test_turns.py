@@ -1,0 +1,59 @@
+"""Turn by turn: each finding's numbers stand at its place's number, and what fails is ringed."""
+
+import math
+
+import numpy as np
+
+from logs.figures.elements.style import FAIL, FLOWN
+from logs.figures.turns import draw_turns, place_values
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import FLIGHT, Place
+
+
+def slope(leg: int, planned: float, flown: float | None, ok: bool | None) -> Finding:
+    return Finding("slope", Place("leg", leg), planned, flown, 8.0, "aircraft", 0.1, None, "deg", "fit", ok, "")
+
+
+FINDINGS = (
+    slope(2, 7.0, None, None),
+    slope(0, 4.0, 4.5, True),
+    Finding("slope", FLIGHT, 1.0, 1.0, 8.0, "aircraft", 0.1, None, "deg", "fit", True, ""),
+    Finding("turn", Place("waypoint", 1, 5), 40.0, 41.0, 45.0, "scenario", 0.1, 4.0, "deg", "fit", True, ""),
+    slope(1, 6.0, 9.0, False),
+)
+
+
+def test_values_are_in_the_order_of_their_places_and_the_flights_own_are_left_out() -> None:
+    values = place_values(FINDINGS, "slope")
+    assert [value.number for value in values] == [0, 1, 2]
+    assert [value.planned for value in values] == [4.0, 6.0, 7.0]
+    assert [value.flown for value in values[:2]] == [4.5, 9.0]
+    assert math.isnan(values[2].flown)
+    assert [value.ok for value in values] == [True, False, None]
+    assert [value.number for value in place_values(FINDINGS, "turn")] == [1]
+    assert place_values(FINDINGS, "threat") == []
+
+
+def test_bars_dots_and_dashes_stand_at_the_findings_numbers() -> None:
+    figure = draw_turns("a flight", Verdict(FINDINGS, False, True, ("not flyable",), "flown"))
+    turn, slopes = figure.axes
+    assert (turn.get_xlabel(), slopes.get_xlabel()) == ("waypoint", "leg")
+    heights = {round(bar.get_x() + bar.get_width() / 2.0): bar.get_height() for bar in slopes.patches}
+    assert heights == {0: 4.0, 1: 6.0, 2: 7.0}
+    dots = next(line for line in slopes.lines if line.get_color() == FLOWN)
+    np.testing.assert_array_equal(dots.get_xydata(), [[0.0, 4.5], [1.0, 9.0], [2.0, np.nan]])
+    dashes = slopes.collections[0].get_segments()
+    assert [segment[0][1] for segment in dashes] == [8.0, 8.0, 8.0]
+    ring = next(line for line in slopes.lines if line.get_markeredgecolor() == FAIL)
+    np.testing.assert_array_equal(ring.get_xydata(), [[1.0, 9.0]])
+    red = [label.get_text() for label in slopes.get_xticklabels() if label.get_color() == FAIL]
+    assert red == ["1"]
+    assert "fails" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_nothing_is_ringed_where_nothing_fails() -> None:
+    figure = draw_turns("a flight", Verdict(FINDINGS[:4], True, True, ("flyable",), "flown"))
+    assert "fails" not in [text.get_text() for text in figure.legends[0].get_texts()]
+    for axes in figure.axes:
+        assert all(not len(line.get_xdata()) for line in axes.lines if line.get_markeredgecolor() == FAIL)
+    assert draw_turns("nothing", Verdict((), True, True, ("flyable",), "flown")).axes == []

@@ -1,0 +1,86 @@
+"""Mission, route and envelope come back from their JSON tables to the last bit, and misfits are refused."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from logs.recording.setup_schema import (
+    EnvelopeFile,
+    MissionFile,
+    RouteFile,
+    SetupModel,
+    envelope_file,
+    mission_file,
+    read_envelope,
+    read_mission,
+    read_route,
+    route_file,
+)
+from tests.logs.made_flight import make_setup
+from tests.logs.recording.log_copies import same
+from world.errors import LogError
+
+SETUP = make_setup()
+
+
+def through_json(file: SetupModel) -> Any:
+    return json.loads(json.dumps(file.model_dump()))
+
+
+def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
+    same(read_mission(MissionFile.model_validate(through_json(mission_file(SETUP.mission)))), SETUP.mission)
+    same(read_route(RouteFile.model_validate(through_json(route_file(SETUP.route))), "x"), SETUP.route)
+    envelope = EnvelopeFile.model_validate(through_json(envelope_file(SETUP.envelope)))
+    same(read_envelope(envelope, "x"), SETUP.envelope)
+
+
+def test_numbers_stand_under_the_unit_that_they_have() -> None:
+    route, envelope = route_file(SETUP.route).model_dump(), envelope_file(SETUP.envelope).model_dump()
+    assert route["waypoints_east_north_amsl_m"][2] == [300.0, 700.0, 460.0]
+    assert route["airspeed_mps"] == [25.0, 26.1, 24.7]
+    assert route["fly_over"] == [False, True, False, False]
+    assert (envelope["airspeed_mps"], envelope["amsl_m"]) == ([18.0, 25.0, 33.3], [0.0, 1500.1])
+    assert envelope["descent_rad"][2][0] == 0.3
+    item = mission_file(SETUP.mission).model_dump()["items"][2]
+    assert (item["seq"], item["command"], item["alt_m"], item["autocontinue"]) == (3, 16, 460.0, False)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"airspeed_mps": [25.0] * 4}, r"route\.airspeed_mps: 4 values: 3 are expected"),
+        ({"acceptance_m": [0.0] * 3}, r"route\.acceptance_m: 3 values: 4"),
+        ({"fly_over": [False]}, r"route\.fly_over: 1 values: 4"),
+        ({"items": []}, r"route\.items: 0 values: 4"),
+        ({"arcs_m": [0.0]}, r"route\.arcs_m: 1 values: 4"),
+    ],
+)
+def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
+    file = route_file(SETUP.route).model_copy(update=change)
+    with pytest.raises(LogError, match=f"^x: {message}"):
+        read_route(file, "x")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"amsl_m": [1500.0, 0.0]}, r"envelope\.amsl_m: not increasing"),
+        ({"airspeed_mps": [18.0, 18.0, 20.0]}, r"envelope\.airspeed_mps: not increasing"),
+        ({"climb_rad": [[0.1, 0.1]] * 2}, r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\] is expected"),
+        ({"level_speed_min_mps": [16.0]}, r"envelope\.level_speed_min_mps: shape \[1\]: \[2\]"),
+        ({"power_level_w": [[1.0, 1.0]] * 3}, r"envelope\.power_idle_w: shape"),
+    ],
+)
+def test_an_envelope_whose_tables_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
+    file = envelope_file(SETUP.envelope).model_copy(update=change)
+    with pytest.raises(LogError, match=f"^x: {message}"):
+        read_envelope(file, "x")
+
+
+def test_unknown_keys_and_numbers_that_are_none_are_refused() -> None:
+    data = route_file(SETUP.route).model_dump()
+    for change in ({"colour": 1}, {"airspeed_mps": [np.nan] * 3}, {"waypoints_east_north_amsl_m": [[0.0, 0.0]]}):
+        with pytest.raises(ValueError, match="validation error"):
+            RouteFile.model_validate(data | change)

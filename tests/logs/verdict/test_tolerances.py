@@ -1,0 +1,44 @@
+"""Every tolerance of the verdict is a positive number that something uses."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from logs.verdict import tolerances
+
+NAMES = [name for name in vars(tolerances) if name.isupper()]
+SOURCES = "\n".join(
+    path.read_text(encoding="utf-8")
+    for path in Path(tolerances.__file__).parents[1].rglob("*.py")
+    if path != Path(tolerances.__file__)
+)
+
+
+def numbers(value: object) -> list[float]:
+    """The numbers of a tolerance: one, or one by each turbulence."""
+    found = list(value.values()) if isinstance(value, dict) else [value]
+    assert all(isinstance(number, int | float) for number in found), value
+    return [float(number) for number in found]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_is_used_positive_and_finite(name: str) -> None:
+    assert re.search(rf"\b{name}\b", SOURCES), f"{name} is used nowhere"
+    value = getattr(tolerances, name)
+    # Calm air adds nothing to where a gust may carry the aircraft.
+    smallest = 0.0 if name == "GUST_OFFSET" else math.ulp(0.0)
+    assert all(smallest <= number < math.inf for number in numbers(value))
+
+
+def test_more_turbulence_allows_no_less() -> None:
+    for table in (tolerances.GUST_OFFSET, tolerances.CLOSER):
+        assert list(table) == ["none", "light", "moderate"]
+        assert list(table.values()) == sorted(table.values())
+
+
+def test_px4s_defaults_are_those_of_its_parameters() -> None:
+    """NAV_ACC_RAD, FW_LND_ANG and MIS_DIST_1WP as PX4's parameter reference has them."""
+    assert (tolerances.PX4_ACCEPTANCE, tolerances.PX4_FIRST_WAYPOINT) == (10.0, 10_000.0)
+    assert math.degrees(tolerances.PX4_LANDING_ANGLE) == pytest.approx(5.1)

@@ -1,0 +1,88 @@
+"""Missions judged for a served vehicle, and logs that never overwrite one another."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flight.live.flight_process import JudgeMission
+from flight.live.status_text import CRITICAL, INFO, WARNING
+from flight.mission.items import Mission
+from logs.recording.reader import read_log
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import Place
+from planfly.commands.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
+from tests.logs.made_flight import make_track
+from tests.planfly.conftest import FIELD
+from tests.setups import waypoint_mission
+
+
+def failing(leg: int) -> Finding:
+    return Finding("slope", Place("leg", leg), 9.0, 9.0, 8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, "too steep")
+
+
+def test_of_a_verdict_the_worst_comes_first_and_the_rest_is_counted() -> None:
+    verdict = Verdict(tuple(failing(k) for k in range(6)), False, True, ("not flyable",), "geometry")
+    texts = verdict_texts("geometry", verdict)
+    assert texts[0] == ("verdict (geometry): NOT FLYABLE", WARNING)
+    assert [text.text for text in texts[1:5]] == [f"slope at leg {k}: too steep" for k in range(4)]
+    assert texts[5:] == (("and 2 more findings", WARNING),)
+    clean = Verdict((), True, True, ("flyable",), "flown")
+    assert verdict_texts("flown", clean) == (("verdict (flown): FLYABLE", INFO),)
+
+
+@pytest.fixture
+def options(tmp_path: Path) -> ServeOptions:
+    (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
+    return ServeOptions("", str(tmp_path / "field.toml"), None, 5.0, tmp_path / "logs")
+
+
+def mission(options: ServeOptions, *points: tuple[float, float, float]) -> Mission:
+    origin = open_served(options).scenario.origin
+    return waypoint_mission(np.array(points), np.full(len(points) - 1, 25.0), origin)
+
+
+def test_a_mission_is_judged_before_it_is_flown(options: ServeOptions) -> None:
+    flights = ServedFlights(options)
+    assert flights.speed == 5.0
+    level = mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0))
+    setup, judged = flights.prepare(JudgeMission(level, 3))
+    assert setup is not None
+    assert (judged.number, judged.possible, judged.flyable) == (3, True, True)
+    assert judged.texts[0].text.startswith("mission: 2 waypoints, 1.5 km; ")
+    # Home is the ground below the start where the mission has none: field is level, at the sea.
+    assert judged.home is not None
+    assert judged.home.alt == pytest.approx(0.0, abs=0.1)
+    steep = mission(options, (0.0, 0.0, 150.0), (500.0, 0.0, 450.0))
+    _, judged = flights.prepare(JudgeMission(steep, 4))
+    assert (judged.possible, judged.flyable) == (True, False)
+    setup, judged = flights.prepare(JudgeMission(Mission(None, ()), 5))
+    assert setup is None
+    assert (judged.number, judged.possible, judged.flyable) == (5, False, False)
+    assert [text.severity for text in judged.texts] == [CRITICAL]
+
+
+def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOptions) -> None:
+    flights = ServedFlights(options)
+    setup, _ = flights.prepare(JudgeMission(mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0)), 1))
+    assert setup is not None
+    options.logs.mkdir()
+    (options.logs / "flight-001.mcap").write_bytes(b"another's")
+    log = flights.open_log(setup)
+    made = make_track(seconds=1.0)
+    track = replace(made, leg=np.zeros_like(made.leg))
+    log.write(track.rows(0, 30))
+    log.write(track.rows(30, 60))
+    judged = log.finish("stopped")
+    assert judged.texts[-1] == (f"log {options.logs / 'flight-002.mcap'}", INFO)
+    read = read_log(options.logs / "flight-002.mcap")
+    assert (read.ended, len(read.track)) == ("stopped", 60)
+    assert [(event.text, event.level) for event in read.events] == [("flight ended: stopped", "error")]
+    assert read.recorded_verdict is not None
+    assert read.recorded_verdict["flyable"] is judged.flyable is False
+    assert (options.logs / "flight-001.mcap").read_bytes() == b"another's"
+    cut = flights.open_log(setup)
+    cut.write(track)
+    cut.abandon()
+    assert not read_log(options.logs / "flight-003.mcap").complete

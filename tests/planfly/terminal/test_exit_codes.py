@@ -1,0 +1,27 @@
+"""Exit codes are those of the README's table and of the help."""
+
+import re
+from pathlib import Path
+
+from planfly.terminal import exit_codes
+
+README = Path(__file__).parents[3] / "README.md"
+# By the sentence that the README has for each; 130 is what a shell gives a command that Ctrl-C ended: 128 + SIGINT.
+MEANT = {
+    "flyable": exit_codes.FLYABLE,
+    "our fault or the machine's": exit_codes.FAULT,
+    "bad usage or bad input": exit_codes.BAD_INPUT,
+    "done with a stated loss": exit_codes.LOSS,
+    "not flyable, or no feasible plan": exit_codes.NOT_FLYABLE,
+}
+
+
+def test_readme_and_help_state_each_code() -> None:
+    stated = re.sub(r"\s+", " ", README.read_text(encoding="utf-8"))
+    readme = stated[stated.index("Exit codes: ") :]
+    printed = re.sub(r"\s+", " ", exit_codes.EXIT_CODES)
+    for meaning, code in MEANT.items():
+        assert f" {code} {meaning}" in readme
+        assert f" {code} {meaning}" in printed
+    assert sorted(MEANT.values()) == [0, 1, 2, 3, 4]
+    assert exit_codes.INTERRUPTED == 128 + 2

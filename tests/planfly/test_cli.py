@@ -1,0 +1,67 @@
+"""Whatever a command meets, the shell gets one line and the code of README's table."""
+
+import argparse
+import errno
+import subprocess
+import sys
+
+import pytest
+
+from planfly.cli import main
+from planfly.commands import registry
+from world.errors import ScenarioError
+
+
+@pytest.mark.parametrize(
+    ("met", "code", "line"),
+    [
+        (ScenarioError("bad.toml:\n  start: missing"), 2, "planfly: bad.toml: start: missing\n"),
+        (
+            OSError(errno.ENOSPC, "No space left on device", "out.mcap"),
+            1,
+            "planfly: out.mcap: No space left on device\n",
+        ),
+        (OSError("no reason"), 1, "planfly: file: no reason\n"),
+        (KeyboardInterrupt(), 130, "planfly: interrupted\n"),
+    ],
+)
+def test_an_error_is_one_line_and_its_code(
+    met: BaseException, code: int, line: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(_args: argparse.Namespace) -> int:
+        raise met
+
+    monkeypatch.setattr(registry, "find_command", lambda _: fail)
+    assert main(["scenarios"]) == code
+    printed = capsys.readouterr()
+    assert (printed.out, printed.err) == ("", line)
+
+
+def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(_args: argparse.Namespace) -> int:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(registry, "find_command", lambda _: fail)
+    with pytest.raises(ZeroDivisionError):
+        main(["scenarios"])
+
+
+def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[str] = []
+
+    def find(name: str) -> registry.Command:
+        taken.append(name)
+        return lambda _args: 4
+
+    monkeypatch.setattr(registry, "find_command", find)
+    assert main(["check", "m.plan"]) == 4
+    assert taken == ["check"]
+
+
+def test_help_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\nfrom planfly.cli import main\ntry:\n    main(['--help'])\nexcept SystemExit as stop:\n"
+        "    print('code', stop.code, [name for name in ('numpy', 'numba', 'pydantic') if name in sys.modules])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    assert done.stdout.endswith("code 0 []\n")
