@@ -1,4 +1,4 @@
-"""What a m of way costs in a cell: 1 in the open, more inside kill spheres, infinite near the ground and off the map."""
+"""What a m of way costs in a cell: 1 in the open, more inside kill spheres, inf near the ground and off the map."""
 
 import math
 from collections.abc import Callable
