@@ -170,7 +170,7 @@ def test_outputs_are_scaled_each_by_its_own_factor_above_and_below_zero(name: st
     def outputs(*, above: float, below: float) -> dict[str, float]:
         space = make_workspace()
         space.record.wind.speed, space.record.wind.cos, space.record.wind.sin = 5.0, -0.6, 0.8
-        space.record.air.gust_down = -0.5
+        space.record.air.gust_down, space.record.memory.trim_throttle = -0.5, 0.6
         space.record.scale_above[name], space.record.scale_below[name] = above, below
         read(space, roll=0.2, up=HEIGHT + 3.0, pitch_rate=0.1)
         tick(space.array, space.path, level_ground())
