@@ -59,6 +59,15 @@ def test_a_run_clears_its_old_results_and_nothing_of_others(tmp_path: Path) -> N
     assert left == ["map.svg", "mine.txt", "round-2", "round-2/mine.txt"]
 
 
+def test_a_folder_of_old_results_alone_stays_to_take_the_new_ones(tmp_path: Path) -> None:
+    folder = tmp_path / "runs" / "a"
+    prepare_folder(folder)
+    (folder / "plan.json").write_text("old", encoding="utf-8")
+    prepare_folder(folder)
+    assert folder.is_dir()
+    assert list(folder.iterdir()) == []
+
+
 def test_another_command_leaves_a_runs_rounds_alone(tmp_path: Path) -> None:
     (tmp_path / "round-1").mkdir()
     for name in ("round-1/map.png", "map.png", "plan.json", "rounds.json"):
