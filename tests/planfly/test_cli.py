@@ -49,7 +49,7 @@ def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> No
 def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[str] = []
 
-    def find(name: str) -> registry.Command:
+    def find(name: str) -> registry.CommandFunction:
         taken.append(name)
         return lambda _args: 4
 

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from flight.live import downlink
 from flight.live.downlink import Downlink
 from flight.live.link import Peer
-from flight.live.parameters import RATE, Parameter, Parameters
+from flight.live.parameters import PARAMETERS_PER_SECOND, Parameter, Parameters
 from flight.live.snapshot import Snapshot
 from flight.live.status_text import WARNING
 from flight.live.telemetry import Status
@@ -166,4 +166,4 @@ def test_all_parameters_are_streamed_once_in_order_to_who_asked(clock: Clock) ->
     assert {port for name, port in sending.link.sent if name == "PARAM_VALUE"} == {1}
     # Two in each pause of 0.01 s at 200 a second.
     assert rounds == 3
-    assert RATE * PAUSE == 2.0
+    assert PARAMETERS_PER_SECOND * PAUSE == 2.0
