@@ -247,3 +247,11 @@ def test_optimisers_import_nothing_of_ours_but_kernels() -> None:
         if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] in PACKAGES
     }
     assert {module for module in imported if not module.startswith("planner.optimisers")} <= {"world.kernels"}
+
+
+def test_a_modules_tests_are_found_by_its_name() -> None:
+    # `python -m planfly` is the command line, which every command's tests go through.
+    modules = [file.relative_to(ROOT) for file in OURS if file.name not in ("__init__.py", "__main__.py")]
+    assert len(modules) > 200
+    without = [str(file) for file in modules if not (ROOT / "tests" / file.parent / f"test_{file.name}").is_file()]
+    assert without == []
