@@ -87,8 +87,16 @@ def test_without_spin_no_time_passes(fake: FakeJsbsim) -> None:
     assert fake.dt == DT
 
 
-def test_an_engine_that_never_settles_is_given_up(fake: FakeJsbsim) -> None:
-    fake.run = lambda: (fake.steps.append(0.0), setattr(fake, "push", -fake.push))  # type: ignore[assignment,func-returns-value,method-assign]  # the one call that matters here
-    fake.engine.settle(spin=True)
-    assert 100 <= len(fake.steps) <= 1000
-    assert fake.dt == DT
+class RestlessJsbsim(FakeJsbsim):
+    """Its engine's push changes its sign at every step."""
+
+    def run(self) -> None:
+        self.steps.append(self.dt)
+        self.push = -self.push
+
+
+def test_an_engine_that_never_settles_is_given_up() -> None:
+    restless = RestlessJsbsim()
+    restless.engine.settle(spin=True)
+    assert 100 <= len(restless.steps) <= 1000
+    assert restless.dt == DT
