@@ -123,7 +123,7 @@ def rates(states: Floats, commands: Floats, air: BookAtmosphere) -> Floats:
     )
 
 
-def trim(airspeed: float, climb: float, air: BookAtmosphere) -> tuple[Floats, Floats]:
+def book_trim(airspeed: float, climb: float, air: BookAtmosphere) -> tuple[Floats, Floats]:
     """Return states (8,) and commands (4,) of steady straight flight without sideslip.
 
     airspeed: m/s.  climb: rad, flight-path angle.  Raises ValueError where none is found.
@@ -148,7 +148,7 @@ def trim(airspeed: float, climb: float, air: BookAtmosphere) -> tuple[Floats, Fl
     return unpack(found.x)
 
 
-def linearise(states: Floats, commands: Floats, air: BookAtmosphere) -> tuple[Floats, Floats]:
+def book_linearise(states: Floats, commands: Floats, air: BookAtmosphere) -> tuple[Floats, Floats]:
     """Return A (8, 8) and B (8, 4) of `rates` by central differences."""
     step = 1e-5
 

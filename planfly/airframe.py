@@ -75,7 +75,7 @@ def load_airframe(scenario: Scenario) -> Airframe:
 
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
-    """The same aircraft within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
+    """An airframe within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
     return replace(airframe, limits=limits)

@@ -83,7 +83,7 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
     setup = make_setup(world, airframe, mission, number, plan=plan)
-    flown = fly(setup, airframe, None if log is None else Path(log))
+    flown = fly_and_judge(setup, airframe, None if log is None else Path(log))
     return PlanThenFly(plan, mission, flown.track, flown.verdict)
 
 
@@ -129,7 +129,7 @@ def make_setup(
     )
 
 
-def fly(
+def fly_and_judge(
     setup: FlightSetup, airframe: Airframe, log: Path | None, advance: Advance | None = None, *, every: int = 1
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.

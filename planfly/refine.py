@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Change
+from logs.verdict.wording import threat_text
 from world.scenario import Scenario, from_spec
 
 Spec = dict[str, Any]
@@ -18,7 +19,7 @@ Spec = dict[str, Any]
 CLEARANCE_BUFFER = 5.0
 MISSILE_BUFFER = 10.0
 # Where a limit is already the aircraft's and the flight failed all the same, this share of it is left.
-SHARE = 0.9
+TIGHTENED_SHARE = 0.9
 # Bank (deg) below which it is not tightened further.
 LEAST_BANK_DEG = 5.0
 # What follows a round that another follows.
@@ -58,7 +59,7 @@ def tightening_text(change: Tightening) -> str:
     return f"limits.{change.what}: {change.current} to {change.wanted}"
 
 
-def tighten(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
+def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list[Tightening]]:
     """The scenario to plan in next, and what was changed; no changes where nothing can be tightened."""
     spec = copy.deepcopy(scenario.to_json())
     failed = [item for item in verdict.findings if item.ok is False]
@@ -87,7 +88,7 @@ def _slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
         by_aircraft = any(item.limit_source == "aircraft" and item.margin and item.margin < 0.0 for item in failed)
         tighter: float | str = "aircraft"
         if now == "aircraft" or not by_aircraft:
-            tighter = round(SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
+            tighter = round(TIGHTENED_SHARE * min([*steep, *([now] if isinstance(now, float) else [])]), 2)
         _limits(spec)[key] = tighter
         changes.append(Tightening(key, now, tighter))
     return changes
@@ -102,7 +103,7 @@ def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tighte
         return [Tightening("max_turn_deg", now, "aircraft")]
     # Larger arcs to plan with, while the flight keeps its bank.
     bank = scenario.flight.max_bank_deg
-    tighter = round(SHARE * bank, 2)
+    tighter = round(TIGHTENED_SHARE * bank, 2)
     if tighter < LEAST_BANK_DEG:
         return []
     spec.setdefault("flight", {})["max_bank_deg"] = tighter
@@ -129,7 +130,7 @@ def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:
             threat = spec["threats"][item.place.index]
             now = threat["kill_radius_m"]
             threat["kill_radius_m"] = now + step.wanted + MISSILE_BUFFER
-            changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], item.place.name))
+            changes.append(Tightening("kill_radius_m", now, threat["kill_radius_m"], threat_text(item.place)))
     return changes
 
 
@@ -165,7 +166,7 @@ def refine(scenario: Scenario, most: int, one_round: OneRound, keep: Callable[[i
                 "next": "",
             }
         )
-        planned_in, changes = tighten(planned_in, verdict)
+        planned_in, changes = tighten_limits(planned_in, verdict)
         rounds[-1]["next"] = _next(verdict, flown, number == most, changes)
         if rounds[-1]["next"] != GO_ON:
             break

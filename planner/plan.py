@@ -20,7 +20,7 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SCHEMA = "planfly.plan/1"
+PLAN_SCHEMA = "planfly.plan/1"
 
 
 class Violation(IntEnum):
@@ -175,7 +175,7 @@ def plan_json(plan: Plan) -> str:
     """
     certificate = plan.certificate
     data = {
-        "schema": SCHEMA,
+        "schema": PLAN_SCHEMA,
         "algorithm": plan.algorithm,
         "seed": plan.seed,
         "evaluations": plan.evaluations,
@@ -224,7 +224,7 @@ def parse_plan(
     try:
         file = _PlanFile.model_validate(data)
     except ValidationError as error:
-        raise MissionError(f"{source}: {first_error(error)}") from error
+        raise MissionError(f"{source}: {first_error(error, data)}") from error
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
     waypoints = np.array(file.waypoints_east_north_amsl_m)

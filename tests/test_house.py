@@ -13,16 +13,23 @@ import pytest
 
 import planfly
 from planfly.cli import main
-from planfly.commands.registry import COMMANDS
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 CODE = sorted(file for folder in (*PACKAGES, "tests", "examples") for file in (ROOT / folder).rglob("*.py"))
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
+# As the README lists them.
+COMMANDS = (
+    *("run", "plan", "export", "fly", "check", "aircraft", "serve", "replay", "recover", "report", "compare", "paper"),
+    "scenarios",
+)
 MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60
 KERNELS = {"compiled", "compiled_views", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
 LEANING = ("Do the" + " same", "the design" + " document", "the" + " issue")
+# A dotted name in single backquotes that begins with a folder of ours; a file such as flight.mcap is none.
+_FIRST, _FILES = "|".join((*PACKAGES, "tests")), "mcap|html|toml|json|md"
+REFERENCE = re.compile(rf"(?<![`\w])`((?:{_FIRST})(?:\.(?!(?:{_FILES})\b)\w+)+)(?:\(\))?`(?!`)")
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
@@ -142,6 +149,16 @@ def test_no_function_is_longer_than_60_lines() -> None:
     assert {function: length for function, length in lengths.items() if length > LONGEST} == {}
 
 
+def test_no_two_modules_define_one_public_name() -> None:
+    """One name for one thing: a class or function of ours is found by its name alone."""
+    homes: dict[str, set[str]] = {}
+    for file in OURS:
+        for node in parsed(file).body:
+            if isinstance(node, Function | ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, set()).add(name_of(file))
+    assert {name: sorted(files) for name, files in homes.items() if len(files) > 1} == {}
+
+
 def test_kernels_name_what_they_read() -> None:
     """Coordinates 0, 1 and 2 of a row are what they are; a column from 3 on is a field that has a name."""
     numbered = [
@@ -164,6 +181,47 @@ def test_docstrings_and_comments_lean_on_no_other_text() -> None:
     assert leaning == []
 
 
+@cache
+def names_of(file: Path) -> frozenset[str]:
+    """What a module defines or imports, at any depth."""
+    nodes = list(ast.walk(parsed(file)))
+    defined = {node.name for node in nodes if isinstance(node, Function | ast.ClassDef)}
+    assigned = {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+    attributes = {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
+    imports = (node for node in nodes if isinstance(node, ast.ImportFrom))
+    imported = {alias.asname or alias.name for node in imports for alias in node.names}
+    return frozenset(defined | assigned | attributes | imported)
+
+
+def resolves(reference: str) -> bool:
+    """Whether a dotted name leads from a folder of ours to a module, and on to what it defines."""
+    parts = reference.split(".")
+    for k in range(len(parts), 0, -1):
+        folder, rest = ROOT.joinpath(*parts[:k]), parts[k:]
+        for module in (folder.with_suffix(".py"), folder / "__init__.py"):
+            if module.is_file():
+                return names_of(module).issuperset(rest)
+    return ROOT.joinpath(*parts).is_dir()
+
+
+def test_names_in_backquotes_lead_to_what_they_name() -> None:
+    """A reference such as `world.raster.read_terrain`, in a docstring, a comment or a page, leads somewhere."""
+    # The changelog tells of names that have gone.
+    pages = [
+        *ROOT.glob("*.md"),
+        *ROOT.glob("docs/*.md"),
+        *(file for package in PACKAGES for file in (ROOT / package).rglob("*.md")),
+    ]
+    pages.remove(ROOT / "CHANGELOG.md")
+    lost = [
+        f"{name_of(file)}: {reference}"
+        for file in (*CODE, *pages)
+        for reference in REFERENCE.findall(file.read_text(encoding="utf-8"))
+        if not resolves(reference)
+    ]
+    assert lost == []
+
+
 def test_every_public_function_has_an_example() -> None:
     """Public: imported by another of our packages, or named in `planfly.__all__`; kernels are called by kernels."""
     public = imported_across() | {("planfly.pipeline", name) for name in planfly.__all__}
@@ -176,3 +234,16 @@ def test_every_public_function_has_an_example() -> None:
         if ">>> " not in (ast.get_docstring(node) or "")
     ]
     assert bare == []
+
+
+def test_optimisers_import_nothing_of_ours_but_kernels() -> None:
+    """As a list of what is allowed: a contract names what is forbidden, and a new module would slip through."""
+    rooms = [file for file in OURS if file.parent == ROOT / "planner" / "optimisers"]
+    assert len(rooms) > 5
+    imported = {
+        node.module
+        for file in rooms
+        for node in ast.walk(parsed(file))
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.partition(".")[0] in PACKAGES
+    }
+    assert {module for module in imported if not module.startswith("planner.optimisers")} <= {"world.kernels"}

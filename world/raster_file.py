@@ -107,6 +107,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
 
 def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
     """Read the heights as stored, and xmin, xmax, ymin, ymax."""
+    edges = ("xmin", "xmax", "ymin", "ymax")
     try:
         with zipfile.ZipFile(file) as archive:
             # A few kilobytes of zeros unpack to gigabytes: ask before unpacking.
@@ -114,11 +115,11 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
         if size > 8 * MOST_PIXELS:
             raise TerrainError(f"{name}: {size:,} bytes unpacked: at most {8 * MOST_PIXELS:,} are read")
         with np.load(file, allow_pickle=False) as data:
+            for key in ("elevation", *edges):
+                if key not in data.files:
+                    raise TerrainError(f"{name}: field {key}: missing (elevation, xmin, xmax, ymin, ymax)")
             heights = np.asarray(data["elevation"])
-            return heights, [float(np.asarray(data[key]).item()) for key in ("xmin", "xmax", "ymin", "ymax")]
-    except KeyError as error:
-        missing = str(error.args[0]).split(" ")[0]
-        raise TerrainError(f"{name}: field {missing}: missing (elevation, xmin, xmax, ymin, ymax)") from error
+            return heights, [float(np.asarray(data[key]).item()) for key in edges]
     # RuntimeError and NotImplementedError: an encrypted entry, an unknown compression.
     except (OSError, ValueError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise TerrainError(f"{name}: not a readable .npz elevation file: {one_line(error)}") from error

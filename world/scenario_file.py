@@ -41,7 +41,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
     try:
         return ScenarioFile.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{source}: {first_error(error)}") from error
+        raise ScenarioError(f"{source}: {first_error(error, data)}") from error
 
 
 def checked_table(make: Callable[[], Table], source: str) -> Table:
@@ -64,8 +64,10 @@ def read_scenario_text(path: Path) -> str:
         raise ScenarioError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
 
 
-def first_error(error: ValidationError) -> str:
+def first_error(error: ValidationError, data: Any = None) -> str:
     """First of the faults that pydantic found, as ``key: value: what is allowed``.
+
+    data: what was checked; needed where a field takes more than one type, to tell its keys from pydantic's branches.
 
     >>> from pydantic import ValidationError
     >>> from world.scenario_tables import WindTable
@@ -77,9 +79,7 @@ def first_error(error: ValidationError) -> str:
     """
     found = error.errors(include_url=False)
     first = found[0]
-    # A union reports every branch; the branch's tag is not a key of the file.
-    parts = [str(part) for part in first["loc"]]
-    keys = [part for part in parts if part not in ("float", "int") and not part.startswith(("function-", "literal["))]
+    keys = [str(part) for part in (first["loc"] if data is None else _keys_found(first["loc"], data))]
     # Of a check of ours the message is that of the error that it raised.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
     value = first.get("input")
@@ -87,12 +87,23 @@ def first_error(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         message = "unknown key"
         shown = ""
-        keys = parts
     if first["type"] == "missing":
         shown = ""
+        keys = [str(part) for part in first["loc"]]
     more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
     named = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
     return f"{named or 'file'}{shown}: {message}{more}"
+
+
+def _keys_found(parts: tuple[str | int, ...], data: Any) -> list[str | int]:
+    """The parts of a place that lead on in the data: of a union pydantic names the branch as well, which does not."""
+    found = []
+    for part in parts:
+        inside = range(len(data)) if isinstance(data, list) else data if isinstance(data, dict) else ()
+        if part in inside:
+            found.append(part)
+            data = data[part]
+    return found
 
 
 def _shown(value: Any) -> str:

@@ -9,7 +9,7 @@ from world.errors import ScenarioError
 from world.frames import GeoOrigin, to_map
 from world.scenario_tables import PointTable, ThreatTable
 from world.terrain import Terrain
-from world.threats import Threats
+from world.threats import Threats, threat_label
 
 Floats = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, grou
         on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
         positions[k] = map_position(on_ground, f"threats[{k}]", source, origin, ground)
     return Threats(
-        names=tuple(table.name or f"threat {k + 1}" for k, table in enumerate(tables)),
+        names=tuple(threat_label(table.name or "", k) for k, table in enumerate(tables)),
         position=positions,
         kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
         detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),

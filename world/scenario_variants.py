@@ -1,4 +1,4 @@
-"""The same scenario with something changed: its terrain, wind, flight, threats or planner."""
+"""Variants of a scenario: another terrain, wind, flight or planner, or more threats."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 
 
 def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
-    """The same scenario over another elevation file.
+    """A scenario over another elevation file.
 
     Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
     Raises TerrainError for a file that cannot be read or does not cover the area.
@@ -49,7 +49,7 @@ def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict
 
 
 def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
-    """The same scenario in another wind; None keeps what it has.
+    """A scenario in another wind; None keeps what it has.
 
     speed: m/s, with from_course: rad, where it comes from.  turbulence: "none", "light" or "moderate".
     Raises ScenarioError for a wind that a scenario file may not have either.
@@ -76,7 +76,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 
 
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
-    """The same scenario with other entries of [flight]; None keeps what it has.
+    """A scenario with other entries of [flight]; None keeps what it has.
 
     Raises ScenarioError for a value that a scenario file may not have either.
 
@@ -95,7 +95,7 @@ def with_threats(
     source: str,
     kept: Sequence[ThreatTable] = (),
 ) -> Scenario:
-    """The same scenario with more threats on its ground.
+    """A scenario with more threats on its ground.
 
     added: east, north, kill radius and detection radius of each, m; a radius of 0 for none.  Their scales are the
     median shares of the radius of those that the scenario has, or a quarter and a third.
@@ -128,7 +128,7 @@ def with_threats(
 
 
 def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
-    """The same scenario with other keys of [planner]; ``source`` names them in messages.
+    """A scenario with other keys of [planner]; ``source`` names them in messages.
 
     Raises ScenarioError for a value that a scenario file may not have either.
 

@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 class Threats:
     """m air-defence units; a radius of 0 means that the unit has no missile, or no radar.
 
-    names: m of them.
+    names: m of them, as `threat_label` makes them.
     position: (m, 3) east, north, up in m.
     kill_radius, detection_radius: (m,) m, the paper's R_PKmax and R_PRDmax.
     kill_scale, detection_scale: (m,) m, the paper's gamma and delta (eq. 9 and 10).
@@ -37,7 +37,10 @@ class Threats:
         return len(self.names)
 
 
-def no_threats() -> Threats:
-    """No threats at all."""
-    none = np.zeros(0)
-    return Threats((), np.zeros((0, 3)), none, none, none, none)
+def threat_label(name: str, index: int) -> str:
+    """What a threat is called: its own name, or its number from 1 where it has none ("").
+
+    >>> threat_label("Powell Valley", 0), threat_label("", 2)
+    ('Powell Valley', 'threat 3')
+    """
+    return name or f"threat {index + 1}"

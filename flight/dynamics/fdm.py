@@ -130,7 +130,6 @@ class Fdm:
         self._ic_position = [access.setter(name) for name in IC_POSITION]
         self._ic_motion = [access.setter(name) for name in IC_MOTION]
         self._rates = [access.getter(name) for name in RATES]
-        self._terrain = access.setter(TERRAIN)
         self._height = access.getter(HEIGHT)
         self._run = self._exec.run
         self._engine = Engine(self._exec, self.dt, access.getter, access.setter) if aircraft.model.settles else None
@@ -217,10 +216,6 @@ class Fdm:
         """Set what adds to the steady wind, m/s, the way the air moves."""
         for setter, value in zip(self._gusts, (north, east, down), strict=True):
             setter(value / FOOT)
-
-    def set_terrain(self, amsl: float) -> None:
-        """Set the ground's height below the aircraft, m above sea level."""
-        self._terrain(amsl / FOOT)
 
     def loop_access(self) -> LoopAccess:
         """Bind what a loop reads and sets in this instance."""

@@ -28,19 +28,19 @@ _PARTS = frozenset({"engine", "tank", "contact", "thruster"})
 class _Reader:
     """Collects property names from one file's XML events and stops at the first forbidden element.
 
-    main: whether it is the model itself, not a file that it brings in.  cut: whether ``<input>`` and ``<output>``
-    channels are noted to be cut out, instead of refused.
+    main: whether it is the model itself, not a file that it brings in.  remove_channels: whether ``<input>`` and
+    ``<output>`` channels are noted to be removed, instead of refused.
     """
 
-    def __init__(self, file: Path, *, main: bool = True, cut: bool = False) -> None:
+    def __init__(self, file: Path, *, main: bool = True, remove_channels: bool = False) -> None:
         self.file = file
         self.data = b""
         self.read_names: dict[str, int] = {}  # with the line of the first use
         self.made_names: set[str] = set()
         self.brings: dict[str, str] = {}  # file names, and where they are named
         self.has_parts = False
-        self._main, self._cut = main, cut
-        self._cutting = -1  # the byte at which the channel that is being cut begins
+        self._main, self._remove_channels = main, remove_channels
+        self._channel_start = -1  # the byte at which the channel that is being removed begins
         self._spans: list[tuple[int, int]] = []
         self._path: list[str] = []
         self._text: list[str] = []
@@ -72,22 +72,22 @@ class _Reader:
 
     def _doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
         # One that only names a document type is never read; JSBSim's own files hold a few harmless entities.
-        if internal and not self._cut:
+        if internal and not self._remove_channels:
             self._refuse("a document type declaration may expand without end")
 
     def _start(self, name: str, attributes: dict[str, str]) -> None:
         depth = len(self._path)
         self._path.append(name)
         self._text = []
-        if self._cutting >= 0:
+        if self._channel_start >= 0:
             return
         if self._main and depth == 0 and name != "fdm_config":
             self._refuse(f"the root element is <{name}>, not <fdm_config>")
         # Inside a flight control component, <input> and <output> hold a property's name and no attribute.
         if name in {"input", "output"} and (depth < 3 or attributes):
-            if not self._cut:
+            if not self._remove_channels:
                 self._refuse(f"<{name}> opens a port or writes a file")
-            self._cutting = self._parser.CurrentByteIndex
+            self._channel_start = self._parser.CurrentByteIndex
             return
         if "file" in attributes:
             where = f'{self.file}:{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
@@ -103,12 +103,12 @@ class _Reader:
         self._path.pop()
         match = _NAME.fullmatch("".join(self._text).strip())
         self._text = []
-        if self._cutting >= 0:
+        if self._channel_start >= 0:
             if name in {"input", "output"} and len(self._path) < 3:
                 # An empty-element tag ends where it began; otherwise the parser stands before the end tag.
                 here = self._parser.CurrentByteIndex
-                self._spans.append((self._cutting, self.data.index(b">", here) + 1))
-                self._cutting = -1
+                self._spans.append((self._channel_start, self.data.index(b">", here) + 1))
+                self._channel_start = -1
             return
         if match is None:
             return
@@ -127,13 +127,13 @@ def check_model(
     """Refuse a model that is unsafe to give to JSBSim, and return its files by name, as JSBSim may read them.
 
     provided: whether JSBSim itself has a property of this name before a model is loaded.  folders: where the files that
-    the model brings in may stand.  shipped: the model is JSBSim's own: its channels are cut out, and its names
+    the model brings in may stand.  shipped: the model is JSBSim's own: its channels are removed, and its names
     are known to be good.
     Raises FlightError, naming file and line, for a file that cannot be read or is not well formed, for a document type
     declaration, for an ``<input>`` or ``<output>`` channel, for a file brought in that is not in the folders, and for a
     property that is read and that neither JSBSim nor the model makes.
     """
-    readers = {file.name: _read(file, main=True, cut=shipped)}
+    readers = {file.name: _read(file, main=True, remove_channels=shipped)}
     waiting = dict(readers[file.name].brings)
     while waiting:
         name, where = waiting.popitem()
@@ -141,15 +141,15 @@ def check_model(
         if found is None:
             raise FlightError(f"{where} brings in another file, which is not in the aircraft's folder")
         if found.name not in readers:
-            readers[found.name] = _read(found, main=False, cut=shipped)
+            readers[found.name] = _read(found, main=False, remove_channels=shipped)
             waiting |= readers[found.name].brings
     if not shipped:
         _check_names(list(readers.values()), provided)
     return {name: reader.without_channels() for name, reader in readers.items()}
 
 
-def _read(file: Path, *, main: bool, cut: bool) -> _Reader:
-    reader = _Reader(file, main=main, cut=cut)
+def _read(file: Path, *, main: bool, remove_channels: bool) -> _Reader:
+    reader = _Reader(file, main=main, remove_channels=remove_channels)
     reader.read()
     return reader
 

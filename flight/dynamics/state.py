@@ -48,5 +48,5 @@ class Commands(NamedTuple):
     throttle: float
 
 
-# The same for compiled code.
+# The four commands as compiled code takes them: a record of the fields of `Commands`.
 COMMANDS = record_dtype(*Commands._fields)

@@ -20,8 +20,8 @@ Floats = NDArray[np.float64]
 
 # Of a trim vector (8,), in this order, SI and radians: climb is the flight-path angle to the air mass, bank turns about
 # the velocity; sideslip is zero.
-Quantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
-QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+TrimQuantity = Literal["airspeed", "climb", "alpha", "bank", "elevator", "aileron", "rudder", "throttle"]
+QUANTITIES: tuple[TrimQuantity, ...] = get_args(TrimQuantity)
 # Of the order of one step of Newton's method; also the scale of the finite differences.
 _STEP = np.array([4.0, 0.1, 0.1, 0.05, 0.15, 0.05, 0.05, 0.2])
 _DIFFERENCE = 1e-5
@@ -82,7 +82,7 @@ class Simulator(Protocol):
 
 def solve(
     balance: Callable[[Floats], Floats],
-    held: Mapping[Quantity, float],
+    held: Mapping[TrimQuantity, float],
     limits: tuple[float, float, float],
     start: Floats | None = None,
 ) -> Floats | None:
@@ -129,7 +129,9 @@ def _bounds(limits: tuple[float, float, float]) -> tuple[Floats, Floats]:
     return lowest, highest
 
 
-def trim(simulator: Simulator, amsl: float, held: Mapping[Quantity, float], near: Trim | None = None) -> Trim | None:
+def trim(
+    simulator: Simulator, amsl: float, held: Mapping[TrimQuantity, float], near: Trim | None = None
+) -> Trim | None:
     """Return the steady flight at this height with two of its quantities held, or None if there is none.
 
     near: a trim to start from.

@@ -152,15 +152,6 @@ def waypoint_records(route: Route) -> Records:
     return waypoints
 
 
-def sample_path(path: FlyByPath, step: float) -> Floats:
-    """Points on the path about every ``step`` m, (n, 3) with its end, for figures and tests."""
-    distances = np.append(np.arange(0.0, path.length, step), path.length)
-    out = np.empty((distances.size, 3))
-    for k, s in enumerate(distances):
-        out[k] = _point_at(path, float(s))
-    return out
-
-
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
     return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
 

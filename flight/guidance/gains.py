@@ -118,7 +118,7 @@ class Gains:
     push_smoothing: float = 0.1
 
     def record(self) -> Record:
-        """The same for compiled code, a record of `GAINS`."""
+        """The gains for compiled code, as a record of `GAINS`."""
         record: Record = np.zeros(1, GAINS)[0]
         for name, value in asdict(self).items():
             setattr(record, name, value)

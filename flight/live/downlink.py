@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from flight.live.link import Link, Peer
-from flight.live.parameters import RATE, Parameters
+from flight.live.parameters import PARAMETERS_PER_SECOND, Parameters
 from flight.live.status_text import INFO, status_texts
 from flight.live.telemetry import Status, heartbeat, telemetry_message
 
@@ -83,7 +83,7 @@ class Downlink:
         if peer.parameter is None:
             return
         last, entries = int(peer.parameter), self._parameters.entries
-        peer.parameter += max(1.0, RATE * self._pause)
+        peer.parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
         for number in range(last, min(int(peer.parameter), len(entries))):
             self._link.send(self._parameters.message(number), peer)
         if peer.parameter >= len(entries):

@@ -192,7 +192,7 @@ def _fly(connection: Connection, setup: FlightSetup, factory: FlightFactory) -> 
         send_event(connection, FlightEnded(f"not started: {error}"))
         send_event(connection, FlightJudged(False, (StatusText(f"flight not started: {error}", CRITICAL),)))
         return True
-    snapshots = SnapshotMaker(setup)
+    snapshots = SnapshotMaker(setup, flight.map)
     try:
         ended, go_on = _in_step(connection, flight, snapshots, log, factory.speed)
         if go_on:

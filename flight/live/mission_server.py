@@ -27,7 +27,7 @@ CONFIRMATIONS, CONFIRM = 4, 0.4
 # A last item that comes twice within this time is a duplicate and gets no ACK again: that would end the next upload, s.
 ACK_AGAIN = 0.3
 # After this silence another station may take over; after the longer one the upload is given up, s.
-LOCK, PATIENCE = 1.0, 8.0
+LOCK, UPLOAD_TIMEOUT = 1.0, 8.0
 
 _FENCE_RETURN = 5000
 _ALLOWED = {
@@ -122,7 +122,7 @@ class MissionServer:
         """Ask again for what did not come, or may not have arrived; give up uploads that have gone silent."""
         replies = []
         for kind, upload in list(self._uploads.items()):
-            if now - upload.heard > PATIENCE:
+            if now - upload.heard > UPLOAD_TIMEOUT:
                 del self._uploads[kind]
                 text = (
                     f"{_NAMES[kind]} upload given up after item {len(upload.items)} of {upload.count}; nothing changed"
@@ -138,11 +138,6 @@ class MissionServer:
                 done.asked = now
                 replies.append(_request(done.station, done.count - 1, kind))
         return replies
-
-    @property
-    def busy(self) -> bool:
-        """Whether an upload is in progress."""
-        return bool(self._uploads)
 
     def _count(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         count = int(message.count)

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 FORCE = "PFLY_FORCE"
 # Parameters sent a second to a station that asked for all.
-RATE = 200.0
+PARAMETERS_PER_SECOND = 200.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -74,11 +74,13 @@ class SnapshotMaker:
     """Makes snapshots of the rows of one flight.
 
     Positions become latitude and longitude, and vectors and courses on the map become true ones.
+
+    local_map: around the setup's flight.
     """
 
-    def __init__(self, setup: FlightSetup) -> None:
+    def __init__(self, setup: FlightSetup, local_map: LocalMap) -> None:
         self._origin: GeoOrigin = setup.scenario.origin
-        self._map = LocalMap.around(setup)
+        self._map = local_map
 
     def before_start(self, setup: FlightSetup) -> Snapshot:
         """Snapshot of an aircraft that waits at the route's start, on the course of its first leg."""

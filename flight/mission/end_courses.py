@@ -11,7 +11,7 @@ from world.geometry import leg_courses, wrap
 from world.scenario import Scenario
 
 # Length of these legs beyond what the turn itself uses, m: the aircraft is level and on course again by then.
-SETTLING_LENGTH = 100.0
+END_LEG_LENGTH = 100.0
 # An end within this of the scenario's is the scenario's, m.
 _SAME = 1.0
 # A course that differs by less than this needs no turn, rad.
@@ -22,7 +22,7 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     """Start a route on the scenario's start course, and end it on its destination course.
 
     A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent and
-    `SETTLING_LENGTH`: so the turn onto the first leg, or off the last, is flown and judged as any other.  A route whose
+    `END_LEG_LENGTH`: so the turn onto the first leg, or off the last, is flown and judged as any other.  A route whose
     scenario asks for no course, or that ends elsewhere, stays as it is.
 
     >>> from types import SimpleNamespace
@@ -75,5 +75,5 @@ def _lead_point(point: np.ndarray, course: float, leg: float, limits: Limits, si
     radius = limits.turn_radius(*((course, leg) if side < 0.0 else (leg, course)), float(point[2]))
     # A reversal has no tangent; twice the radius shows it as the sharp corner that it is.
     tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
-    step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + SETTLING_LENGTH)
+    step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
     return point + step * np.array([math.sin(course), math.cos(course), 0.0])

@@ -20,7 +20,7 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 
 # The area extends this far (m) beyond the mission's positions, and the ceiling above its highest.
-BUFFER = 2000.0
+AREA_BUFFER = 2000.0
 # A home further than this (m) from the first position is not where the mission is flown: ground stations write a
 # default position of their own where none was set.
 _HOME_DISTANCE = 100_000.0
@@ -35,7 +35,7 @@ def implied_scenario(
     flight: the aircraft and how it flies, the defaults if None.
     vertical_legs: as for `flight.mission.routing.make_route`.
 
-    The area is the box of the positions flown to, their circles and 2 km around, cut at the edge of the tile.  Start
+    The area is the box of the positions flown to, their circles and 2 km around, clipped at the tile's edge.  Start
     and destination are the route's ends; where those are not above ground they are lifted to 1 m, because a scenario's
     ends must be, while the route (and its verdict) keeps the mission's heights.  Raises MissionError, and TerrainError
     where the mission leaves the tile.
@@ -65,7 +65,7 @@ def implied_scenario(
         description="Made around a mission that came without a scenario",
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
-        area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + BUFFER, HIGHEST)),
+        area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + AREA_BUFFER, HIGHEST)),
         start=_end(route.waypoints[0], terrain),
         destination=_end(route.waypoints[-1], terrain),
         flight=flight,
@@ -100,20 +100,20 @@ def _boxes(mission: Mission, stops: tuple[ItineraryStop, ...], origin: GeoOrigin
         # The error that names the item.
         make_route(mission, origin, None, 1.0, False)
     flown = np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
-    around = BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
+    around = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     return np.clip(flown + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
 
 
 def _ground(
     path: str | None, origin: GeoOrigin, box: Floats, flown: Floats
 ) -> tuple[Terrain | None, TerrainTable, Floats]:
-    """Terrain, its table, and the area cut at the tile's edge."""
+    """Terrain, its table, and the area clipped at the tile's edge."""
     if path is None:
         return None, TerrainTable(kind="none"), box
     raster = open_raster(path)
     tile = tile_bounds(raster, origin)
-    cut = np.stack([np.maximum(box[:, 0], tile[:, 0]), np.minimum(box[:, 1], tile[:, 1])], axis=1)
-    if not ((cut[:, 0] <= flown[:, 0]) & (flown[:, 1] <= cut[:, 1])).all():
+    inside = np.stack([np.maximum(box[:, 0], tile[:, 0]), np.minimum(box[:, 1], tile[:, 1])], axis=1)
+    if not ((inside[:, 0] <= flown[:, 0]) & (flown[:, 1] <= inside[:, 1])).all():
         (e0, e1), (n0, n1) = flown
         (te0, te1), (tn0, tn1) = tile
         raise TerrainError(
@@ -124,7 +124,7 @@ def _ground(
     file = Path(path)
     found = str(file.resolve()) if file.is_file() else path
     table = TerrainTable(kind="dem", path=found, sha256=raster.sha256)
-    return read_terrain(raster, origin, cut, GROUND_BUFFER), table, cut
+    return read_terrain(raster, origin, inside, GROUND_BUFFER), table, inside
 
 
 def _end(point: Floats, terrain: Terrain | None) -> EndTable:

@@ -110,7 +110,7 @@ def parse_plan_file(text: str, source: str) -> Mission:
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
-        raise MissionError(f"{source}: {first_error(error)}") from error
+        raise MissionError(f"{source}: {first_error(error, data)}") from error
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
     if not items:
         raise MissionError(f"{source}: mission.items: no items")

@@ -1,11 +1,12 @@
 """Everything that decides a flight, fixed before it starts."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
+from flight.guidance.fly_by_path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
@@ -29,6 +30,7 @@ class FlightSetup:
     guidance: the law that steers.
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
+    path: that is to be followed, of route and limits.
     """
 
     scenario: Scenario
@@ -43,6 +45,11 @@ class FlightSetup:
     guidance: Guidance = "path"
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
+    path: FlyByPath = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Draw the path here, where it cannot differ from route and limits."""
+        object.__setattr__(self, "path", fly_by_path(self.route, self.limits))
 
     @property
     def envelope(self) -> Envelope:

@@ -14,7 +14,7 @@ from world.terrain import Heights, Terrain
 Floats = NDArray[np.float64]
 
 # The local map extends this far (m) beyond the area and the route.
-BUFFER = 5000.0
+MAP_BUFFER = 5000.0
 # Worst error of the local map that a flight accepts, m and rad.
 WORST = (0.01, 1e-6)
 
@@ -34,13 +34,13 @@ class LocalMap:
 
     @staticmethod
     def around(setup: FlightSetup) -> "LocalMap":
-        """Fit the area and the route with `BUFFER` around them; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
+        """Fit the area and the route with `MAP_BUFFER` around them; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
 
         Raises FlightError where the map cannot be fitted: an area about a pole.
         """
         origin: GeoOrigin = setup.scenario.origin
         points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
-        low, high = points.min(axis=0) - BUFFER, points.max(axis=0) + BUFFER
+        low, high = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
         outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
         lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
         # Longitudes about the origin's, so that an area may lie across the 180th meridian.

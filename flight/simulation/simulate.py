@@ -11,7 +11,7 @@ from aircraft.catalog import Aircraft
 from aircraft.path_limits import Limits, ground_speed_on
 from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import Trim, straight
-from flight.guidance.fly_by_path import FlyByPath, fly_by_path, waypoint_records
+from flight.guidance.fly_by_path import FlyByPath, waypoint_records
 from flight.guidance.gains import load_gains
 from flight.guidance.guidance_memory import CROSS_TRACK, L1, VECTOR_FIELD
 from flight.guidance.navigation_error import ERRORS, start_navigation
@@ -19,7 +19,7 @@ from flight.simulation.dryden import start_gusts
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.loop import make_loop
-from flight.simulation.tick import ENDS, tick
+from flight.simulation.tick import ENDS, tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows, quantised
 from flight.simulation.workspace import BLOCK_TICKS, READ_FIELDS, Workspace
 from world.errors import FlightError
@@ -117,20 +117,21 @@ class Flight:
 
     dt: of a tick, s.
     path: that it follows.
+    map: from JSBSim's positions, around area and route.
     memory: guidance's, a record of `flight.guidance.guidance_memory.GUIDANCE_MEMORY`.
     fdm: the aircraft that flies.
     """
 
     def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> None:
         limits, gains = setup.limits, load_gains(aircraft)
-        self.path = fly_by_path(setup.route, limits)
+        self.path = setup.path
         self._ground = Ground(setup.scenario.terrain)
-        self._map = LocalMap.around(setup)
+        self.map = LocalMap.around(setup)
         self._steps = round(FDM_HZ / setup.guidance_hz)
         self.dt = self._steps / FDM_HZ
         self._workspace = Workspace(gains, self.path, waypoint_records(setup.route))
         self._work = self._workspace.record
-        self._work.position_map, self._work.north_map = self._map.position.record, self._map.angle.record
+        self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
         self.memory = self._work.memory
         braking = setup.scenario.flight.motor_braking
@@ -143,7 +144,7 @@ class Flight:
         self._disturb(setup)
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
-        self._work.settings.middle = self._map.middle
+        self._work.settings.middle = self.map.middle
         self._fly = self._loop(self.fdm.loop_access())
         slow = _slowest_leg(setup, limits)
         self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / self.dt)
@@ -181,7 +182,7 @@ class Flight:
             raise FlightError(f"{setup.aircraft}: no level flight at {reference:.1f} m/s and {up:.0f} m AMSL")
         step = points[1] - points[0]
         # A map course is the true course and this.
-        turn = self._map.convergence(lat, lon)
+        turn = self.map.convergence(lat, lon)
         course = math.atan2(step[0], step[1]) - turn
         slope = math.atan2(step[2], math.hypot(step[0], step[1]))
         # A speed or a first slope that the aircraft cannot hold is the verdict's business, not the start's: it starts
@@ -259,7 +260,7 @@ class Flight:
         return make_loop(
             [access.getters[field] for field in READ_FIELDS],
             setters,
-            partial(tick, space.array, space.path, self._ground.heights),
+            partial(tick_in_block, space.block, self._ground.heights),
             space,
             access.run,
             self._steps,

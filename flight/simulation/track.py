@@ -14,6 +14,7 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int32]
 Rows = NDArray[np.record]
 
+ROLL, PITCH, YAW = range(3)  # columns of `Track.attitude`
 # Columns of `Track.controls` and `Track.commands`.
 ELEVATOR, AILERON, RUDDER, THROTTLE = range(4)
 

@@ -87,11 +87,14 @@ WORKSPACE = record_dtype(
     ("noise", NOISE, (BLOCK_TICKS,)),
     ("rows", TRACK_ROW, (BLOCK_TICKS,)),
 )
+# As many float64 as it takes the place of.
+WORKSPACE_NUMBERS = WORKSPACE.itemsize // 8
 
 
 class Workspace:
-    """One flight's record, and plain views of the parts that pass to and from JSBSim.
+    """One flight's record and path, in one block of memory, and plain views of what passes to and from JSBSim.
 
+    block: (n,) numbers, the workspace's and then the path's, for compiled code.
     array: (1,) of `WORKSPACE`, for compiled code.
     record: its one record, for Python.
     path: of `PATH_ROW`, as many as there are pieces, nodes or waypoints.
@@ -103,11 +106,13 @@ class Workspace:
     """
 
     def __init__(self, gains: Gains, path: FlyByPath, waypoints: Records) -> None:
-        self.array: Records = np.zeros(1, WORKSPACE)
+        parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
+        rows_of_path = max(map(len, parts.values()))
+        self.block: Floats = np.zeros(WORKSPACE_NUMBERS + rows_of_path * PATH_ROW.itemsize // 8)
+        self.array: Records = self.block[:WORKSPACE_NUMBERS].view(WORKSPACE)
+        self.path: Records = self.block[WORKSPACE_NUMBERS:].view(PATH_ROW)
         self.record: Record = self.array[0]
         self.record.gains = gains.record()
-        parts = {"piece": path.pieces, "node": path.nodes, "waypoint": waypoints}
-        self.path: Records = np.zeros(max(map(len, parts.values())), PATH_ROW)
         for name, rows in parts.items():
             self.path[name][: len(rows)] = rows
             setattr(self.record.settings, f"{name}s", len(rows))

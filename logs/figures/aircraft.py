@@ -85,7 +85,7 @@ def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
 
 def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     low, high = envelope.level_speed_min, envelope.level_speed_max
-    axes.fill_betweenx(envelope.amsl, low, high, color=style.PLAN, alpha=0.2, linewidth=0)
+    axes.fill_betweenx(envelope.amsl, low, high, color=style.PLANNED, alpha=0.2, linewidth=0)
     axes.plot(low, envelope.amsl, color=style.MISSILE, linestyle="--", linewidth=1.3, label="slowest: elevator full up")
     axes.plot(high, envelope.amsl, color=style.BLUE, linewidth=1.3, label="fastest: full throttle")
     _shade_guidance_speeds(axes, aircraft)

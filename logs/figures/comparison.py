@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.track import Track
+from flight.simulation.track import COLUMNS, Track
 from logs.figures.elements import style
 from logs.figures.elements.panels import Axis, Panel, Series, doubles, draw_panels
 from logs.figures.map import draw_map
@@ -31,9 +31,7 @@ class NamedFlight:
 def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
     """Draw the first flight's map and route with both tracks over it."""
     first, _ = flights
-    both = Track(
-        *(np.concatenate([getattr(flight.track, name) for flight in flights]) for name in Track.__dataclass_fields__)
-    )
+    both = Track(*(np.concatenate([getattr(flight.track, name) for flight in flights]) for name in COLUMNS))
     setup = first.setup
     paths: dict[str, Any] = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
     # The map holds both tracks; the line that joins them is taken out again.

@@ -84,7 +84,7 @@ def _limits(axes: Any, setup: FlightSetup) -> None:
 
 def _planned(axes: Any, setup: FlightSetup) -> None:
     slopes = np.degrees(leg_slopes(setup.route.waypoints))
-    ring: dict[str, Any] = {"mfc": style.PLAN, "mec": "black", "mew": 0.8, "markersize": 7.0, "zorder": 5}
+    ring: dict[str, Any] = {"mfc": style.PLANNED, "mec": "black", "mew": 0.8, "markersize": 7.0, "zorder": 5}
     axes.plot(setup.route.airspeed, slopes, "o", label="legs as planned (over the ground)", **ring)
 
 

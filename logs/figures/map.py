@@ -151,7 +151,13 @@ def _paths(axes: Any, route: Floats, plan: Floats | None, placer: LabelPlacer) -
         handles.append(line[0])
     label = "route of the mission" if plan is None or differs else "planned path"
     line = axes.plot(
-        route[:, 0], route[:, 1], color=style.PLAN, linewidth=3.6, solid_joinstyle="round", zorder=5, path_effects=halo
+        route[:, 0],
+        route[:, 1],
+        color=style.PLANNED,
+        linewidth=3.6,
+        solid_joinstyle="round",
+        zorder=5,
+        path_effects=halo,
     )
     line[0].set_label(label)
     placer.avoid(route[:, 0], route[:, 1])

@@ -19,7 +19,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
 from logs.figures.map import draw_map
-from logs.verdict.measures.leg_numbers import with_legs
+from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]
@@ -59,7 +59,7 @@ class MovieFrames:
 
     def frames(self) -> Iterator[Pixels]:
         """Each frame as (height, width, 3); both even, as video formats want them."""
-        setup, track = self.setup, with_legs(self.setup, self.track)
+        setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
         figure = draw_map(
             setup.scenario, plan_waypoints=None, route_waypoints=setup.route.waypoints, track=None, verdict=None
         )

@@ -125,7 +125,7 @@ def _ground(axes: Any, scenario: Scenario, distance: Floats, ground: Floats | No
 
 def _plan(axes: Any, at: Floats, route: Floats) -> list[Any]:
     kilometres = at / 1000.0
-    line = axes.plot(kilometres, route[:, 2], color=style.PLAN, linewidth=3.6, zorder=5, label="planned heights")
+    line = axes.plot(kilometres, route[:, 2], color=style.PLANNED, linewidth=3.6, zorder=5, label="planned heights")
     look: dict[str, Any] = {
         "color": "white",
         "markeredgecolor": style.BLUE,

@@ -18,7 +18,7 @@ from logs.figures.elements import style
 from logs.figures.elements.failures import Failures, failures, route_distance, route_samples
 from logs.figures.elements.labels import LabelPlacer
 from logs.figures.elements.legend import draw_legend, failing_handles
-from logs.figures.elements.scene_data import GroundGrid, exaggeration, ground_grid, scene_bounds, track_rows
+from logs.figures.elements.scene_data import GroundGrid, drawn_positions, exaggeration, ground_grid, scene_bounds
 from logs.verdict.findings import Verdict
 from world.terrain import Terrain
 
@@ -221,10 +221,10 @@ def _paths(
     for leg in failed.legs:
         ends = projection.project(route[leg : leg + 2])
         axes.plot(ends[:, 0], ends[:, 1], color=style.FAIL, linewidth=9.0, alpha=0.9, zorder=4.5, solid_capstyle="butt")
-    _line(axes, projection, terrain, samples, style.PLAN, 3.6, 5)
-    handles: list[Any] = [Line2D([], [], color=style.PLAN, linewidth=3.6, label="planned path")]
+    _line(axes, projection, terrain, samples, style.PLANNED, 3.6, 5)
+    handles: list[Any] = [Line2D([], [], color=style.PLANNED, linewidth=3.6, label="planned path")]
     if track is not None:
-        _line(axes, projection, terrain, track_rows(track), style.FLOWN, 1.2, 6)
+        _line(axes, projection, terrain, drawn_positions(track), style.FLOWN, 1.2, 6)
         handles.append(Line2D([], [], color=style.FLOWN, linewidth=1.2, label="flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)

@@ -65,8 +65,8 @@ def draw_turns(name: str, verdict: Verdict) -> Figure:
             _bars(axes, values, rule)
             axes.set_ylabel(title)
             axes.set_xlabel(place, labelpad=1.0)
-        words = f"{style.shorten(name, 60)}: turn by turn, leg by leg"
-        figure.text(_LEFT / style.WIDTH, 1 - 0.28 / total, words, fontsize=11, fontweight="bold", va="center")
+        heading = f"{style.shorten(name, 60)}: turn by turn, leg by leg"
+        figure.text(_LEFT / style.WIDTH, 1 - 0.28 / total, heading, fontsize=11, fontweight="bold", va="center")
         draw_legend(figure, _handles(any(v.ok is False for *_, values in shown for v in values)), _LEFT, 0.3 / total)
     return figure
 
@@ -74,7 +74,7 @@ def draw_turns(name: str, verdict: Verdict) -> Figure:
 def _bars(axes: Any, values: list[PlaceValue], rule: str) -> None:
     numbers = [value.number for value in values]
     small = 3.0 if len(values) > _NUMBERED else 5.5
-    axes.bar(numbers, [value.planned for value in values], width=0.62, color=style.PLAN, zorder=2)
+    axes.bar(numbers, [value.planned for value in values], width=0.62, color=style.PLANNED, zorder=2)
     axes.plot(numbers, [value.flown for value in values], "o", color=style.FLOWN, markersize=small, zorder=4)
     axes.hlines(
         [value.limit for value in values],
@@ -118,7 +118,7 @@ def _zoom(axes: Any, values: list[PlaceValue], rule: str) -> None:
 def _handles(failing: bool) -> list[Any]:
     ring: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 9, "mfc": "none", "markeredgewidth": 2.0}
     handles: list[Any] = [
-        Patch(color=style.PLAN, label="planned"),
+        Patch(color=style.PLANNED, label="planned"),
         Line2D([], [], marker="o", linestyle="", color=style.FLOWN, markersize=5.5, label="flown"),
         Line2D([], [], color=style.MISSILE, linewidth=2.0, label="limit"),
     ]

@@ -6,14 +6,14 @@
 from pathlib import PurePath
 from typing import Final
 
-SETUP: Final = "setup.json"
-SCENARIO: Final = "scenario.json"
-PLAN: Final = "plan.json"
-MISSION: Final = "mission.waypoints"
-TERRAIN: Final = "terrain.json"
-VERDICT: Final = "verdict.json"
-RESULT: Final = "result.json"
-RECOVERY: Final = "recovery.json"
+SETUP_FILE: Final = "setup.json"
+SCENARIO_FILE: Final = "scenario.json"
+PLAN_FILE: Final = "plan.json"
+MISSION_FILE: Final = "mission.waypoints"
+TERRAIN_FILE: Final = "terrain.json"
+VERDICT_FILE: Final = "verdict.json"
+RESULT_FILE: Final = "result.json"
+RECOVERY_FILE: Final = "recovery.json"
 
 _MEDIA_TYPES: Final = {
     ".json": "application/json",

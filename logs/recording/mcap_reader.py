@@ -109,14 +109,14 @@ def records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
         at = end
 
 
-def stream(content: bytes) -> ReadDataStream:
+def record_stream(content: bytes) -> ReadDataStream:
     """Wrap one record's content as what mcap's record classes read from."""
     return ReadDataStream(BytesIO(content))
 
 
 def _chunk(content: bytes, at: int) -> bytes:
     try:
-        chunk = Chunk.read(stream(content))
+        chunk = Chunk.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the chunk at byte {at:,} cannot be read") from error
     size = chunk.uncompressed_size
@@ -144,7 +144,7 @@ def _chunk(content: bytes, at: int) -> bytes:
 
 def _attachment(content: bytes, at: int, found: Container) -> None:
     try:
-        attachment = Attachment.read(stream(content))
+        attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the attachment at byte {at:,} cannot be read") from error
     if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
@@ -157,7 +157,7 @@ def _attachment(content: bytes, at: int, found: Container) -> None:
 
 def _data_end(content: bytes, at: int, crc: int) -> None:
     try:
-        stated = DataEnd.read(stream(content)).data_section_crc
+        stated = DataEnd.read(record_stream(content)).data_section_crc
     except PARSE_ERRORS as error:
         raise _Damage(f"the end record at byte {at:,} cannot be read") from error
     # A writer may leave the CRC out, as 0; chunks and attachments have their own.
@@ -175,7 +175,7 @@ def _summary(file: BinaryIO) -> None:
             break
         crc = zlib.crc32(content, zlib.crc32(head, crc))
     try:
-        footer = Footer.read(stream(content))
+        footer = Footer.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the footer at byte {at:,} cannot be read") from error
     if footer.summary_crc not in (0, zlib.crc32(content[:-4], zlib.crc32(head, crc))):

@@ -29,7 +29,7 @@ from mcap.records import (
 )
 from numpy.typing import NDArray
 
-from logs.recording.mcap_reader import FRAME, MAGIC, records, stream
+from logs.recording.mcap_reader import FRAME, MAGIC, record_stream, records
 
 Index = NDArray[np.uint64]
 _MESSAGE = struct.Struct("<HIQ")
@@ -138,10 +138,10 @@ class ContainerWriter:
         index: dict[int, list[tuple[int, int]]] = {}
         for opcode, at, content in records(data):
             if opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream(content))
+                schema = Schema.read(record_stream(content))
                 self._schemas.setdefault(f"{schema.id}", schema)
             elif opcode == Opcode.CHANNEL:
-                channel = Channel.read(stream(content))
+                channel = Channel.read(record_stream(content))
                 if all(channel.id != known.id for known in self._channels):
                     self._channels.append(channel)
             elif opcode == Opcode.MESSAGE:

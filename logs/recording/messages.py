@@ -9,7 +9,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
 from mcap.records import Message as MessageRecord
 
-from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks, records, stream
+from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,15 +80,15 @@ def log_channels(path: Path) -> list[LogChannel]:
 def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
     for opcode, _, content in records(data):
         if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream(content))
+            schema = Schema.read(record_stream(content))
             schemas[schema.id] = schema
         elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream(content))
+            channel = Channel.read(record_stream(content))
             if channel.id not in channels:
                 known = schemas[channel.schema_id]
                 channels[channel.id] = LogChannel(
                     channel.topic, channel.message_encoding, known.name, known.encoding, known.data
                 )
         elif opcode == Opcode.MESSAGE:
-            message = MessageRecord.read(stream(content), len(content))
+            message = MessageRecord.read(record_stream(content), len(content))
             yield LogMessage(channels[message.channel_id], message.log_time, message.data)

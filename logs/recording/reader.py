@@ -17,24 +17,23 @@ from mcap.records import Channel, Schema
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.attachment_names import RECOVERY, RESULT, SETUP, VERDICT
+from logs.recording.attachment_names import RECOVERY_FILE, RESULT_FILE, SETUP_FILE, VERDICT_FILE
+from logs.recording.chunk_layout import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.foxglove_scene import LEVELS
-from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, stream
+from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream
 from logs.recording.recorder import LONGEST
 from logs.recording.setup_attachments import unpack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
     LOG_NAME,
-    MESSAGE_HEADER,
     RECORD,
-    RECORD_HEADER,
     STATE_NAME,
     STATE_TOPIC,
     RowMatcher,
-    Rows,
+    StateRecords,
     decode_rows,
-    join_rows,
+    join_records,
     parse_row,
     state_class,
 )
@@ -88,7 +87,7 @@ class _MessageCollector:
     """Collects state rows and events from the bytes of chunks."""
 
     def __init__(self) -> None:
-        self.parts: list[Rows] = []
+        self.parts: list[StateRecords] = []
         self.events: list[LogEvent] = []
         self.chunks = 0
         self._schemas: dict[int, str] = {0: ""}
@@ -103,7 +102,7 @@ class _MessageCollector:
         at = 0
         while at < len(data):
             opcode, length = FRAME.unpack_from(data, at)
-            start = at + RECORD_HEADER
+            start = at + FRAME_SIZE
             end = start + length
             if end > len(data):
                 raise ValueError("a record reaches beyond its chunk")
@@ -113,10 +112,10 @@ class _MessageCollector:
                 at = self._message(data, at, start, end)
                 continue
             if opcode == Opcode.SCHEMA:
-                schema = Schema.read(stream(data[start:end]))
+                schema = Schema.read(record_stream(data[start:end]))
                 self._schemas[schema.id] = schema.name
             elif opcode == Opcode.CHANNEL:
-                self._channel(Channel.read(stream(data[start:end])))
+                self._channel(Channel.read(record_stream(data[start:end])))
             at = end
 
     def _channel(self, channel: Channel) -> None:
@@ -145,9 +144,9 @@ class _MessageCollector:
             self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))
         return end
 
-    def rows(self) -> Rows:
+    def rows(self) -> StateRecords:
         """All state rows in the order of the file, (t,) of `RECORD`."""
-        return join_rows(self.parts, RECORD)
+        return join_records(self.parts, RECORD)
 
 
 def read_log(path: Path) -> FlightLog:
@@ -180,7 +179,7 @@ def read_log(path: Path) -> FlightLog:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
     if not messages.chunks:
         raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}")
-    if SETUP not in found.attachments and found.problem:
+    if SETUP_FILE not in found.attachments and found.problem:
         raise LogError(f"{path}: holds no setup: {found.problem}")
     stored = unpack_setup(found.attachments, str(path))
     rows, fault = _good_rows(messages.rows(), len(stored.setup.route.waypoints))
@@ -189,8 +188,8 @@ def read_log(path: Path) -> FlightLog:
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
     lost = fault or found.problem
-    recovered = not lost and RECOVERY in found.attachments
-    lost = _loss(found.attachments[RECOVERY]) if recovered else lost or wrong or garbled
+    recovered = not lost and RECOVERY_FILE in found.attachments
+    lost = _loss(found.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
@@ -214,7 +213,7 @@ def _check_magic(magic: bytes, path: Path) -> None:
         raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected")
 
 
-def _good_rows(rows: Rows, waypoints: int) -> tuple[Rows, str]:
+def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:
     """Keep the rows before the first that cannot follow the one before it; and say what is wrong with that one."""
     state = rows["state"]
     time = state["time_s"]
@@ -235,12 +234,12 @@ def _good_rows(rows: Rows, waypoints: int) -> tuple[Rows, str]:
 
 def _result(attachments: dict[str, bytes], rows: int) -> tuple[str | None, str]:
     """How the flight ended, and what is wrong with that."""
-    if RESULT not in attachments:
+    if RESULT_FILE not in attachments:
         return None, "the recording stopped before the flight had ended"
-    data = _object(attachments[RESULT])
+    data = _object(attachments[RESULT_FILE])
     ended = data.get("ended")
     if not isinstance(ended, str):
-        return None, f"{RESULT} does not say how the flight ended"
+        return None, f"{RESULT_FILE} does not say how the flight ended"
     if data.get("rows") != rows:
         return ended, f"{rows} of {data.get('rows')} rows are there"
     return ended, ""
@@ -253,10 +252,10 @@ def _loss(recovery: bytes) -> str:
 
 
 def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]:
-    if VERDICT not in attachments:
+    if VERDICT_FILE not in attachments:
         return None, ""
-    verdict = _object(attachments[VERDICT])
-    return (verdict, "") if verdict else (None, f"{VERDICT} is not a JSON object")
+    verdict = _object(attachments[VERDICT_FILE])
+    return (verdict, "") if verdict else (None, f"{VERDICT_FILE} is not a JSON object")
 
 
 def _object(data: bytes) -> dict[str, Any]:

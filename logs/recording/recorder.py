@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
-from logs.recording.attachment_names import RESULT, VERDICT, media_type
+from logs.recording.attachment_names import RESULT_FILE, VERDICT_FILE, media_type
 from logs.recording.chunk_layout import (
     CHUNK,
     NOT_INCREASING,
@@ -127,11 +127,16 @@ class Recorder:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close the file, without a result if `finish` was not called."""
-        if not self._open:
-            return
-        # The first error is the one to report, not a full disk met again while closing.
-        with contextlib.suppress(OSError) if kind is not None else contextlib.nullcontext():
+        if kind is not None:
+            self.abandon()
+        elif self._open:
             self._close()
+
+    def abandon(self) -> None:
+        """Close the file after an error, without a result: that error is the one to report, not one of closing."""
+        if self._open:
+            with contextlib.suppress(OSError):
+                self._close()
 
     def write(self, block: Track) -> None:
         """Append rows.  Raises ValueError unless their times increase, from 0 on, across all blocks."""
@@ -191,14 +196,14 @@ class Recorder:
         end = max(self._last_ns, EPOCH_NS)
         self._write([self._poses.whole(end)])
         if verdict is not None:
-            self._attach(VERDICT, verdict_json(verdict).encode(), end)
+            self._attach(VERDICT_FILE, verdict_json(verdict).encode(), end)
         result = {
             "schema": RESULT_SCHEMA,
             "ended": ended,
             "rows": self._written,
             "end_time_s": (end - EPOCH_NS) / 1e9,
         }
-        self._attach(RESULT, (json.dumps(result, indent=1) + "\n").encode(), end)
+        self._attach(RESULT_FILE, (json.dumps(result, indent=1) + "\n").encode(), end)
         self._close()
 
     def _begin(self, attachments: dict[str, bytes], setup: FlightSetup) -> None:

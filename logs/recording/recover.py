@@ -8,7 +8,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from logs.recording.attachment_names import RECOVERY, RESULT, VERDICT, media_type
+from logs.recording.attachment_names import RECOVERY_FILE, RESULT_FILE, VERDICT_FILE, media_type
 from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.mcap_writer import ContainerWriter
 from logs.recording.reader import FlightLog, read_log
@@ -48,7 +48,7 @@ def recover_log(path: Path) -> Recovered | None:
     out = io.BytesIO()
     writer = ContainerWriter(out, PROFILE)
     for name, data in found.attachments.items():
-        if name not in (RESULT, VERDICT, RECOVERY):
+        if name not in (RESULT_FILE, VERDICT_FILE, RECOVERY_FILE):
             media, stamp = found.media[name]
             writer.attach(name, media, data, stamp)
     for chunk in chunks:
@@ -59,7 +59,7 @@ def recover_log(path: Path) -> Recovered | None:
             break
     note = {"schema": RECOVERY_SCHEMA, "lost": log.lost, "rows": len(log.track), "end_time_s": log.end_time}
     text = (json.dumps(note, indent=1) + "\n").encode()
-    writer.attach(RECOVERY, media_type(RECOVERY), text, writer.last_time)
+    writer.attach(RECOVERY_FILE, media_type(RECOVERY_FILE), text, writer.last_time)
     writer.finish()
     return Recovered(out.getvalue(), log)
 

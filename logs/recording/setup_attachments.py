@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError
 
 from flight.simulation.flight_setup import FlightSetup, make_limits
-from logs.recording.attachment_names import MISSION, PLAN, SCENARIO, SETUP, TERRAIN
+from logs.recording.attachment_names import MISSION_FILE, PLAN_FILE, SCENARIO_FILE, SETUP_FILE, TERRAIN_FILE
 from logs.recording.setup_schema import (
     EnvelopeFile,
     Finite,
@@ -26,7 +26,7 @@ from logs.recording.setup_schema import (
     envelope_file,
     mission_file,
     read_envelope,
-    read_mission,
+    read_mission_table,
     read_route,
     route_file,
 )
@@ -38,7 +38,7 @@ from world.scenario_file import first_error
 from world.scenario_tables import Guidance, Navigation
 from world.terrain import Terrain
 
-SCHEMA = "planfly.log/1"
+LOG_SCHEMA = "planfly.log/1"
 _PACKAGES = (
     "planfly",
     "jsbsim",
@@ -57,7 +57,7 @@ _PACKAGES = (
 
 
 class _Setup(SetupModel):
-    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{SCHEMA}$")] = SCHEMA
+    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{LOG_SCHEMA}$")] = LOG_SCHEMA
     aircraft: str
     airspeed_mps: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     max_bank_rad: Annotated[float, Field(gt=0.0, lt=math.pi / 2)]
@@ -108,16 +108,16 @@ def _find_versions() -> dict[str, str]:
 
 
 def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
-    """Pack all that a log needs of a setup as attachments, bytes by name, `SETUP` first.
+    """Pack all that a log needs of a setup as attachments, bytes by name, `SETUP_FILE` first.
 
     The same setup and packages give the same bytes.
     """
     attachments = {
-        SCENARIO: _json(setup.scenario.to_json()),
-        MISSION: setup.mission_text.encode(),
+        SCENARIO_FILE: _json(setup.scenario.to_json()),
+        MISSION_FILE: setup.mission_text.encode(),
     }
     if setup.plan is not None:
-        attachments[PLAN] = plan_json(setup.plan).encode()
+        attachments[PLAN_FILE] = plan_json(setup.plan).encode()
     if setup.scenario.terrain is not None:
         attachments |= pack_terrain(setup.scenario.terrain)
     file = _Setup(
@@ -136,7 +136,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         versions=package_versions(),
         sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
-    return {SETUP: _json(file.model_dump(by_alias=True)), **attachments}
+    return {SETUP_FILE: _json(file.model_dump(by_alias=True)), **attachments}
 
 
 def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
@@ -145,31 +145,31 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     attachments: by name.  source: names the log in messages.  Raises LogError, in one line, for one that is missing,
     altered or does not fit.
     """
-    if SETUP not in attachments:
-        raise LogError(f"{source}: no {SETUP}: not a planfly flight log, or cut off before its first second")
+    if SETUP_FILE not in attachments:
+        raise LogError(f"{source}: no {SETUP_FILE}: not a planfly flight log, or cut off before its first second")
     try:
-        file = _Setup.model_validate_json(attachments[SETUP])
+        file = _Setup.model_validate_json(attachments[SETUP_FILE])
     except ValidationError as error:
-        raise LogError(f"{source}: {SETUP}: {first_error(error)}") from error
+        raise LogError(f"{source}: {SETUP_FILE}: {first_error(error)}") from error
     for name, digest in file.sha256.items():
         if name not in attachments:
-            raise LogError(f"{source}: {name}: missing; {SETUP} lists it")
+            raise LogError(f"{source}: {name}: missing; {SETUP_FILE} lists it")
         if hashlib.sha256(attachments[name]).hexdigest() != digest:
-            raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP}")
+            raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}")
     listed = {name: attachments[name] for name in file.sha256}
-    terrain = unpack_terrain(listed, source) if TERRAIN in listed else None
+    terrain = unpack_terrain(listed, source) if TERRAIN_FILE in listed else None
     scenario = _scenario(listed, source, terrain, file.external)
-    envelope = read_envelope(file.envelope, f"{source}: {SETUP}")
+    envelope = read_envelope(file.envelope, f"{source}: {SETUP_FILE}")
     setup = FlightSetup(
         scenario=scenario,
-        mission=read_mission(file.mission),
-        mission_text=_text(listed, MISSION, source),
-        route=read_route(file.route, f"{source}: {SETUP}"),
+        mission=read_mission_table(file.mission),
+        mission_text=_text(listed, MISSION_FILE, source),
+        route=read_route(file.route, f"{source}: {SETUP_FILE}"),
         limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),
         aircraft=file.aircraft,
         battery=file.battery_wh,
         seed=file.seed,
-        plan=_plan(listed, source, terrain) if PLAN in listed else None,
+        plan=_plan(listed, source, terrain) if PLAN_FILE in listed else None,
         guidance=file.guidance,
         nav=file.nav,
         guidance_hz=file.guidance_hz,
@@ -202,9 +202,9 @@ def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
 
 
 def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
-    where = f"{source}: {SCENARIO}"
+    where = f"{source}: {SCENARIO_FILE}"
     try:
-        spec = json.loads(_text(attachments, SCENARIO, source))
+        spec = json.loads(_text(attachments, SCENARIO_FILE, source))
     except (ValueError, RecursionError) as error:
         raise LogError(f"{where}: not valid JSON: {error}") from error
     _refuse_outside_terrain(spec, terrain, where)
@@ -215,8 +215,8 @@ def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | Non
 
 
 def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
-    where = f"{source}: {PLAN}"
-    text = _text(attachments, PLAN, source)
+    where = f"{source}: {PLAN_FILE}"
+    text = _text(attachments, PLAN_FILE, source)
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
@@ -233,4 +233,4 @@ def _refuse_outside_terrain(spec: Any, terrain: Terrain | None, where: str) -> N
     table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = table.get("kind") if isinstance(table, dict) else None
     if terrain is None and kind != "none":
-        raise LogError(f"{where}: terrain.kind: {kind!r}: the log holds no {TERRAIN}")
+        raise LogError(f"{where}: terrain.kind: {kind!r}: the log holds no {TERRAIN_FILE}")

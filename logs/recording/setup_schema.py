@@ -13,6 +13,7 @@ from aircraft.envelope import Envelope
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
 from world.errors import LogError
+from world.geometry import leg_runs
 
 Floats = NDArray[np.float64]
 
@@ -60,7 +61,7 @@ class RouteFile(SetupModel):
     """A `Route` as a table: a value a waypoint, and a value a leg for airspeed."""
 
     waypoints_east_north_amsl_m: Annotated[
-        list[Annotated[list[Finite], Field(min_length=3, max_length=3)]], Field(min_length=1)
+        list[Annotated[list[Finite], Field(min_length=3, max_length=3)]], Field(min_length=2)
     ]
     airspeed_mps: list[Finite]
     acceptance_m: Column
@@ -124,7 +125,7 @@ def mission_file(mission: Mission) -> MissionFile:
     )
 
 
-def read_mission(file: MissionFile) -> Mission:
+def read_mission_table(file: MissionFile) -> Mission:
     """Read the mission of a table."""
     return Mission(
         home=None if file.home is None else Home(file.home.lat_deg, file.home.lon_deg, file.home.amsl_m),
@@ -152,8 +153,11 @@ def route_file(route: Route) -> RouteFile:
 
 
 def read_route(file: RouteFile, source: str) -> Route:
-    """Read the route of a table.  Raises LogError for arrays that do not fit each other."""
-    count = len(file.waypoints_east_north_amsl_m)
+    """Read the route of a table.  Raises LogError for arrays that do not fit each other, and legs without length."""
+    waypoints = np.array(file.waypoints_east_north_amsl_m, dtype=np.float64)
+    if not (leg_runs(waypoints) > 0.0).all():
+        raise LogError(f"{source}: route.waypoints_east_north_amsl_m: a leg without horizontal length")
+    count = len(waypoints)
     wanted = {"airspeed_mps": count - 1, "acceptance_m": count, "fly_over": count, "items": count}
     if file.arcs_m:
         wanted["arcs_m"] = count
@@ -161,7 +165,7 @@ def read_route(file: RouteFile, source: str) -> Route:
         if len(getattr(file, name)) != length:
             raise LogError(f"{source}: route.{name}: {len(getattr(file, name))} values: {length} are expected")
     return Route(
-        waypoints=np.array(file.waypoints_east_north_amsl_m, dtype=np.float64),
+        waypoints=waypoints,
         airspeed=np.array(file.airspeed_mps, dtype=np.float64),
         acceptance=np.array(file.acceptance_m, dtype=np.float64),
         fly_over=np.array(file.fly_over, dtype=np.bool_),

@@ -12,6 +12,7 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from numpy.typing import NDArray
 
 from flight.simulation.track import COLUMNS, Track
+from logs.recording.chunk_layout import MESSAGE_HEADER, MESSAGE_OPCODE
 from world.kernels import compiled
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from google.protobuf.message import Message
 
 Bytes = NDArray[np.uint8]
-Rows = NDArray[np.void]
+StateRecords = NDArray[np.void]
 
 # log_time of simulation time 0: 2000-01-01T00:00:00Z in ns since 1970.  Not 0, which MCAP reads as "no messages".
 EPOCH_NS = 946_684_800_000_000_000
@@ -119,7 +120,7 @@ def _layout() -> tuple[np.dtype[np.void], dict[str, int]]:
 
 
 STATE_FILE = _file()
-STATE, _TAGS = _layout()
+STATE_BODY, _TAGS = _layout()
 # One MCAP message record of this channel, header included.
 RECORD = np.dtype(
     [
@@ -129,12 +130,9 @@ RECORD = np.dtype(
         ("sequence", "<u4"),
         ("log_time", "<u8"),
         ("publish_time", "<u8"),
-        ("state", STATE),
+        ("state", STATE_BODY),
     ]
 )
-RECORD_HEADER = 9
-MESSAGE_HEADER = RECORD.itemsize - RECORD_HEADER - STATE.itemsize
-MESSAGE_OPCODE = 5
 
 
 def state_class() -> "type[Message]":
@@ -171,10 +169,10 @@ def times_ns(time: NDArray[np.float64]) -> NDArray[np.int64]:
     return np.rint(time * 1e9).astype(np.int64) + EPOCH_NS
 
 
-def _template() -> Rows:
-    row: Rows = np.zeros(1, dtype=RECORD)
+def _template() -> StateRecords:
+    row: StateRecords = np.zeros(1, dtype=RECORD)
     row["opcode"] = MESSAGE_OPCODE
-    row["length"] = MESSAGE_HEADER + STATE.itemsize
+    row["length"] = MESSAGE_HEADER + STATE_BODY.itemsize
     for name, tag in _TAGS.items():
         row["state"][name] = tag
     return row
@@ -183,13 +181,13 @@ def _template() -> Rows:
 _TEMPLATE = _template()
 
 
-def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> Rows:
+def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> StateRecords:
     """Encode flown rows, (t,) of `flight.simulation.track.TRACK_ROW`, as MCAP message records (t,) of `RECORD`.
 
     first_row: the number of the first row in the whole flight.  channel: the MCAP channel.
     """
     log_times = times_ns(rows["time"])
-    records: Rows = np.repeat(_TEMPLATE, len(rows))
+    records: StateRecords = np.repeat(_TEMPLATE, len(rows))
     numbers = np.arange(first_row, first_row + len(rows)).astype(np.uint32)
     records["channel"] = channel
     records["sequence"] = numbers
@@ -203,14 +201,14 @@ def encode_rows(rows: NDArray[np.record], first_row: int, channel: int) -> Rows:
     return records
 
 
-def join_rows(parts: list[Rows], kind: np.dtype[np.void]) -> Rows:
+def join_records(parts: list[StateRecords], kind: np.dtype[np.void]) -> StateRecords:
     """Join arrays of one structured type; as bytes, since numpy compares structured types name by name."""
     if not parts:
         return np.zeros(0, dtype=kind)
     return np.concatenate([np.ascontiguousarray(part).view(np.uint8) for part in parts]).view(kind)
 
 
-def decode_rows(records: Rows) -> Track:
+def decode_rows(records: StateRecords) -> Track:
     """Decode message records, (t,) of `RECORD`, to the track that they hold."""
     rows = records["state"]
     columns: dict[str, list[NDArray[np.generic]]] = {name: [] for name in COLUMNS}
@@ -219,7 +217,7 @@ def decode_rows(records: Rows) -> Track:
     return Track(*(parts[0] if len(parts) == 1 else np.stack(parts, axis=1) for parts in columns.values()))  # type: ignore[arg-type]  # one array a field, typed by Track
 
 
-def parse_row(data: bytes, parser: "type[Message]") -> Rows:
+def parse_row(data: bytes, parser: "type[Message]") -> StateRecords:
     """Read one message in any layout that protobuf allows, as (1,) of `RECORD`.
 
     Raises google.protobuf.message.DecodeError.
@@ -248,14 +246,14 @@ class RowMatcher:
         """channel: the MCAP channel of the state messages in this file."""
         sample = _TEMPLATE.copy()
         sample["channel"] = channel
-        fixed: Rows = np.zeros(1, dtype=RECORD)
+        fixed: StateRecords = np.zeros(1, dtype=RECORD)
         fixed["opcode"], fixed["length"], fixed["channel"] = 0xFF, 0xFFFF_FFFF_FFFF_FFFF, 0xFFFF
         for name, tag in _TAGS.items():
             fixed["state"][name] = 0xFF if tag < 256 else 0xFFFF
         self._columns = np.flatnonzero(fixed.view(np.uint8))
         self._expected = sample.view(np.uint8)[self._columns]
 
-    def match(self, data: bytes, offset: int) -> Rows:
+    def match(self, data: bytes, offset: int) -> StateRecords:
         """Give the records that follow each other from ``offset`` on and have the layout, (n,) of `RECORD`."""
         count = (len(data) - offset) // RECORD.itemsize
         raw = np.frombuffer(data, np.uint8, count * RECORD.itemsize, offset).reshape(count, RECORD.itemsize)

@@ -13,14 +13,14 @@ import zstandard
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from logs.recording.attachment_names import TERRAIN, heights_name
+from logs.recording.attachment_names import TERRAIN_FILE, heights_name
 from world.errors import LogError
 from world.frames import MOST_TERMS, PolyMap
 from world.raster import MOST_PIXELS
 from world.scenario_file import first_error
 from world.terrain import Terrain
 
-SCHEMA = "planfly.terrain/1"
+TERRAIN_SCHEMA = "planfly.terrain/1"
 _ENCODING = "float32 bits, difference to the west modulo 2^32, byte planes (low first), zstd"
 _PART_PIXELS = 4 * 2**20
 
@@ -31,7 +31,7 @@ _Finite = Annotated[float, Field(allow_inf_nan=False)]
 class _File(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
-    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{SCHEMA}$")] = SCHEMA
+    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{TERRAIN_SCHEMA}$")] = TERRAIN_SCHEMA
     encoding: Annotated[str, Field(max_length=200)] = _ENCODING
     rows: Annotated[int, Field(ge=2)]
     cols: Annotated[int, Field(ge=2, le=_PART_PIXELS)]
@@ -48,7 +48,7 @@ class _File(BaseModel):
 
 
 def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
-    """Pack the terrain as attachments, bytes by name: `TERRAIN`, and the heights in parts."""
+    """Pack the terrain as attachments, bytes by name: `TERRAIN_FILE`, and the heights in parts."""
     rows, cols = terrain.heights.shape
     parts = {}
     for k, (first, last) in enumerate(_row_blocks(rows, cols)):
@@ -66,7 +66,7 @@ def pack_terrain(terrain: Terrain) -> dict[str, bytes]:
         parts=list(parts),
     )
     text = json.dumps(file.model_dump(by_alias=True), indent=1)
-    return {TERRAIN: text.encode(), **parts}
+    return {TERRAIN_FILE: text.encode(), **parts}
 
 
 def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
@@ -76,14 +76,14 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     heights that are missing, damaged or of another size, and for a map that is none.
     """
     try:
-        file = _File.model_validate_json(attachments[TERRAIN])
+        file = _File.model_validate_json(attachments[TERRAIN_FILE])
     except ValidationError as error:
-        raise LogError(f"{source}: {TERRAIN}: {first_error(error)}") from error
+        raise LogError(f"{source}: {TERRAIN_FILE}: {first_error(error)}") from error
     if file.rows * file.cols > MOST_PIXELS:
-        raise LogError(f"{source}: {TERRAIN}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read")
+        raise LogError(f"{source}: {TERRAIN_FILE}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read")
     blocks = _row_blocks(file.rows, file.cols)
     if len(blocks) != len(file.parts) or any(name not in attachments for name in file.parts):
-        raise LogError(f"{source}: {TERRAIN}: parts: {len(blocks)} are expected, each in the log")
+        raise LogError(f"{source}: {TERRAIN_FILE}: parts: {len(blocks)} are expected, each in the log")
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
         heights[first:last] = _unpack(attachments[name], last - first, file.cols, f"{source}: {name}")
@@ -127,7 +127,8 @@ def _unpack(data: bytes, rows: int, cols: int, where: str) -> NDArray[Any]:
 def _coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
-        raise LogError(f"{source}: {TERRAIN}: map_to_pixel: {len(rows)} rows of {size}: 2 + 2n rows of n are expected")
+        found = f"{len(rows)} rows of {size}"
+        raise LogError(f"{source}: {TERRAIN_FILE}: map_to_pixel: {found}: 2 + 2n rows of n are expected")
     if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
-        raise LogError(f"{source}: {TERRAIN}: map_to_pixel: half-widths {rows[1][:2]}: not above 0")
+        raise LogError(f"{source}: {TERRAIN_FILE}: map_to_pixel: half-widths {rows[1][:2]}: not above 0")
     return np.array(rows)

@@ -5,15 +5,14 @@ A frame is a function of the log and the time alone: the same log and time give 
 
 import bisect
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.control_limits import control_limits
 from logs.recording.reader import FlightLog
-from logs.replay.timeline import TimelineEntry, timeline, waypoint_name
-from logs.verdict.measures.leg_numbers import with_legs
+from logs.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
 
 Floats = NDArray[np.float64]
 
@@ -156,13 +155,13 @@ def make_instruments(log: FlightLog) -> Instruments:
     >>> print(frame[5])
     |                         |  height       200 m AMSL, 100 m above ground
     """
-    log = replace(log, track=with_legs(log.setup, log.track))
+    log = log_with_legs(log)
     terrain = log.setup.scenario.terrain
     position = log.track.position
     ground = np.full(len(log.track), math.nan)
     if terrain is not None:
         ground = np.asarray(terrain.height(position[:, 0], position[:, 1]), dtype=np.float64)
-    return Instruments(log, tuple(timeline(log)), ground, tuple(control_limits(log.setup.aircraft)))
+    return Instruments(log, tuple(timeline_of_legs(log)), ground, tuple(control_limits(log.setup.aircraft)))
 
 
 def _printable(text: str) -> str:

@@ -16,7 +16,7 @@ from flight.mission.route import Route
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
 from logs.verdict.measures.along_track import Passage, passages, segment_clearances
-from logs.verdict.measures.leg_numbers import with_legs
+from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 
@@ -58,7 +58,16 @@ def timeline(log: FlightLog) -> list[TimelineEntry]:
     20.0 turn - turn left 14.0° at waypoint 1 (item 2), peak bank 0.0°
     20.0 leg - leg 1 to waypoint 2 (item 3): course 076°, 412 m, slope +2.8°, 25.0 m/s
     """
-    log = replace(log, track=with_legs(log.setup, log.track))
+    return timeline_of_legs(log_with_legs(log))
+
+
+def log_with_legs(log: FlightLog) -> FlightLog:
+    """The log with its track's legs found from the track, whatever was recorded."""
+    return replace(log, track=with_legs(log.track, find_leg_ends(log.setup, log.track)))
+
+
+def timeline_of_legs(log: FlightLog) -> list[TimelineEntry]:
+    """As `timeline`, of a log from `log_with_legs`."""
     parts = _leg_rows(log.track, log.setup.route)
     entries = [_start(log)]
     entries += _legs(log, parts)
@@ -93,12 +102,12 @@ def _printable(text: str) -> str:
 
 
 def _leg_rows(track: Track, route: Route) -> list[_LegRows]:
-    """Cut the track where the leg changes, and leave out rows on no leg of the route."""
+    """Split the track where the leg changes, and leave out rows on no leg of the route."""
     edges = np.flatnonzero(np.diff(track.leg)) + 1
     starts = [0, *edges.tolist()]
     stops = [*edges.tolist(), len(track)]
-    cut = [_LegRows(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
-    return [part for part in cut if 0 <= part.leg < route.legs]
+    parts = [_LegRows(int(track.leg[a]), a, b - 1) for a, b in zip(starts, stops, strict=True)]
+    return [part for part in parts if 0 <= part.leg < route.legs]
 
 
 def _by_circle(parts: list[_LegRows], route: Route) -> list[list[_LegRows]]:

@@ -66,7 +66,7 @@ def write_report(
     """
     from logs.figures.draw_all import FIGURE_FILES, draw_pictures
 
-    track = None if track is None or not len(track) else with_legs(setup, track)
+    track = None if track is None or not len(track) else with_legs(track, verdict.leg_ends)
     pictures = draw_pictures(setup, track, verdict, svg=svg)
     page = _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
     out_dir.mkdir(parents=True, exist_ok=True)
@@ -76,31 +76,6 @@ def write_report(
     for name, data in files.items():
         write_whole(out_dir / name, data)
     return [out_dir / name for name in files]
-
-
-def report_html(
-    setup: FlightSetup,
-    track: Track | None,
-    verdict: Verdict,
-    *,
-    ended: str | None,
-    versions: Mapping[str, str],
-    command: str,
-    events: Sequence["LogEvent"] = (),
-) -> str:
-    """Make the page.
-
-    track: None for a plan that was not flown.
-    ended: how the flight ended, as in its log; None where unknown.
-    versions: of planfly and the packages it depends on.
-    command: the command line that makes the same flight again.
-    events: the log's lines, shown with their times.
-    """
-    from logs.figures.draw_all import draw_pictures
-
-    track = None if track is None or not len(track) else with_legs(setup, track)
-    pictures = draw_pictures(setup, track, verdict)
-    return _page(setup, track, verdict, pictures, ended=ended, versions=versions, command=command, events=events)
 
 
 def _page(

@@ -88,6 +88,8 @@ class Verdict:
     flown).
     prediction: of a flown verdict, what the geometric level says beside it.
     notes: what is not flown as the mission has it; the lines say it too.
+    leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
+    it did not get to; empty where too little was recorded to tell.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -101,6 +103,7 @@ class Verdict:
     level: str
     prediction: Prediction | None = None
     notes: tuple[str, ...] = ()
+    leg_ends: tuple[float, ...] = ()
 
     @property
     def headline(self) -> str:
@@ -115,7 +118,7 @@ class Verdict:
 
 @dataclass(frozen=True, slots=True)
 class Message:
-    """A statement of a rule: in full, and how it begins, which is what a headline has room for.
+    """A statement of a rule: in full, and how it begins, which is what a headline takes.
 
     placed: whether it begins with the finding's place.
     """

@@ -38,16 +38,19 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     envelope: whether the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and
     the scenario's numbers alone.
 
+    >>> from aircraft.catalog import find_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission, MissionItem
+    >>> from flight.mission.routing import make_route
+    >>> from flight.simulation.flight_setup import make_limits
     >>> from flight.simulation.simulate import simulate
-    >>> from planfly.airframe import load_airframe
-    >>> from planfly.pipeline import make_setup
     >>> from world.scenario import load_scenario
-    >>> scenario = load_scenario("tight")
+    >>> scenario, aerosonde = load_scenario("tight"), find_aircraft("aerosonde")
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.01 * k, 75.0) for k in range(2)]
-    >>> airframe = load_airframe(scenario)
-    >>> setup = make_setup(scenario, airframe, Mission(None, tuple(way)), seed=1)
-    >>> flown = simulate(setup, airframe.aircraft)
+    >>> mission, limits = Mission(None, tuple(way)), make_limits(scenario, load_envelope(aerosonde), 25.0, 0.5)
+    >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
+    >>> setup = FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1)
+    >>> flown = simulate(setup, aerosonde)
     >>> verdict = judge_flight(setup, flown.track, flown.ended)
     >>> verdict.headline
     'flyable'
@@ -72,7 +75,8 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     findings = with_suggestions(demands, aligned, findings)
     prediction = _predict(demands, findings) if envelope else None
     lines = summary_lines(findings, flyable, setup, "flown", prediction)
-    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes)
+    ends = () if aligned is None else aligned.leg_ends()
+    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes, ends)
 
 
 def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:

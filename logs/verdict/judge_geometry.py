@@ -37,14 +37,17 @@ def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
 def judge_geometry(setup: FlightSetup) -> Verdict:
     """Judge a route by its geometry and the aircraft's envelope, without flying it: level "geometric".
 
+    >>> from aircraft.catalog import find_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission, MissionItem
-    >>> from planfly.airframe import load_airframe
-    >>> from planfly.pipeline import make_setup
+    >>> from flight.mission.routing import make_route
+    >>> from flight.simulation.flight_setup import make_limits
     >>> from world.scenario import load_scenario
-    >>> scenario = load_scenario("tight")
+    >>> scenario, envelope = load_scenario("tight"), load_envelope(find_aircraft("aerosonde"))
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.001 * k, 60.0 + 20.0 * k) for k in range(2)]
-    >>> setup = make_setup(scenario, load_airframe(scenario), Mission(None, tuple(way)), seed=1)
-    >>> verdict = judge_geometry(setup)
+    >>> mission, limits = Mission(None, tuple(way)), make_limits(scenario, envelope, 25.0, 0.5)
+    >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
+    >>> verdict = judge_geometry(FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1))
     >>> verdict.headline
     'not flyable: slope on leg 0 (14.5° > 14.2°)'
     >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]

@@ -24,7 +24,7 @@ class Place:
     kind: what it is.
     index: of the leg, waypoint or threat, from 0 as the route and the scenario have them; None for the whole.
     item: number of the mission item that a waypoint comes from, or that a check names; None where there is none.
-    name: of the threat, "" for every other kind.
+    name: that the scenario gives the threat; "" where it gives none, and for every other kind.
 
     >>> Place("waypoint", 3, item=4)
     Place(kind='waypoint', index=3, item=4, name='')

@@ -59,8 +59,8 @@ def _phrase(item: Finding) -> str:
         case "waypoint":
             return f"{where} missed" + (f" ({item.flown:.0f} m > {item.limit:.0f} m)" if _over(item) else "")
         case "threat":
-            # "threat 3 (missile)" is what a threat without a name of its own is called.
-            named = where if item.place.name.startswith("threat") else f"threat {where}"
+            # One without a name of its own is called "threat 3 (missile)".
+            named = f"threat {where}" if item.place.name else where
             return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
     if item.place.kind == "flight":
         return f"{item.rule} ({_numbers(item)})"

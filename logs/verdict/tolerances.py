@@ -12,16 +12,18 @@ import math
 PLAN_TOLERANCE = math.radians(0.01)
 # m.  A mission file's 1e-7 degrees move a waypoint by up to 1 cm in each direction.
 ROUNDING = 0.02
-# m.  The same on steep ground is this much height.
+# m.  Height on steep ground that a waypoint's centimetre, `ROUNDING`, comes to.
 HEIGHT_ROUNDING = 0.1
 # m.  A loiter's radius: 1e-7 degrees at the circle's middle.
 RADIUS_TOLERANCE = 0.02
 # m.  A leg shorter than this is a climb on the spot, with no course of its own.
 ON_THE_SPOT = 0.5
-# rad.  A turn sharper than this has no useful tangent length; a U-turn's is infinite.
+# rad.  A turn sharper than this has no useful tangent length; a U-turn's is infinite.  Between
+# legs that are too short guidance leaves out the arc of a turn beyond a smaller limit of its own, SHARPEST in
+# flight/guidance/fly_by_path.py, which the turn rule takes from there.
 U_TURN = math.pi - 1e-6
-# Radii.  Most by which a fly-by is taken to pass its waypoint, which is a turn of about 176 degrees.
-LARGEST_CUT = 30.0
+# Radii.  Largest fly-by offset that is taken of a turn, which is one of about 176 degrees.
+LARGEST_OFFSET = 30.0
 
 # The turn rule
 
@@ -41,6 +43,8 @@ CLOSER = {"none": 0.6, "light": 0.8, "moderate": 1.0}
 NAVIGATION_SIGMAS = 3.0
 # s.  How long after its arc a turn is watched at most.
 WATCHED = 10.0
+# Radii of the planned arc.  A flown radius from this on is a nearly straight flight's, and says nothing of a turn.
+STRAIGHT = 10.0
 
 # The slope rule
 
@@ -50,6 +54,8 @@ OFF_SLOPE = math.radians(0.5)
 OFF_HEIGHT, OFF_HEIGHT_SHORT = 10.0, 15.0
 # rad.  A leg within this of level is level.
 LEVEL = math.radians(0.5)
+# m/s.  Less wind than this is called calm air where a reason says what the wind does to a slope.
+CALM = 0.5
 # m/s.  Mean airspeed while the throttle is at a limit, or lost on an arc; a gust's standard deviation more in
 # turbulence.
 OFF_SPEED = 1.0
@@ -68,6 +74,8 @@ SURE = 3.0
 SATURATED = 5.0
 # s.  Rising air takes speed up with it on a held slope, by g w/V, until drag has eaten it up: about this long.
 SPEED_MEMORY = 12.0
+# m/s.  Least airspeed V in g w/V: an aircraft that has nearly stopped gains no speed without bound.
+SLOWEST_LIFTED = 10.0
 # Share of a window that counts as "at the limit throughout".
 THROUGHOUT = 0.8
 # Throttle 0..1, and battery current in A, that count as at a limit.
@@ -91,7 +99,7 @@ ACCELERATION = 0.5
 
 # m.  Ends of a leg that are left out of a fit, beyond the turns' tangents.
 CLEAR_OF_TURN = 100.0
-# m.  The same beyond the blend of slopes, and at a route's first waypoint.
+# m.  Ends of a leg that are left out of a fit, beyond the blend of slopes, and at a route's first waypoint.
 CLEAR_OF_BLEND = 20.0
 # m.  Shortest piece of a leg that a course, a slope is fitted to.
 SHORTEST_COURSE, SHORTEST_SLOPE = 60.0, 100.0
@@ -107,8 +115,14 @@ ROUGH_COURSE, ROUGH_SLOPE = math.radians(0.75), math.radians(0.5)
 # m.  A waypoint is passed within this of where the fly-by path passes it, and within this height of that path, beside
 # what the blend of slopes takes.
 PASS, PASS_HEIGHT = 10.0, 15.0
+# m.  Approaches to a waypoint within this of the closest are equally close, as on a path that crosses itself above or
+# below: of them the one nearest in height counts.
+EQUALLY_CLOSE = 0.5
 # m/s.  Mean airspeed of a leg off its command.
 OFF_MEAN = 1.0
+# Share of the time that a leg takes at `SLOWEST`.  Steady flight for so long is enough for its mean airspeed, where the
+# leg is too short for `SATURATED`.
+MEASURED_SHARE = 0.5
 # m.  Taking up another slope may put the aircraft this far ahead or behind: a short leg is mostly that.
 TAKE_UP = 10.0
 # s.  How long a gust lasts.
@@ -122,28 +136,41 @@ SLOWEST, SLOWEST_SHARE = 15.0, 0.94
 CORRIDOR = 20.0
 # s.  A log with a pause this long between rows has lost some.
 LONGEST_GAP = 0.5
+# Median steps between rows.  In a log of few rows a second, where `LONGEST_GAP` is an ordinary step, this many are a
+# pause.
+GAP_STEPS = 5.0
 # m/s.  By how much position and velocity of one tick may disagree before the record contradicts itself.
 CONTRADICTION = 10.0
-# Share of the battery or the tank that is to be left.
+# Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.
 CAPTURE_RADIUS = 500.0
+# s.  To assign stretches of a track to waypoints its rows are thinned to no less than this between them; the row
+# nearest to each waypoint is then looked for among all.
+CHORD_TIME = 0.25
 # m.  A waypoint that the track ends at is passed within this of its apex, beside the fly-by's own distance.
 ARRIVED = 10.0
 # m, m/s.  No position or speed of ours is larger; what is, is garbage.
 FARTHEST, FASTEST = 1e7, 1e4
 # s.  Stays in a sphere on neighbouring segments that touch to within this are one.  Rounding.
 TOUCH = 1e-6
+# Diagonals of a block of segments.  From this far from a sphere's centre the segments are joined to longer ones, which
+# changes the exposure by less than 0.1 %.
+FAR = 30.0
 
 # PX4's checks: the defaults of the parameters that its `FeasibilityChecker` reads, by their names
 
 # m.  NAV_ACC_RAD.
 PX4_ACCEPTANCE = 10.0
-# rad.  FW_LND_ANG, and the 0.1 degrees that the checker adds.
-PX4_LANDING_ANGLE = math.radians(5.0 + 0.1)
+# m.  A takeoff's height is to be this much more than the acceptance radius; the checker has it as a literal.
+PX4_TAKEOFF_BUFFER = 1.0
+# Degrees.  FW_LND_ANG.
+PX4_LANDING_ANGLE_DEG = 5.0
+# rad.  The steepest landing approach: FW_LND_ANG, and the 0.1 degrees that the checker adds.
+PX4_STEEPEST_LANDING = math.radians(PX4_LANDING_ANGLE_DEG + 0.1)
 # m.  MIS_DIST_1WP.
 PX4_FIRST_WAYPOINT = 10_000.0
 # m.  MIS_DIST_WPS of the releases that had it.

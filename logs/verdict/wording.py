@@ -4,6 +4,7 @@ import math
 
 from logs.verdict.places import Change, Disagreement, Place, Suggestion
 from logs.verdict.tolerances import ON_THE_SPOT
+from world.threats import threat_label
 
 # Longest statement of a headline, characters.
 _LONGEST = 80
@@ -19,12 +20,21 @@ def place_text(place: Place) -> str:
         case Place("mission", item=int(item)):
             return f"item {item}"
         case Place("missile" | "radar"):
-            return f"{place.name} ({place.kind})"
+            return f"{threat_text(place)} ({place.kind})"
         case Place(kind, index=int(index), item=int(item)):
             return f"{kind} {index} (item {item})"
         case Place(kind, index=int(index)):
             return f"{kind} {index}"
     return place.kind
+
+
+def threat_text(place: Place) -> str:
+    """What the threat of a missile or a radar is called.
+
+    >>> threat_text(Place("missile", 0, name="Alfa")), threat_text(Place("missile", 2))
+    ('Alfa', 'threat 3')
+    """
+    return threat_label(place.name, place.index or 0)
 
 
 def change_text(change: Change) -> str:
@@ -54,7 +64,7 @@ def change_text(change: Change) -> str:
         case "inset":
             return f"bring the path {wanted:.0f} m further inside"
         case "distance":
-            return f"pass {change.place.name} {wanted:.0f} m further away"
+            return f"pass {threat_text(change.place)} {wanted:.0f} m further away"
         case "duration":
             return f"shorten the flight by {wanted:.0f} %"
         case "battery" | "tank":
@@ -100,7 +110,7 @@ def disagreement_text(one: Disagreement) -> str:
 
 
 def shortened(text: str) -> str:
-    """A statement cut to what a headline has room for.
+    """A statement cut to the length that a headline takes.
 
     >>> shortened("bank 80° at 3.0 s"), len(shortened("m" * 200))
     ('bank 80° at 3.0 s', 80)

@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from planfly import pipeline
 from planfly.open_mission import open_mission
+from planfly.pipeline import fly_and_judge
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, print_warnings
@@ -21,7 +21,7 @@ def fly(args: argparse.Namespace) -> int:
     print_warnings(opened.setup.mission.warnings)
     target.parent.mkdir(parents=True, exist_ok=True)
     with progress("flying") as advance:
-        flown = pipeline.fly(opened.setup, opened.airframe, target, advance, every=60 // args.log_hz)
+        flown = fly_and_judge(opened.setup, opened.airframe, target, advance, every=60 // args.log_hz)
     print_verdict(flown.verdict, opened.setup.route.notes)
     print(f"log       {target}")
     return FLYABLE if flown.verdict.flyable else NOT_FLYABLE

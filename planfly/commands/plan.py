@@ -17,7 +17,7 @@ from planner.plan import Objective, Plan, plan_json, read_plan
 from planner.search.explain_failure import what_blocks
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, same_mission
-from planner.search.search_state import Progress, StopCondition
+from planner.search.search_state import SearchProgress, StopCondition
 from world.atomic_files import write_whole
 from world.errors import ScenarioError
 from world.scenario import Scenario, load_scenario
@@ -92,7 +92,12 @@ def _prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Pl
 
 
 def _make_plan(
-    args: argparse.Namespace, scenario: Scenario, old: Plan | None, airframe: Airframe, seed: int, advance: Progress
+    args: argparse.Namespace,
+    scenario: Scenario,
+    old: Plan | None,
+    airframe: Airframe,
+    seed: int,
+    advance: SearchProgress,
 ) -> Plan:
     """Plan as the command line asks."""
     limits = airframe.limits

@@ -4,9 +4,9 @@ import argparse
 from collections.abc import Callable
 from importlib import import_module
 
-Command = Callable[[argparse.Namespace], int]
+CommandFunction = Callable[[argparse.Namespace], int]
 
-COMMANDS = (
+COMMAND_NAMES = (
     "run",
     "plan",
     "export",
@@ -23,15 +23,16 @@ COMMANDS = (
 )
 
 
-def find_command(name: str) -> Command:
+def find_command(name: str) -> CommandFunction:
     """The function that carries a command out: parsed arguments to exit code.
 
-    Its results go to standard output, its progress to standard error.  Raises KeyError for a name not of `COMMANDS`.
+    Its results go to standard output, its progress to standard error.  Raises KeyError for a name that is not
+    one of `COMMAND_NAMES`.
 
     >>> find_command("scenarios").__module__
     'planfly.commands.scenarios'
     """
-    if name not in COMMANDS:
+    if name not in COMMAND_NAMES:
         raise KeyError(name)
-    command: Command = getattr(import_module(f"planfly.commands.{name}"), name)
+    command: CommandFunction = getattr(import_module(f"planfly.commands.{name}"), name)
     return command

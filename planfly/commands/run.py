@@ -10,7 +10,7 @@ from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
-from planfly.pipeline import fly, make_plan, make_setup
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planfly.refine import refine
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
@@ -87,7 +87,7 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
         return verdict, False
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with progress("flying") as advance:
-        flown = fly(setup, airframe, folder / "flight.mcap", advance)
+        flown = fly_and_judge(setup, airframe, folder / "flight.mcap", advance)
     write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):
         write_pictures(folder, setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)

@@ -27,7 +27,7 @@ from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.wording import place_text
-from planfly.airframe import Airframe, load_airframe
+from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.open_mission import open_mission
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
@@ -72,7 +72,7 @@ def open_served(options: ServeOptions) -> ServedScenario:
         opened = open_mission(Path(options.mission), options.scenario, options.terrain)
         return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
     scenario = load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain)
-    return ServedScenario(scenario, load_airframe(scenario), scenario.planner.seed or 1, None)
+    return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
 
 
 def fly_process(connection: Connection, options: ServeOptions) -> None:
@@ -117,14 +117,14 @@ class ServedFlights:
         try:
             setup = make_setup(served.scenario, served.airframe, order.mission, served.seed)
             # Its first tick says whether it can start, and has the loop compiled.
-            Flight(setup, self.aircraft).block(1)
-            snapshots = SnapshotMaker(setup)
+            flight = Flight(setup, self.aircraft)
+            flight.block(1)
         except PlanflyError as error:
             text = StatusText(f"mission cannot be flown: {error}", CRITICAL)
             return None, MissionJudged(order.number, False, False, (text,))
         verdict = judge_geometry(setup)
         home = order.mission.home
-        start = snapshots.before_start(setup)
+        start = SnapshotMaker(setup, flight.map).before_start(setup)
         if home is None:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
@@ -170,7 +170,7 @@ class ServedLog:
 
     def abandon(self) -> None:
         """Close the log as it is."""
-        self._recorder.__exit__(OSError, None, None)
+        self._recorder.abandon()
 
 
 def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...]:

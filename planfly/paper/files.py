@@ -13,7 +13,7 @@ from planner.plan import Objective, Violation
 from world.atomic_files import write_whole
 from world.scenario import load_scenario
 
-SCHEMA = "planfly.paper/1"
+PAPER_SCHEMA = "planfly.paper/1"
 # Files that any command may write; older ones of these names are cleared first.
 FILES = ("table.csv", "runs.csv", "runs.json", "times.csv", "convergence.png")
 
@@ -65,7 +65,7 @@ def write_tables(folder: Path, rows: Sequence[TableRow], plans: Sequence[SeededP
         }
         for item in plans
     ]
-    text = json.dumps({"schema": SCHEMA, "table": kept, "runs": runs}, allow_nan=False, indent=1)
+    text = json.dumps({"schema": PAPER_SCHEMA, "table": kept, "runs": runs}, allow_nan=False, indent=1)
     write_whole(folder / "runs.json", text + "\n")
 
 

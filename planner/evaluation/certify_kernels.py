@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 # A straight piece of a leg, or of the arc at a waypoint, by its number; its least height above ground (m, NaN off the
 # terrain) and the buffer wanted there (m).
-PIECE = np.dtype(
+CERTIFIED_PIECE = np.dtype(
     [("of_arc", np.bool_), ("number", np.int64), ("height", np.float64), ("buffer", np.float64)], align=True
 )
 # Pieces of one arc, at most: its chords, and one on either leg.
@@ -116,10 +116,10 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`PIECE` records of the legs of a path (w, 3), and then of its fly-by arcs."""
+    """`CERTIFIED_PIECE` records of the legs of a path (w, 3), and then of its fly-by arcs."""
     last = waypoints.shape[0] - 1
     radii = fly_by_radii(data, waypoints)
-    out = np.zeros(last + last * _MOST_PIECES, dtype=PIECE)
+    out = np.zeros(last + last * _MOST_PIECES, dtype=CERTIFIED_PIECE)
     for i in range(last):
         _measure_piece(data, waypoints[i], waypoints[i + 1], False, i, out[i])
     count = last

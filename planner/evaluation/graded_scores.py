@@ -162,7 +162,7 @@ def _score_paths(
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:  # pragma: no cover - compiled
     """Radius of the arc at waypoint i: 0 where a number alone limits turns and a leg there is too short for its two.
 
-    The same as `planner.evaluation.fly_by_corners.fly_by_radii`, of which the ends have no arc.
+    The ends have no arc.  `planner.evaluation.fly_by_corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):

@@ -25,8 +25,8 @@ THREAT = np.dtype(
         for name in ("east", "north", "up", "kill_radius", "kill_scale", "detection_radius", "detection_scale")
     ]
 )
-# The same as a point is compared with it: radii to the power of two, scales to the power of four, and what makes it as
-# long as a line of the processor's cache.
+# A unit as a point is compared with it: its position (m), radii to the power of two, scales to the power of four, and
+# what makes the record as long as a line of the processor's cache.
 SPHERE = np.dtype(
     [
         (name, np.float64)
@@ -56,7 +56,8 @@ class ProblemArrays(NamedTuple):
 
     heights: raster of the ground.
     to_pixel: map from positions to its pixels.
-    threats: `THREAT` records (m,), and spheres the same as `SPHERE` records.
+    threats: `THREAT` records (m,).
+    spheres: `SPHERE` records (m,), each of the threat with its number.
     aircraft: what it can do, of which turbulence leaves a plan a share.
     west, east, south, north: edges of the map; floor and ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.

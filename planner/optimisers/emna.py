@@ -11,7 +11,7 @@ from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
 from planner.optimisers.umda import Floats, Umda
 
 # Added to each variance, as a share of their mean: fewer rows than variables make a covariance singular.
-RIDGE = 1e-9
+COVARIANCE_RIDGE = 1e-9
 
 
 class Emna(Umda):
@@ -35,7 +35,7 @@ class Emna(Umda):
         # Scaled to the box, so that metres of one variable do not drown those of another.
         width = self.upper - self.lower
         rows = np.ascontiguousarray((self.samples - mean) / width)
-        factor = cholesky(covariance(rows, 0, 0, mean.size), RIDGE)
+        factor = cholesky(covariance(rows, 0, 0, mean.size), COVARIANCE_RIDGE)
         return self._redraw(
             lambda number: mean + width * times_lower(self._rng.normal(size=(number, mean.size)), factor), count
         )

@@ -16,15 +16,15 @@ ALONG, ACROSS = 200, 400
 def what_blocks(plan: Plan) -> list[str]:
     """Lines that say what is in the way of a plan that is not feasible, and what a search in its encoding cannot do.
 
-    >>> from dataclasses import replace
-    >>> from planfly.airframe import load_airframe
-    >>> from planner.search.plan_path import plan_path
+    >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
     >>> from world.scenario_variants import with_threats
-    >>> scenario = load_scenario("hard-07")
-    >>> plan = plan_path(scenario, load_airframe(scenario).limits, seed=1)
-    >>> guarded = with_threats(scenario, [(5000.0, 5000.0, 8000.0, 0.0)], "--add-threat")
-    >>> print(what_blocks(replace(plan, scenario=guarded))[0])
+    >>> guarded = with_threats(load_scenario("hard-07"), [(5000.0, 5000.0, 8000.0, 0.0)], "--add-threat")
+    >>> path = np.stack([guarded.start, guarded.destination])
+    >>> certificate = Certificate(0.1, np.inf, 0.1, 9.0, -50.0, -50.0, ())
+    >>> found = np.array([0, 0, 1, 1]), np.zeros(4)
+    >>> plan = Plan(guarded, path, *found, certificate, 1, "umda", 60, np.zeros((0, 3)))
+    >>> print(what_blocks(plan)[0])
     terrain and missiles together close the way 65 m from the start, at every height
     """
     scenario = plan.scenario

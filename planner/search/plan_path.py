@@ -27,7 +27,7 @@ from planner.search.score_table import (
     no_scores,
     safe,
 )
-from planner.search.search_state import Archive, Improved, Progress, Search, StopCondition
+from planner.search.search_state import Archive, Improved, Search, SearchProgress, StopCondition
 from planner.seeding.first_samples import bridge_basis, first_samples
 from planner.seeding.grid_routes import GridRoute, grid_routes
 from planner.seeding.waypoint_fitting import QUICK, fit_waypoints
@@ -46,10 +46,10 @@ ATTEMPTS = (
 )
 # A seeded search ends when this many generations have shortened its best path by less than this share of the straight
 # line: the pattern search at the end is faster at the rest.
-PATIENCE, GAIN = 10, 2e-4
+STALLED_GENERATIONS, LEAST_GAIN = 10, 2e-4
 # Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
 # safe path, and once it has.
-SHARE, SAFE_SHARE = 0.3, 0.1
+SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
 # Evaluations that a quick path, each seed, and the best path at the end are improved with by a pattern search, at most.
 QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
@@ -64,7 +64,7 @@ def plan_path(
     *,
     seed: int,
     algorithm: str | None = None,
-    progress: Progress | None = None,
+    progress: SearchProgress | None = None,
     stop: StopCondition | None = None,
     improved: Improved | None = None,
     first_safe: bool = False,
@@ -198,7 +198,7 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
     for generation in range(table.generations):
         if search.over() or search.safe_already():
             break
-        share = SAFE_SHARE if search.best_is_safe() else SHARE
+        share = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
         if algorithm.seeded and (_stagnant(bests) or search.evaluations >= before + share * whole):
             break
         optimiser.tell(search.evaluate(optimiser.ask()))
@@ -306,8 +306,8 @@ def _make_optimiser(
 
 def _stagnant(bests: list[Floats]) -> bool:
     """Whether the last generations have gained next to nothing."""
-    if len(bests) <= PATIENCE:
+    if len(bests) <= STALLED_GENERATIONS:
         return False
-    before, after = bests[-1 - PATIENCE], bests[-1]
+    before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
     same = np.array_equal(before[:LENGTH], after[:LENGTH]) and before[KILL] == after[KILL]
-    return bool(same and before[LENGTH] - after[LENGTH] < GAIN)
+    return bool(same and before[LENGTH] - after[LENGTH] < LEAST_GAIN)

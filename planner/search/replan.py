@@ -11,7 +11,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from planner.search.search_state import Progress, StopCondition
+from planner.search.search_state import SearchProgress, StopCondition
 from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs
 from world.scenario import Scenario
@@ -30,7 +30,7 @@ def replan(
     *,
     seed: int,
     algorithm: str | None = None,
-    progress: Progress | None = None,
+    progress: SearchProgress | None = None,
     stop: StopCondition | None = None,
 ) -> Plan:
     """Plan anew from the waypoint at which leg `leg` of an old plan begins; legs before it are flown and stay.

@@ -10,7 +10,7 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-COLUMNS = len(Violation) + len(Objective)
+SCORE_COLUMNS = len(Violation) + len(Objective)
 LENGTH, KILL, DETECTION, HEIGHT = (len(Violation) + item for item in Objective)
 CONSTRAINTS = Level(tuple(Violation), (0.0,) * len(Violation))
 # The order of an archive: what meets the constraints, then least kill exposure, then the shortest.
@@ -24,7 +24,7 @@ def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:
 
 def no_scores() -> Floats:
     """A table without rows."""
-    return np.empty((0, COLUMNS))
+    return np.empty((0, SCORE_COLUMNS))
 
 
 def violated(scores: Floats) -> Flags:

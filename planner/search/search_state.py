@@ -20,7 +20,7 @@ from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
 
 Floats = NDArray[np.float64]
-Progress = Callable[[int, int, str], None]
+SearchProgress = Callable[[int, int, str], None]
 StopCondition = Callable[[], str]
 Improved = Callable[[Floats], None]
 
@@ -83,7 +83,7 @@ class Search:
     algorithm: Algorithm
     encoding: Encoding
     rng: np.random.Generator
-    progress: Progress | None
+    progress: SearchProgress | None
     stop: StopCondition | None
     first_safe: bool
     wanted: float

@@ -39,7 +39,7 @@ def _near(modes: NDArray[np.complex128], value: complex) -> complex:
 @pytest.mark.parametrize("climb_deg", [-4.0, 0.0, 3.0])
 def test_trim_is_the_reference_trim(airspeed: float, climb_deg: float) -> None:
     climb = math.radians(climb_deg)
-    states, commands = reference.trim(airspeed, climb, reference.BookAtmosphere())
+    states, commands = reference.book_trim(airspeed, climb, reference.BookAtmosphere())
     if not 0.0 < commands[3] < 1.0:
         assert straight(_flat(), airspeed, 100.0, climb) is None
         return
@@ -66,7 +66,7 @@ def test_modes_are_the_reference_modes(variation: Variation | None) -> None:
     world = reference.BookAtmosphere(parasite_drag=0.043 if variation is None else 0.0)
     fdm = _flat(variation)
     a, b = linearise(fdm, _trim(fdm, 25.0))
-    expected_a, expected_b = reference.linearise(*reference.trim(25.0, 0.0, world), world)
+    expected_a, expected_b = reference.book_linearise(*reference.book_trim(25.0, 0.0, world), world)
     expected = _modes(expected_a)
     assert np.abs((_modes(a) - expected) / expected).max() < 1e-5
     np.testing.assert_allclose(a, expected_a, rtol=1e-4, atol=1e-4)
@@ -147,28 +147,6 @@ def test_a_kicked_flight_is_the_reference_flight() -> None:
     np.testing.assert_allclose(coarse / fine, 4.0, rtol=0.1)
 
 
-def test_lift_breaks_at_the_stall() -> None:
-    assert reference.lift(0.2) == pytest.approx(0.23 + 5.61 * 0.2, rel=1e-5)
-    assert reference.lift(0.7) == pytest.approx(2.0 * math.sin(0.7) ** 2 * math.cos(0.7), rel=1e-4)
-    assert reference.lift(0.7) < 0.5 * reference.lift(0.42)
-
-
-@pytest.mark.parametrize("throttle", [0.0, 0.3, 0.55])
-def test_without_braking_a_closed_throttle_draws_nothing(throttle: float) -> None:
-    coasting = reference.propulsion(25.0, throttle, reference.BookAtmosphere())
-    braking = reference.propulsion(25.0, throttle, reference.BookAtmosphere(motor_braking=True))
-    assert coasting[2] == 0.0
-    assert coasting[1] == pytest.approx(-reference.KQ * reference.NO_LOAD_CURRENT)
-    assert braking[2] < 0.0
-    assert braking[0] < coasting[0] < 0.0
-
-
-def test_braking_makes_no_difference_while_current_flows() -> None:
-    assert reference.propulsion(25.0, 0.8, reference.BookAtmosphere()) == reference.propulsion(
-        25.0, 0.8, reference.BookAtmosphere(motor_braking=True)
-    )
-
-
 @pytest.mark.parametrize("motor_braking", [False, True])
 def test_limits_of_the_envelope_balance_in_the_reference(motor_braking: bool) -> None:
     # On the turning WGS84 earth in the standard atmosphere: 1.16727 kg/m^3 at 500 m (ISO 2533).
@@ -180,8 +158,3 @@ def test_limits_of_the_envelope_balance_in_the_reference(motor_braking: bool) ->
         states = np.zeros(8)
         states[[0, 2, 6, 7]] = 25.0 * math.cos(found.alpha), 25.0 * math.sin(found.alpha), roll, pitch
         assert np.abs(reference.rates(states, found.commands(), world)).max() < 6e-3
-
-
-def test_reference_says_when_it_finds_no_trim() -> None:
-    with pytest.raises(ValueError, match="no trim at"):
-        reference.trim(25.0, 0.0, reference.BookAtmosphere(density=0.1))

@@ -26,7 +26,7 @@ def against_the_book() -> dict[str, float]:
     trims, modes = [], []
     for airspeed in (19.0, 22.0, 25.0, 28.0, 31.0):
         for climb in (-0.05, 0.0, 0.05):
-            states, commands = reference.trim(airspeed, climb, world)
+            states, commands = reference.book_trim(airspeed, climb, world)
             if not 0.0 < commands[3] < 1.0:
                 continue
             fdm = Fdm(aerosonde, flat_earth=True)
@@ -38,7 +38,7 @@ def against_the_book() -> dict[str, float]:
             trims.append(np.abs((np.array([found.alpha, *found.commands()]) - expected) / expected).max())
             roots, book = (
                 np.sort_complex(np.linalg.eigvals(a))
-                for a in (linearise(fdm, found)[0], reference.linearise(states, commands, world)[0])
+                for a in (linearise(fdm, found)[0], reference.book_linearise(states, commands, world)[0])
             )
             modes.append(np.abs((roots - book) / book).max())
     clean = straight(Fdm(aerosonde, flat_earth=True, variation=CLEAN), 25.0, 100.0)

@@ -183,11 +183,15 @@ def reference_laws(seeds: Sequence[int]) -> dict[str, list[float]]:
 
 @dataclass(frozen=True, slots=True)
 class LoopCost:
-    """CPU time of the closed loop over that of bare `run()`, and how many times real time each goes."""
+    """CPU time of the closed loop over that of bare `run()`, and how many times real time each goes: medians of rounds.
+
+    least: the smallest ratio of a round.
+    """
 
     ratio: float
     closed: float
     bare: float
+    least: float
 
 
 # Seconds of flight that the closed loop and bare JSBSim take in turn.
@@ -218,7 +222,7 @@ def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240) -> LoopCost
         ratios.append(looped / stepped)
         closed.append(seconds / looped)
         bares.append(seconds / stepped)
-    return LoopCost(*(float(np.median(found)) for found in (ratios, closed, bares)))
+    return LoopCost(*(float(np.median(found)) for found in (ratios, closed, bares)), least=min(ratios))
 
 
 # Must and aim, by the row's name or the end of it; rows without are for information.
@@ -238,9 +242,9 @@ NEEDED = {
     "straight legs, vector field, best-tuned / ours": (3.0, 5.0),
     "feasible missions: turning angles off the plan, most, deg": (0.1, 0.05),
     "feasible missions: slopes off the plan, most, deg": (0.15, 0.1),
-    "closed loop / bare JSBSim at 60 Hz": (1.40, 1.30),
+    "closed loop / bare JSBSim at 60 Hz": (1.40, 1.15),
     "closed loop / bare JSBSim at 30 Hz": (1.15, 1.05),
-    "real-time factor at 60 Hz": (1300.0, 1500.0),
+    "real-time factor at 60 Hz": (1300.0, 2100.0),
 }
 
 

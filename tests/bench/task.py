@@ -57,7 +57,7 @@ class Task:
 
 
 def is_safe(certificate: Certificate) -> bool:
-    """Whether all four constraints hold everywhere and no missile spreades the path."""
+    """Whether all four constraints hold everywhere and no missile reaches the path."""
     return certificate.ok and certificate.kill_distance > 0.0
 
 

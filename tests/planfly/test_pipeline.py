@@ -9,7 +9,7 @@ import pytest
 from logs.recording.reader import read_log
 from logs.verdict.findings import verdict_json
 from planfly.airframe import load_airframe
-from planfly.pipeline import fly, make_setup, plan_then_fly
+from planfly.pipeline import fly_and_judge, make_setup, plan_then_fly
 from tests.setups import small_scenario, waypoint_mission
 
 POINTS = np.array([[0.0, 0.0, 300.0], [900.0, 0.0, 300.0], [1500.0, 300.0, 320.0]])
@@ -24,8 +24,8 @@ def test_a_thinned_log_holds_the_rows_that_were_judged(tmp_path: Path) -> None:
     assert setup.route.airspeed.tolist() == [25.0, 22.0]
     np.testing.assert_allclose(setup.route.waypoints, POINTS, atol=0.02)
     reports: list[tuple[float, float, str]] = []
-    whole = fly(setup, airframe, None, lambda *report: reports.append(report))
-    thin = fly(setup, airframe, tmp_path / "f.mcap", every=3)
+    whole = fly_and_judge(setup, airframe, None, lambda *report: reports.append(report))
+    thin = fly_and_judge(setup, airframe, tmp_path / "f.mcap", every=3)
     log = read_log(tmp_path / "f.mcap")
     assert log.complete
     assert log.ended == whole.ended == "completed"

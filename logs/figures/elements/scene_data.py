@@ -61,7 +61,7 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
     return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wanted, 1.0))
 
 
-def track_rows(track: Track, most: int = MOST_TRACK) -> Floats:
+def drawn_positions(track: Track, most: int = MOST_TRACK) -> Floats:
     """At most ``most`` positions of the track that are numbers, (n, 3) m."""
     good = track.position[np.isfinite(track.position).all(axis=1)]
     rows = np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))
@@ -91,7 +91,7 @@ def scene_json(setup: FlightSetup, track: Track | None, failed: Failures) -> str
             for k, name in enumerate(threats.names)
         ],
         "plan": np.round(setup.route.waypoints, 1).tolist(),
-        "track": [] if track is None else np.round(track_rows(track), 1).tolist(),
+        "track": [] if track is None else np.round(drawn_positions(track), 1).tolist(),
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }
     # "<" would end the script element early where a name holds one.

@@ -24,7 +24,7 @@ Indices = NDArray[np.intp]
 DPI = 150
 WIDTH = 10.0
 
-PLAN = "#56B4E9"
+PLANNED = "#56B4E9"
 FLOWN = "#000000"
 MISSILE = "#D55E00"
 RADAR = "#007A5A"  # Okabe-Ito's bluish green, darkened for thin dashes on pale ground

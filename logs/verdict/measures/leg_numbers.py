@@ -1,9 +1,9 @@
-"""Which leg each row of a track was flown on, worked out from the route and the track as a check does.
+"""Which leg each row of a track was flown on, as a verdict aligned them.
 
 What guidance noted of it is left aside, so that a report's tables and a replay cannot differ from the verdict.
 """
 
-import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,15 +16,25 @@ from logs.verdict.measures.track_alignment import lay_track
 _ASIDE = ("velocity", "attitude", "airspeed", "controls", "wind", "current", "energy")
 
 
-def with_legs(setup: FlightSetup, track: Track) -> Track:
-    """Return the track with its ``leg`` column made anew: a leg ends at the row nearest to its waypoint's apex.
+def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
+    """When each leg but the last ended, s, for a track without a verdict; inf where its waypoint was not met.
 
-    Only time and position count.  After the last waypoint that was met its leg goes on; a track with fewer than two
-    usable rows is all on leg 0.
+    Only time and position count.  Empty for a track with fewer than two usable rows.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> find_leg_ends(log.setup, log.track)
+    (20.0,)
     """
     places = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _ASIDE})
     aligned = lay_track(route_demands(setup), places)
-    if aligned is None:
-        return replace(track, leg=np.zeros(len(track), dtype=np.int32))
-    ends = np.where(aligned.passed, aligned.track.time[aligned.rows], math.inf)[1:-1]
+    return () if aligned is None else aligned.leg_ends()
+
+
+def with_legs(track: Track, leg_ends: Sequence[float]) -> Track:
+    """Return the track with its ``leg`` column made anew of the times at which legs end, s, rising.
+
+    leg_ends: of a `logs.verdict.findings.Verdict` or of `find_leg_ends`.  Without any, all rows are on leg 0.
+    """
+    ends = np.array(leg_ends, dtype=np.float64)
     return replace(track, leg=np.searchsorted(ends, track.time, side="right").astype(np.int32))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.verdict.tolerances import FAR
 from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
 from world.kernels import compiled
@@ -20,10 +21,8 @@ Heights = NDArray[np.float32]
 
 # Segments that share one bounding box.
 _BLOCK = 256
-# Segments joined to one where a sphere is far from a block of them (30 of its diagonals): the exposure changes by
-# less than 0.1 %.
+# Segments joined to one where a sphere's centre is `FAR` from a block of them.
 _JOINED = 16
-_FAR = 30.0
 
 
 @compiled
@@ -94,7 +93,7 @@ def path_spheres(
             if low < out.closest[m]:
                 _closest(points, time, block, centres[m], m, out)
             if low <= radii[m]:
-                whole = high <= radii[m] and low > _FAR * boxes.diagonal[block]
+                whole = high <= radii[m] and low > FAR * boxes.diagonal[block]
                 _inside(points, time, block, _JOINED if whole else 1, centres[m], radii[m], scales[m], m, out)
     return out
 

@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits, PerformanceTable, aircraft_slopes, ground_speed_on
-from flight.guidance.fly_by_path import fly_by_path, path_polyline
+from flight.guidance.fly_by_path import FlyByPath, path_polyline
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.turn_demands import TurnDemands, performance_tables, turn_demands
 from logs.verdict.places import Place
-from logs.verdict.tolerances import LARGEST_CUT
+from logs.verdict.tolerances import LARGEST_OFFSET
 from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes
 
 Floats = NDArray[np.float64]
@@ -135,12 +135,12 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         climb=climb,
         dive=dive,
         ground_speed=speeds,
-        path=_planned_path(route, limits, speeds),
+        path=_planned_path(setup.path, route, speeds),
     )
 
 
-def _planned_path(route: Route, limits: Limits, ground_speed: Floats) -> PlannedPath:
-    points, legs = path_polyline(fly_by_path(route, limits))
+def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
+    points, legs = path_polyline(path)
     speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
     run = np.hypot(*np.diff(points[:, :2], axis=0).T)
     return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(run / speed[legs])]))
@@ -167,7 +167,7 @@ def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
     out = np.zeros(len(turning.radius))
     for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
         radius = float(turning.radius[i])
-        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_CUT * radius)
+        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_OFFSET * radius)
     return out
 
 

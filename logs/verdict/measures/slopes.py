@@ -23,6 +23,7 @@ from logs.verdict.tolerances import (
     SETTLED_AFTER,
     SHOWN_OVER,
     SINGULAR,
+    SLOWEST_LIFTED,
     SPEED_MEMORY,
     SURE,
     THROUGHOUT,
@@ -230,7 +231,7 @@ def lifted_speed(time: Floats, airspeed: Singles, rising: Singles, stop: int) ->
     out = np.zeros(stop)
     for k in range(1, stop):
         step = time[k] - time[k - 1]
-        gain = GRAVITY * rising[k] / max(10.0, airspeed[k])
+        gain = GRAVITY * rising[k] / max(SLOWEST_LIFTED, airspeed[k])
         out[k] = (out[k - 1] + gain * step) / (1.0 + step / SPEED_MEMORY)
     return out
 

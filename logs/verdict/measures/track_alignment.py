@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flight.simulation.track import Track
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, FARTHEST, FASTEST
+from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
@@ -22,8 +22,6 @@ Bytes = NDArray[np.uint8]
 
 # Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
 _CELLS = 40_000_000
-# Rows are thinned to no less than this many seconds for the assignment.
-_CHORD = 0.25
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +55,11 @@ class AlignedTrack:
     def leg_rows(self, leg: int) -> slice:
         """Rows between a leg's two waypoints, both included."""
         return slice(int(self.rows[leg]), int(self.rows[leg + 1]) + 1)
+
+    def leg_ends(self) -> tuple[float, ...]:
+        """When each leg but the last ended, s: at the row nearest to its waypoint's apex; inf where it was not met."""
+        ends = np.where(self.passed, self.track.time[self.rows], math.inf)[1:-1]
+        return tuple(ends.tolist())
 
     def flew(self, leg: int) -> bool:
         """Whether any of a leg was flown."""
@@ -152,7 +155,7 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
     """Row of each waypoint's passage: the assignment in time order with the least sum of squared distances."""
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
-    step = max(1, int(_CHORD / tick), -(-len(track) * count // _CELLS))
+    step = max(1, int(CHORD_TIME / tick), -(-len(track) * count // _CELLS))
     chords, capped = _align(position, apexes, step, CAPTURE_RADIUS)
     rows = np.zeros(count, dtype=np.int64)
     distance = np.zeros(count)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.simulation.track import ROLL
 from logs.verdict.measures.leg_fits import leg_course
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
@@ -68,7 +69,7 @@ def measure_turn(demands: RouteDemands, aligned: AlignedTrack, i: int) -> TurnMe
         angle=angle,
         tolerance=tolerance,
         fitted=fitted,
-        peak_bank=float(np.abs(track.attitude[around, 0]).max()),
+        peak_bank=float(np.abs(track.attitude[around, ROLL]).max()),
         held_bank=held,
         radius=radius,
         overshoot=_overshoot(demands, i, position[watched], before[watched], along[watched], across[watched]),
@@ -95,7 +96,7 @@ def _angle(demands: RouteDemands, aligned: AlignedTrack, i: int) -> tuple[float 
 def _second_by_second(aligned: AlignedTrack, rows: slice) -> tuple[float, float]:
     """Largest mean bank over a second (rad) and least radius over a second (m; inf for no turn)."""
     time = aligned.track.time[rows]
-    bank = np.abs(aligned.track.attitude[rows, 0].astype(np.float64))
+    bank = np.abs(aligned.track.attitude[rows, ROLL].astype(np.float64))
     ticks = int(np.searchsorted(time, time[0] + 1.0))
     if ticks < 1 or ticks >= time.size:
         return float(bank.mean()), math.inf

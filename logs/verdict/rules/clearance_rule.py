@@ -75,11 +75,12 @@ def _flown_clearance(
         if known.any():
             k = first + int(np.nanargmin(span))
             least = float(aligned.low[k])
-            reason = f"{least:.1f} m above ground {_moment(aligned, k, float(aligned.low_at[k]))}"
+            reason = f"{least:.1f} m above ground {_when_and_where(aligned, k, float(aligned.low_at[k]))}"
             ok = least >= limit - HEIGHT_ROUNDING
         if not known.all():
             k = first + int(np.argmin(known))
-            reason = ("" if math.isnan(least) else reason + "; ") + f"off the known terrain {_moment(aligned, k, 0.0)}"
+            off = f"off the known terrain {_when_and_where(aligned, k, 0.0)}"
+            reason = off if math.isnan(least) else f"{reason}; {off}"
             ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
@@ -103,7 +104,7 @@ def _flown_clearance(
     )
 
 
-def _moment(aligned: AlignedTrack, k: int, fraction: float) -> str:
+def _when_and_where(aligned: AlignedTrack, k: int, fraction: float) -> str:
     """When and where the aircraft was at this fraction of a segment, in words."""
     time, position = aligned.track.time, aligned.track.position
     when = time[k] + fraction * (time[k + 1] - time[k])

@@ -7,7 +7,7 @@ from logs.verdict.measures.leg_fits import straight_span
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
 from logs.verdict.places import FLIGHT
-from logs.verdict.tolerances import CLEAR_OF_TURN, CONTRADICTION, CORRIDOR, LONGEST_GAP
+from logs.verdict.tolerances import CLEAR_OF_TURN, CONTRADICTION, CORRIDOR, GAP_STEPS, LONGEST_GAP
 
 
 def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool) -> list[Finding]:
@@ -71,7 +71,7 @@ def _record_faults(aligned: AlignedTrack) -> list[Message]:
     track, out = aligned.track, []
     step = np.diff(track.time)
     gap = int(np.argmax(step))
-    if step[gap] > max(LONGEST_GAP, 5.0 * float(np.median(step))):
+    if step[gap] > max(LONGEST_GAP, GAP_STEPS * float(np.median(step))):
         out.append(message(f"rows are missing from {track.time[gap]:.1f} s to {track.time[gap + 1]:.1f} s"))
     # Where rows are missing the mean velocity says nothing.
     short = step <= LONGEST_GAP

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.simulation.track import ROLL
 from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -19,12 +20,12 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
     if aligned is None:
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
-    bank = np.abs(track.attitude[:, 0].astype(np.float64))
+    bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
     slowest = _slowest(demands, track.position[:, 2])
     faults = []
     if aligned.bad_rows:
         faults.append(
-            message(f"{aligned.bad_rows} rows without usable numbers, the first {_moment(aligned.first_bad)}")
+            message(f"{aligned.bad_rows} rows without usable numbers, the first {_time_text(aligned.first_bad)}")
         )
     if (bank > MOST_BANK).any():
         k = int(np.argmax(bank > MOST_BANK))
@@ -55,7 +56,7 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
     ]
 
 
-def _moment(time: float) -> str:
+def _time_text(time: float) -> str:
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 

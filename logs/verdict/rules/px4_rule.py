@@ -32,9 +32,11 @@ from logs.verdict.tolerances import (
     PX4_BETWEEN_WAYPOINTS,
     PX4_FIRST_WAYPOINT,
     PX4_GATE_APART,
-    PX4_LANDING_ANGLE,
+    PX4_LANDING_ANGLE_DEG,
     PX4_MOST_PWM,
     PX4_MOST_SERVO,
+    PX4_STEEPEST_LANDING,
+    PX4_TAKEOFF_BUFFER,
 )
 from world.frames import GeoOrigin, to_map
 
@@ -131,8 +133,9 @@ def _takeoff(mission: Mission) -> Iterator[_Remark]:
     for item in mission.items:
         if item.command in TAKEOFFS:
             height = _over_home(mission, item)
-            if height - 1.0 < PX4_ACCEPTANCE:
-                yield False, item.seq, f"takeoff altitude {height:.1f} m too low: at least {PX4_ACCEPTANCE + 1.0:.0f} m"
+            if height - PX4_TAKEOFF_BUFFER < PX4_ACCEPTANCE:
+                least = PX4_ACCEPTANCE + PX4_TAKEOFF_BUFFER
+                yield False, item.seq, f"takeoff altitude {height:.1f} m too low: at least {least:.0f} m"
             if placed:
                 yield False, item.seq, "takeoff is not the first waypoint item"
         placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
@@ -176,8 +179,9 @@ def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
             yield False, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
         angle = math.atan2(rise, run)
-        if angle > PX4_LANDING_ANGLE:
-            yield False, item.seq, f"the landing glide slope {math.degrees(angle):.1f}° is steeper than 5.0°"
+        if angle > PX4_STEEPEST_LANDING:
+            steep = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {PX4_LANDING_ANGLE_DEG:.1f}°"
+            yield False, item.seq, steep
 
 
 def _available(mission: Mission) -> Iterator[_Remark]:

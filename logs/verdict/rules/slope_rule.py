@@ -10,6 +10,7 @@ from logs.verdict.measures.tighter_limits import slope_limit, steep_arc
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.tolerances import (
+    CALM,
     GUST_SHARE,
     LEVEL,
     OFF_HEIGHT,
@@ -126,7 +127,7 @@ def _allowed(demands: RouteDemands, leg: int, limit: float, source: str) -> str:
         return f"{at} the aircraft has no steady flight on this course"
     wind = demands.setup.scenario.wind
     tail, cross = wind.along(float(demands.courses[leg]), up)
-    if math.hypot(tail, cross) < 0.5:
+    if math.hypot(tail, cross) < CALM:
         return f"{at} the aircraft can {math.degrees(limit):.1f}° in calm air"
     calm = demands.setup.envelope.slope_limits(speed, up)[0 if demands.slopes[leg] >= 0.0 else 1]
     blows = f"{abs(tail):.0f} m/s {'tailwind' if tail > 0.0 else 'headwind'}"

@@ -9,7 +9,7 @@ from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.tolerances import GUST_SHARE, GUST_TIME, LEVEL, OFF_MEAN, SATURATED, SLOWEST, TAKE_UP
+from logs.verdict.tolerances import GUST_SHARE, GUST_TIME, LEVEL, MEASURED_SHARE, OFF_MEAN, SATURATED, SLOWEST, TAKE_UP
 from world.wind import W20
 
 
@@ -92,7 +92,7 @@ def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[f
         return None
     rows = steady_rows(demands, aligned, leg)
     time = aligned.track.time[rows]
-    if time.size < 2 or time[-1] - time[0] < min(SATURATED, 0.5 * float(demands.runs[leg]) / SLOWEST):
+    if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(demands.runs[leg]) / SLOWEST):
         return None
     speed = aligned.track.airspeed[rows].astype(np.float64)
     lasts = float(time[-1] - time[0])

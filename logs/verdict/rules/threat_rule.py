@@ -35,7 +35,7 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
         track = None
         if aligned is not None:
             track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
-        for m, name in enumerate(threats.names):
+        for m, table in enumerate(scenario.spec.threats):
             if radii[m] <= 0.0:
                 continue
             if side == "missile":
@@ -43,7 +43,8 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
                 nearest = min(nearest, float(judged.closest[m] - radii[m]))
             if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
                 visit = None if geometric else _visit(track, m)
-                touched.append(_touched(Place(side, m, name=name), _visit(plan, m), visit, float(radii[m])))
+                place = Place(side, m, name=table.name or "")
+                touched.append(_touched(place, _visit(plan, m), visit, float(radii[m])))
     if not any(item.place.kind == "missile" for item in touched):
         touched.insert(0, _untouched(len(threats), nearest, aligned is not None or geometric))
     return touched

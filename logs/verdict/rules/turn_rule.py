@@ -19,6 +19,7 @@ from logs.verdict.tolerances import (
     OVERSHOOT,
     PLAN_TOLERANCE,
     SETTLED,
+    STRAIGHT,
 )
 from world.geometry import fly_by_offset
 
@@ -106,7 +107,7 @@ def _flown_facts(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[st
         facts.append(f"flown {math.degrees(measure.angle):.2f}°")
     if measure.peak_bank is not None and measure.held_bank is not None:
         facts.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
-    if measure.radius is not None and measure.radius < 10.0 * demands.radius[i]:
+    if measure.radius is not None and measure.radius < STRAIGHT * demands.radius[i]:
         facts.append(f"radius {measure.radius:.0f} m")
     if measure.overshoot is not None:
         facts.append(f"overshoot {measure.overshoot:.1f} m")
@@ -146,6 +147,7 @@ def _too_tight(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[Mess
     """
     turn, setup = abs(float(demands.turns[i])), demands.setup
     tightest = float(demands.tightest[i])
+    # Guidance's own limit: a corner sharper than it has no arc to be held to where its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST else math.inf
     if measure.passed is None or not math.isfinite(least) or setup.route.fly_over[i] or setup.guidance != "path":
         return []

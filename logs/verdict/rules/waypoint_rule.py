@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
-from logs.verdict.tolerances import PASS, PASS_HEIGHT
+from logs.verdict.tolerances import EQUALLY_CLOSE, PASS, PASS_HEIGHT
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def _closest(demands: RouteDemands, aligned: AlignedTrack, i: int, level: float)
     if not distance.size:
         off = aligned.track.position[-1] - demands.points[i]
         return math.hypot(off[0], off[1]), float(off[2])
-    # Of equally close rows, as on a path that crosses itself above or below, the one nearest in height.
-    near = np.flatnonzero(distance <= distance.min() + 0.5)
+    # Of equally close rows the one nearest in height.
+    near = np.flatnonzero(distance <= distance.min() + EQUALLY_CLOSE)
     up = position[near, 2] + fraction[near] * (position[near + 1, 2] - position[near, 2]) - level
     return float(distance.min()), float(up[np.argmin(np.abs(up))])

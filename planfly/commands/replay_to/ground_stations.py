@@ -10,6 +10,7 @@ from flight.live.snapshot import SnapshotMaker
 from flight.live.status_text import INFO, status_texts
 from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, PERIODS, Status, heartbeat, telemetry_message
 from flight.mission.items import Home
+from flight.simulation.local_map import LocalMap
 from flight.simulation.track import track_rows
 from logs.recording.reader import FlightLog
 from planfly.terminal.link_options import Stopped, link_access, stop_signals
@@ -23,7 +24,7 @@ _TIMEOUT = 10.0
 def play(log: FlightLog, args: argparse.Namespace) -> None:
     """Play a log to ground stations, as if it were flown now.  Raises FlightError if none answers."""
     link, wait = Link(link_access(args)), _TIMEOUT if args.wait is None else args.wait
-    snapshots = SnapshotMaker(log.setup)
+    snapshots = SnapshotMaker(log.setup, LocalMap.around(log.setup))
     track = log.track
     rows = track_rows(track)
     start = snapshots.before_start(log.setup)

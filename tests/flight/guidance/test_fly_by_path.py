@@ -10,9 +10,10 @@ from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from flight.guidance.fly_by_path import FlyByPath, arc_point, fly_by_path, sample_path
+from flight.guidance.fly_by_path import FlyByPath, arc_point, fly_by_path
 from flight.guidance.path_kernels import PIECE, profile
 from flight.simulation.flight_setup import FlightSetup
+from tests.sampled_paths import sample_path
 from tests.setups import MakeSetup
 from world.geometry import leg_runs, turning_angles
 from world.kernels import Record, field_names

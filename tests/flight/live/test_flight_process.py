@@ -118,5 +118,11 @@ def test_the_process_ends_when_it_is_to_or_its_link_is_gone(order: EndFlight | N
     if order is not None:
         ours.send(order)
     ours.close()
-    serve_flights(theirs, OneSetup(setup_of(wp(0, 0), wp(0, 1500)), MemoryLog()))
+    log = MemoryLog()
+    thread = Thread(target=serve_flights, args=(theirs, OneSetup(setup_of(wp(0, 0), wp(0, 1500)), log)))
+    thread.start()
+    thread.join(20.0)
+    assert not thread.is_alive()
+    assert log.rows == 0
+    assert log.closed == []
     theirs.close()

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flight.live.snapshot import Snapshot, SnapshotMaker
+from flight.simulation.local_map import LocalMap
 from flight.simulation.track import Track, track_rows
 from tests.mission_lines import setup_of, wp
 
@@ -38,7 +39,7 @@ def test_a_row_comes_out_under_its_names() -> None:
     """On the meridian of the map's origin north is true north."""
     setup = setup_of(wp(0, 0), wp(0, 2000))
     track = a_track()
-    snapshot = SnapshotMaker(setup).snapshot(track_rows(track)[0])
+    snapshot = SnapshotMaker(setup, LocalMap.around(setup)).snapshot(track_rows(track)[0])
     assert (snapshot.time, snapshot.amsl, snapshot.height, snapshot.leg) == (7.0, 560.0, 460.0, 2.0)
     assert (snapshot.airspeed, snapshot.throttle, snapshot.current, snapshot.energy) == (25.5, 0.75, 6.5, 8.25)
     assert (snapshot.roll, snapshot.pitch) == pytest.approx((0.1, 0.2))
@@ -52,7 +53,7 @@ def test_a_row_comes_out_under_its_names() -> None:
 
 def test_an_aircraft_waits_at_the_start_on_its_first_course() -> None:
     setup = setup_of(wp(0, 500), wp(2000, 500))
-    snapshot = SnapshotMaker(setup).before_start(setup)
+    snapshot = SnapshotMaker(setup, LocalMap.around(setup)).before_start(setup)
     assert snapshot.amsl == pytest.approx(400.0)
     assert snapshot.height == pytest.approx(300.0)
     assert snapshot.yaw == pytest.approx(math.pi / 2.0, abs=1e-3)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.mission.end_courses import SETTLING_LENGTH, with_end_courses
+from flight.mission.end_courses import END_LEG_LENGTH, with_end_courses
 from flight.mission.route import Route
 from tests.mission_lines import setup_of, wp
 from world.geometry import leg_courses
@@ -31,7 +31,7 @@ def test_the_route_starts_on_the_course_far_enough_for_the_turn(turn_deg: float)
     assert float(leg_courses(longer.waypoints)[0]) == pytest.approx(course, abs=1e-4)
     assert longer.waypoints[0, 2] == route.waypoints[0, 2]
     # R = 625 / (9.80665 tan 30) = 110.39 m; the tangent of a sharp turn counts as two radii at most.
-    length = 110.39 * min(math.tan(abs(course) / 2.0), 2.0) + SETTLING_LENGTH
+    length = 110.39 * min(math.tan(abs(course) / 2.0), 2.0) + END_LEG_LENGTH
     assert math.dist(longer.waypoints[0], longer.waypoints[1]) == pytest.approx(length, abs=0.1)
     assert longer.items.tolist() == [-1, *route.items.tolist()]
     assert f"from a lead-in leg of {length:.0f} m" in longer.started

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
-from flight.guidance.fly_by_path import fly_by_path, sample_path
+from flight.guidance.fly_by_path import fly_by_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
@@ -21,6 +21,7 @@ from logs.recording.recorder import Recorder
 from logs.replay.timeline import timeline
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
+from tests.sampled_paths import sample_path
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
 from world.scenario_tables import MAP_EXTENT

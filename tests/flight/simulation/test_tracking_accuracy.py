@@ -67,6 +67,7 @@ def test_lateral_reference_laws_are_further_off_on_straight_legs() -> None:
 
 @pytest.mark.bench
 def test_the_closed_loop_costs_little() -> None:
-    # A ratio, side by side.
-    assert bench.loop_cost(60, rounds=5, seconds=60).ratio < 1.4
-    assert bench.loop_cost(30, rounds=5, seconds=60).ratio < 1.2
+    # A ratio, side by side; of the least round, because another test on the next core adds more to the loop, whose
+    # Python then leaves the processor's cache, than to JSBSim alone.
+    assert bench.loop_cost(60, rounds=5, seconds=60).least < 1.4
+    assert bench.loop_cost(30, rounds=5, seconds=60).least < 1.2

@@ -21,9 +21,17 @@ def test_a_log_holds_exactly_these(log_file: Path) -> None:
         "verdict.json": "application/json",
         "result.json": "application/json",
     }
-    fixed = {names.SETUP, names.SCENARIO, names.PLAN, names.MISSION, names.TERRAIN, names.VERDICT, names.RESULT}
+    fixed = {
+        names.SETUP_FILE,
+        names.SCENARIO_FILE,
+        names.PLAN_FILE,
+        names.MISSION_FILE,
+        names.TERRAIN_FILE,
+        names.VERDICT_FILE,
+        names.RESULT_FILE,
+    }
     assert fixed | {names.heights_name(0)} == set(found)
-    assert names.RECOVERY not in found
+    assert names.RECOVERY_FILE not in found
 
 
 def test_parts_of_the_terrain_sort_in_their_order() -> None:

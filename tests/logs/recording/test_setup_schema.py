@@ -15,7 +15,7 @@ from logs.recording.setup_schema import (
     envelope_file,
     mission_file,
     read_envelope,
-    read_mission,
+    read_mission_table,
     read_route,
     route_file,
 )
@@ -38,7 +38,7 @@ def through_json(file: SetupModel) -> Any:
 
 
 def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
-    same(read_mission(MissionFile.model_validate(through_json(mission_file(SETUP.mission)))), SETUP.mission)
+    same(read_mission_table(MissionFile.model_validate(through_json(mission_file(SETUP.mission)))), SETUP.mission)
     same(read_route(RouteFile.model_validate(through_json(route_file(SETUP.route))), "x"), SETUP.route)
     envelope = EnvelopeFile.model_validate(through_json(envelope_file(SETUP.envelope)))
     same(read_envelope(envelope, "x"), SETUP.envelope)

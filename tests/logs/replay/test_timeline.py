@@ -11,7 +11,7 @@ from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.replay.instruments import make_instruments
 from logs.replay.timeline import TimelineEntry, entry_lines, timeline
-from logs.verdict.measures.leg_numbers import with_legs
+from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
 from tests.logs.made_flight import make_setup, make_track
 
 
@@ -47,7 +47,7 @@ def test_the_lowest_clearance_of_each_leg_is_that_of_a_fine_sampling(log: Flight
     fine = np.linspace(0.0, log.end_time, 40_001)
     position = np.stack([np.interp(fine, log.track.time, log.track.position[:, k]) for k in range(3)], axis=1)
     height = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
-    legs = with_legs(log.setup, log.track).leg
+    legs = with_legs(log.track, find_leg_ends(log.setup, log.track)).leg
     leg = legs[np.searchsorted(log.track.time, fine, side="right") - 1]
     for k, entry in enumerate(sorted(entries, key=lambda item: item.text)):
         lowest = float(height[leg == k].min())

@@ -2,8 +2,10 @@
 
 import math
 import re
+import tempfile
 from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
+from logs.report.page import write_report
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.wording import place_text
@@ -97,7 +100,9 @@ FINDINGS = (
     finding("slope", Place("leg", 1), False, -3.45, flown=11.25),
     finding("bounds", FLIGHT, None, None, planned=None, flown=None, limit=None, reason="no scenario was given"),
 )
-VERDICT = Verdict(FINDINGS, False, True, ("not flyable: slope on leg 1", "Start: in the air"), "flown")
+VERDICT = Verdict(
+    FINDINGS, False, True, ("not flyable: slope on leg 1", "Start: in the air"), "flown", leg_ends=(40.0, 72.0)
+)
 ARGUMENTS: dict[str, Any] = {
     "ended": "completed",
     "versions": {"planfly": "0.1.0", "jsbsim": "1.3.3"},
@@ -139,3 +144,10 @@ class Page(HTMLParser):
 
     def text(self) -> str:
         return re.sub(r"\s+", " ", " ".join(self.texts))
+
+
+def report_html(setup: FlightSetup, track: Track | None, verdict: Verdict, **arguments: Any) -> str:
+    """The page alone, of a report that is written and thrown away."""
+    with tempfile.TemporaryDirectory() as folder:
+        *_, page = write_report(Path(folder), setup, track, verdict, **arguments)
+        return page.read_text(encoding="utf-8")

@@ -14,10 +14,21 @@ import logs.figures.draw_all
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.draw_all import FIGURE_FILES
-from logs.report.page import report_html, write_report
+from logs.report.page import write_report
 from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
-from tests.logs.report.report_data import ARGUMENTS, EVIL, FINDINGS, PNG, VERDICT, Page, finding, make_setup, make_track
+from tests.logs.report.report_data import (
+    ARGUMENTS,
+    EVIL,
+    FINDINGS,
+    PNG,
+    VERDICT,
+    Page,
+    finding,
+    make_setup,
+    make_track,
+    report_html,
+)
 
 
 @pytest.fixture

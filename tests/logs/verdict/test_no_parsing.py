@@ -17,7 +17,7 @@ from logs.report.text import badge_of, rule_rows
 from logs.verdict import findings, wording
 from logs.verdict.findings import RULES, Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from planfly.refine import tighten
+from planfly.refine import tighten_limits
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bump, edited, fly_path, make_setup
 
@@ -25,7 +25,10 @@ ROOT = Path(__file__).parents[3]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 MUTE = "¤"
 # What words are made by, and the fields that hold some.
-MAKERS = ("place_text", "change_text", "suggestion_text", "suggestions_text", "disagreement_text", "tightening_text")
+MAKERS = (
+    *("place_text", "threat_text", "change_text", "suggestion_text", "suggestions_text", "disagreement_text"),
+    "tightening_text",
+)
 FIELDS = ("reason", "brief", "headline", "summary", "lines")
 TAKE_APART = (
     *("split", "rsplit", "splitlines", "partition", "rpartition", "startswith", "endswith", "removeprefix"),
@@ -60,7 +63,7 @@ def used(verdict: Verdict, setup: FlightSetup) -> list[Any]:
     rows = [
         (row.state, row.rule, row.counts, row.planned, row.flown, row.margin) for row in rule_rows(verdict.findings)
     ]
-    tighter, changes = tighten(setup.scenario, verdict)
+    tighter, changes = tighten_limits(setup.scenario, verdict)
     values = [place_values(verdict.findings, rule) for rule in RULES]
     return [failures(verdict, len(setup.route.waypoints)), values, rows, badge_of(verdict), changes, tighter.to_json()]
 
@@ -110,6 +113,17 @@ def test_a_loiter_is_judged_the_same_without_words(muted: Callable[[], None]) ->
     assert data_of(judge_geometry(setup)) == data_of(spoken)
 
 
+@pytest.mark.parametrize("name", ["threatening hill", "threat 1", "radar (item 2)"])
+def test_what_a_threat_is_called_changes_its_name_alone(name: str) -> None:
+    def written(called: str) -> str:
+        threat = THREAT | {"kill_scale_m": 200.0, "name": called}
+        verdict = judge_geometry(make_setup([[0, 0, 300], [0, 2000, 300]], threats=[threat]))
+        assert f"threat {called} (missile)" in verdict.headline
+        return findings.verdict_json(verdict).replace(called, MUTE)
+
+    assert written(name) == written("Alfa")
+
+
 def modules() -> Iterator[tuple[Path, ast.Module]]:
     """Modules of ours that know verdicts."""
     for package in PACKAGES:
@@ -120,11 +134,16 @@ def modules() -> Iterator[tuple[Path, ast.Module]]:
 
 
 def holds_words(node: ast.AST) -> bool:
-    """Whether an expression holds words of a verdict."""
-    return any(
-        (isinstance(part, ast.Attribute) and part.attr in FIELDS) or (isinstance(part, ast.Name) and part.id in MAKERS)
-        for part in ast.walk(node)
-    )
+    """Whether an expression holds words of a verdict, or the name that a user gave to a place."""
+    for part in ast.walk(node):
+        match part:
+            case ast.Attribute(attr=attr) if attr in FIELDS:
+                return True
+            case ast.Attribute(attr="name", value=ast.Name(id="place") | ast.Attribute(attr="place")):
+                return True
+            case ast.Name(id=name) if name in MAKERS:
+                return True
+    return False
 
 
 def test_no_module_that_knows_verdicts_takes_their_words_apart() -> None:

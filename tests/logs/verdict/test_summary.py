@@ -35,9 +35,11 @@ def test_evidence_without_a_number_beyond_its_limit_is_named_in_brief() -> None:
 
 
 def test_a_threat_is_named_once() -> None:
-    items = [make_finding("threat", missile(name), ok=False, reason="", flown=3.0) for name in ("Alfa", "threat 2")]
+    places = (missile("Alfa"), Place("missile", 1), missile("threatening hill"))
+    items = [make_finding("threat", place, ok=False, reason="", flown=3.0) for place in places]
     assert headline(items, False) == (
-        "not flyable: threat Alfa (missile) (3.0 s inside), threat 2 (missile) (3.0 s inside)"
+        "not flyable: threat Alfa (missile) (3.0 s inside), threat 2 (missile) (3.0 s inside),"
+        " threat threatening hill (missile) (3.0 s inside)"
     )
 
 

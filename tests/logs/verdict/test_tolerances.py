@@ -41,4 +41,4 @@ def test_more_turbulence_allows_no_less() -> None:
 def test_px4s_defaults_are_those_of_its_parameters() -> None:
     """NAV_ACC_RAD, FW_LND_ANG and MIS_DIST_1WP as PX4's parameter reference has them."""
     assert (tolerances.PX4_ACCEPTANCE, tolerances.PX4_FIRST_WAYPOINT) == (10.0, 10_000.0)
-    assert math.degrees(tolerances.PX4_LANDING_ANGLE) == pytest.approx(5.1)
+    assert math.degrees(tolerances.PX4_STEEPEST_LANDING) == pytest.approx(5.1)

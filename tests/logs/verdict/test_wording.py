@@ -29,6 +29,7 @@ LONGER = Change("length", leg(1), 150.0, 300.0, "m")
         (Place("mission", item=0), "item 0"),
         (Place("missile", 0, name="Alfa"), "Alfa (missile)"),
         (Place("radar", 2, name="threat 3"), "threat 3 (radar)"),
+        (Place("radar", 2), "threat 3 (radar)"),
     ],
 )
 def test_places(place: Place, text: str) -> None:
@@ -49,6 +50,7 @@ def test_places(place: Place, text: str) -> None:
         (Change("height", leg(4), None, 12.0, "m"), "fly leg 4 12 m higher"),
         (Change("inset", FLIGHT, None, 7.0, "m"), "bring the path 7 m further inside"),
         (Change("distance", missile("Alfa"), None, 41.0, "m"), "pass Alfa 41 m further away"),
+        (Change("distance", Place("missile", 1), None, 41.0, "m"), "pass threat 2 41 m further away"),
         (Change("duration", FLIGHT, None, 12.0, "%"), "shorten the flight by 12 %"),
         (Change("battery", FLIGHT, None, 1.13, "1"), "take a battery 1.13 times as large"),
         (Change("tank", FLIGHT, None, 2.0, "1"), "take a tank 2.00 times as large"),
@@ -67,7 +69,7 @@ def test_changes_together_and_alternatives() -> None:
     assert suggestions_text(()) == ""
 
 
-def test_headlines_have_room_for_eighty_characters() -> None:
+def test_a_headline_takes_eighty_characters_of_a_statement() -> None:
     assert shortened("m" * 80) == "m" * 80
     assert shortened("m" * 81) == "m" * 77 + "..."
 

@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 import planfly.commands
-from planfly.commands.registry import COMMANDS, find_command
+from planfly.commands.registry import COMMAND_NAMES, find_command
 
 HELPERS = {"__init__", "registry", "served_flights"}
 
 
 def test_the_commands_are_the_modules_of_their_folder() -> None:
     modules = {path.stem for path in Path(planfly.commands.__path__[0]).glob("*.py")} - HELPERS
-    assert sorted(COMMANDS) == sorted(modules)
-    for name in COMMANDS:
+    assert sorted(COMMAND_NAMES) == sorted(modules)
+    for name in COMMAND_NAMES:
         command = find_command(name)
         assert (command.__module__, command.__name__) == (f"planfly.commands.{name}", name)
 

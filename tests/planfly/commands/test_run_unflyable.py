@@ -7,7 +7,7 @@ import pytest
 from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from planfly.airframe import Airframe, load_airframe
-from planfly.pipeline import fly, make_plan, make_setup
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planner.plan import Plan
 from world.scenario import load_scenario
 
@@ -18,7 +18,7 @@ def judge(plan: Plan, airframe: Airframe, first: int, last: int) -> Verdict:
     # Item 0 sets the speed; item k + 1 is waypoint k.
     part = dataclasses.replace(mission, items=(mission.items[0], *mission.items[first + 1 : last + 2]))
     setup = make_setup(plan.scenario, airframe, part, 1)
-    return fly(setup, airframe, None).verdict
+    return fly_and_judge(setup, airframe, None).verdict
 
 
 def failing_legs(verdict: Verdict, legs: int) -> set[int]:

@@ -5,12 +5,12 @@ import sys
 
 import pytest
 
-from planfly.commands.registry import COMMANDS
+from planfly.commands.registry import COMMAND_NAMES
 from planfly.terminal.parser import build_parser
 
 
 def test_help_describes_every_command_and_no_other(capsys: pytest.CaptureFixture[str]) -> None:
-    for name in COMMANDS:
+    for name in COMMAND_NAMES:
         with pytest.raises(SystemExit) as stopped:
             build_parser().parse_args([name, "--help"])
         assert stopped.value.code == 0
@@ -21,11 +21,11 @@ def test_help_describes_every_command_and_no_other(capsys: pytest.CaptureFixture
         build_parser().parse_args(["--help"])
     text = capsys.readouterr().out
     listed = [line.split()[0] for line in text.splitlines() if line.startswith("    ") and line[4:5].isalpha()]
-    assert sorted(listed) == sorted(COMMANDS)
+    assert sorted(listed) == sorted(COMMAND_NAMES)
 
 
 def test_the_example_of_each_command_is_one_that_it_takes(capsys: pytest.CaptureFixture[str]) -> None:
-    for name in COMMANDS:
+    for name in COMMAND_NAMES:
         with pytest.raises(SystemExit):
             build_parser().parse_args([name, "--help"])
         (line,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("example: ")]

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits, turn_tangents
-from flight.guidance.fly_by_path import fly_by_path, sample_path
+from flight.guidance.fly_by_path import fly_by_path
 from flight.mission.route import Route
 from planner.evaluation.problem import ANGLE_MARGIN, CERTIFIED_KILL_MARGIN
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
+from tests.sampled_paths import sample_path
 from world.scenario import Scenario, load_scenario
 
 EMBEDDED = ("jacksboro", "steep", "tight")

@@ -11,11 +11,11 @@ from logs.figures.elements.failures import Failures
 from logs.figures.elements.scene_data import (
     MISSING,
     MOST_GROUND,
+    drawn_positions,
     exaggeration,
     ground_grid,
     scene_bounds,
     scene_json,
-    track_rows,
 )
 from tests.logs.made_flight import make_setup, make_track
 
@@ -69,11 +69,11 @@ def test_the_track_is_thinned_to_both_its_ends() -> None:
     track = make_track()
     position = track.position.copy()
     position[100:110] = np.nan
-    rows = track_rows(replace(track, position=position), 50)
+    rows = drawn_positions(replace(track, position=position), 50)
     assert len(rows) == 50
     assert np.isfinite(rows).all()
     np.testing.assert_array_equal(rows[[0, -1]], track.position[[0, -1]])
-    assert track_rows(replace(track, position=np.full_like(position, np.nan))).shape == (0, 3)
+    assert drawn_positions(replace(track, position=np.full_like(position, np.nan))).shape == (0, 3)
 
 
 def test_the_text_holds_the_scene_and_ends_no_script() -> None:

@@ -1,0 +1,176 @@
+"""Newton's method, rotations and the wind triangle of a trim, against models whose answers are known."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from flight.dynamics.trim import (
+    QUANTITIES,
+    Trim,
+    air_velocity,
+    attitude,
+    body_axes,
+    euler,
+    first_guess,
+    from_vector,
+    full_throttle,
+    idle,
+    linearise,
+    slowest,
+    solve,
+    straight,
+)
+from world.errors import FlightError
+
+Floats = NDArray[np.float64]
+LIMITS = (0.5, 0.4, 0.3)
+GUESS = first_guess(25.0)
+
+
+class LinearAircraft:
+    """Its six accelerations are linear in the trim vector, and vanish at `balanced` and along two ways from it.
+
+    Climbing takes throttle, 1 for a slope of 0.5; a higher airspeed takes less elevator.
+    """
+
+    balanced = np.array([25.0, 0.0, 0.05, 0.01, -0.1, 0.02, -0.01, 0.5])
+
+    def __init__(self) -> None:
+        self.amsl = math.nan
+        rng = np.random.default_rng(8)
+        self.a, self.b = rng.normal(size=(8, 8)), rng.normal(size=(8, 4))
+
+    def move_to(self, amsl: float) -> None:
+        self.amsl = amsl
+
+    def balance(self, values: Floats) -> Floats:
+        airspeed, climb, alpha, bank, elevator, aileron, rudder, throttle = values - self.balanced
+        return np.array(
+            [
+                4.0 * (throttle - 2.0 * climb) + 0.1 * alpha,
+                alpha + 0.004 * airspeed,
+                bank,
+                aileron + 0.2 * rudder,
+                rudder - 0.1 * aileron,
+                9.0 * (elevator - 0.01 * airspeed),
+            ]
+        )
+
+    def surface_limits(self) -> tuple[float, float, float]:
+        return LIMITS
+
+    def first_guess(self) -> Floats:
+        return GUESS
+
+    def derivatives(self, states: Floats, commands: Floats) -> Floats:
+        return np.asarray(self.a @ states + self.b @ commands)
+
+
+def test_held_quantities_stay_and_the_others_balance() -> None:
+    aircraft = LinearAircraft()
+    found = solve(aircraft.balance, {"airspeed": 28.0, "climb": 0.1}, LIMITS)
+    assert found is not None
+    # 3 m/s faster: alpha less by 0.012, elevator more by 0.03; a slope of 0.1 takes 0.2 more throttle and 0.0003.
+    wanted = [28.0, 0.1, 0.038, 0.01, -0.07, 0.02, -0.01, 0.5 + 0.2 + 0.012 * 0.1 / 4.0]
+    assert found == pytest.approx(wanted, abs=1e-8)
+
+
+@pytest.mark.parametrize(("airspeed", "climb", "found"), [(25, 0.24, True), (25, 0.26, False), (66, 0, False)])
+def test_what_the_stops_do_not_allow_is_no_flight(airspeed: float, climb: float, found: bool) -> None:
+    # Throttles of 0.98 and 1.02; an elevator of 0.31, where 0.3 is the stop.
+    trimmed = solve(LinearAircraft().balance, {"airspeed": airspeed, "climb": climb}, (0.3, 0.4, 0.3))
+    assert (trimmed is not None) == found
+
+
+def test_a_balance_that_is_not_a_number_is_no_flight() -> None:
+    assert solve(lambda _: np.full(6, math.nan), {"airspeed": 25.0, "climb": 0.0}, LIMITS) is None
+
+
+def test_each_kind_of_trim_holds_its_two_quantities() -> None:
+    aircraft = LinearAircraft()
+    held = straight(aircraft, 26.0, 700.0, 0.05)
+    assert held is not None
+    assert (held.airspeed, held.climb, held.amsl, aircraft.amsl) == (26.0, 0.05, 700.0, 700.0)
+    steepest, lowest = full_throttle(aircraft, 25.0, 0.0), idle(aircraft, 25.0, 0.0)
+    assert steepest is not None
+    assert lowest is not None
+    assert (steepest.throttle, lowest.throttle) == (1.0, 0.0)
+    # Half of the throttle is a slope of 0.25.
+    assert (steepest.climb, lowest.climb) == pytest.approx((0.25, -0.25))
+
+
+def test_the_slowest_flight_has_the_elevator_at_its_stop() -> None:
+    slow = slowest(LinearAircraft(), 0.0)
+    # -0.5 is 40 m/s slower than the 25 m/s of -0.1, which is no flight; -0.2 is 15 m/s.
+    assert slow is None
+    aircraft = LinearAircraft()
+    aircraft.surface_limits = lambda: (0.2, 0.4, 0.3)  # type: ignore[method-assign]  # an aircraft with less elevator
+    slow = slowest(aircraft, 0.0)
+    assert slow is not None
+    assert (slow.elevator, slow.climb) == (-0.2, 0.0)
+    assert slow.airspeed == pytest.approx(15.0)
+
+
+def test_vector_and_back_is_the_same_trim() -> None:
+    trim = Trim(25.0, 700.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+    assert from_vector(trim.vector(), 700.0) == trim
+    assert trim.commands() == (0.4, 0.5, 0.6, 0.7)
+    assert dict(zip(QUANTITIES, trim.vector(), strict=True))["bank"] == 0.3
+
+
+def test_linearising_a_linear_aircraft_gives_its_matrices() -> None:
+    aircraft = LinearAircraft()
+    a, b = linearise(aircraft, from_vector(LinearAircraft.balanced, 300.0))
+    np.testing.assert_allclose(a, aircraft.a, atol=1e-7)
+    np.testing.assert_allclose(b, aircraft.b, atol=1e-7)
+    assert aircraft.amsl == 300.0
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-1.2, 1.2), st.floats(-1.2, 1.2), st.floats(-0.3, 0.3))
+def test_body_axes_put_the_velocity_where_alpha_says(heading: float, climb: float, bank: float, alpha: float) -> None:
+    axes = body_axes(heading, climb, bank, alpha)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) == pytest.approx(1.0)
+    velocity = axes @ [math.cos(alpha), 0.0, math.sin(alpha)]
+    down = [math.cos(heading) * math.cos(climb), math.sin(heading) * math.cos(climb), -math.sin(climb)]
+    np.testing.assert_allclose(velocity, down, atol=1e-12)
+
+
+@given(st.floats(-3.0, 3.0), st.floats(-1.5, 1.5), st.floats(-3.0, 3.0))
+def test_euler_angles_are_those_of_the_rotation(roll: float, pitch: float, yaw: float) -> None:
+    def turn(axis: int, angle: float) -> Floats:
+        i, j = [(1, 2), (2, 0), (0, 1)][axis]
+        out = np.eye(3)
+        out[i, i] = out[j, j] = math.cos(angle)
+        out[j, i], out[i, j] = math.sin(angle), -math.sin(angle)
+        return out
+
+    assert euler(turn(2, yaw) @ turn(1, pitch) @ turn(0, roll)) == pytest.approx((roll, pitch, yaw), abs=1e-9)
+
+
+def test_without_bank_the_pitch_is_the_slope_and_the_angle_of_attack() -> None:
+    assert attitude(Trim(25.0, 0.0, 0.1, 0.06, 0.0, 0.0, 0.0, 0.0, 0.5)) == pytest.approx((0.0, 0.16))
+
+
+def test_the_air_and_the_wind_add_up_to_the_course() -> None:
+    # To the north in 7 m/s from the west: 24 of the 25 m/s are left.
+    assert air_velocity(0.0, 0.0, 25.0, np.array([0.0, 7.0, 0.0])).tolist() == pytest.approx([24.0, -7.0, 0.0])
+    wind = np.array([3.0, -6.0, 0.4])
+    velocity = air_velocity(2.0, 0.05, 24.0, wind)
+    assert np.linalg.norm(velocity) == pytest.approx(24.0)
+    ground = velocity + wind
+    assert math.atan2(ground[1], ground[0]) == pytest.approx(2.0)
+    assert math.atan2(-ground[2], math.hypot(ground[0], ground[1])) == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize(
+    ("airspeed", "wind"),
+    [(25.0, (-25.1, 0.0, 0.0)), (25.0, (0.0, 25.1, 0.0)), (0.0, (0.0, 0.0, 0.0)), (-5.0, (9, 0, 0))],
+)
+def test_a_wind_that_leaves_no_way_is_refused(airspeed: float, wind: tuple[float, float, float]) -> None:
+    with pytest.raises(FlightError, match=f"no way made along the course of 0 degrees: airspeed {airspeed:.1f} m/s"):
+        air_velocity(0.0, 0.0, airspeed, np.array(wind))

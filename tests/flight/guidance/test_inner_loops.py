@@ -1,0 +1,130 @@
+"""The vertical channel and the inner loops: nothing to do in steady flight, and each error is worked against."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from aircraft.envelope import GRAVITY
+from flight.dynamics.state import COMMANDS, STATE
+from flight.guidance.gains import Gains, load_gains
+from flight.guidance.guidance_memory import GUIDANCE_MEMORY
+from flight.guidance.inner_loops import roll_model, steer_bank, steer_height
+from flight.guidance.navigation_error import MOTION
+from flight.guidance.path_kernels import NODE
+from world.kernels import Record
+
+GAINS = load_gains(load_aircraft("aerosonde"))
+DT = 1.0 / 60.0
+TRIM = {"trim_elevator": -0.12, "trim_alpha": 0.05, "trim_throttle": 0.6}
+
+
+def record(dtype: np.dtype[np.record], **values: float) -> Record:
+    made: Record = np.zeros(1, dtype)[0]
+    for name, value in values.items():
+        made[name] = value
+    return made
+
+
+class Channel:
+    """Guidance at 500 m on a level path to the north, at the airspeed of the gains."""
+
+    def __init__(self, gains: Gains = GAINS, *, slope: float = 0.0) -> None:
+        self.gains, self.speed = gains.record(), gains.reference_airspeed
+        self.nodes: Any = np.array([(0.0, 500.0, slope, 0.0)], NODE)
+        self.memory = record(GUIDANCE_MEMORY, last_airspeed=-1.0, speed_command=self.speed, **TRIM)
+        self.commands = record(COMMANDS)
+
+    def height(self, *, up: float = 500.0, climb: float = 0.0, airspeed: float | None = None) -> Record:
+        state = record(STATE, airspeed=self.speed if airspeed is None else airspeed)
+        estimated = record(MOTION, up=up, velocity_north=self.speed, velocity_up=climb)
+        steer_height(state, estimated, self.nodes, self.gains, self.memory, self.commands, 0.0, DT)
+        return self.commands
+
+    def bank(self, wanted: float, **state: float) -> Record:
+        flown = record(STATE, **({"airspeed": self.speed} | state))
+        steer_bank(flown, self.gains, self.memory, self.commands, wanted, DT)
+        return self.commands
+
+
+def test_on_the_path_at_its_speed_the_trim_is_kept() -> None:
+    commands = Channel().height()
+    assert commands.elevator == pytest.approx(TRIM["trim_elevator"])
+    assert commands.throttle == pytest.approx(TRIM["trim_throttle"])
+
+
+@pytest.mark.parametrize("error", [-3.0, -0.1, 0.1, 3.0])
+def test_above_the_path_the_nose_goes_down_and_below_it_up(error: float) -> None:
+    channel = Channel()
+    commands = channel.height(up=500.0 + error)
+    # A trailing edge down, which is positive, takes the nose down.
+    assert math.copysign(1.0, commands.elevator - TRIM["trim_elevator"]) == math.copysign(1.0, error)
+    assert channel.memory.height_error == pytest.approx(error)
+
+
+def test_a_climbing_path_wants_its_climb_rate_and_more_throttle() -> None:
+    channel = Channel(slope=0.1)
+    level = channel.height(climb=0.0).elevator
+    climbing = channel.height(climb=0.1 * channel.speed).elevator
+    # On the slope there is little to do; level there is much to pull.
+    assert abs(climbing - TRIM["trim_elevator"]) < 0.3 * abs(level - TRIM["trim_elevator"])
+    assert level < TRIM["trim_elevator"]
+    wanted = TRIM["trim_throttle"] + GAINS.throttle_per_slope * 0.1
+    assert Channel(slope=0.1).height(climb=0.1 * channel.speed).throttle == pytest.approx(min(1.0, wanted))
+
+
+def test_too_slow_takes_throttle_too_fast_gives_it_back_within_0_and_1() -> None:
+    speed = GAINS.reference_airspeed
+    assert Channel().height(airspeed=speed - 0.5).throttle > TRIM["trim_throttle"]
+    assert Channel().height(airspeed=speed + 0.5).throttle < TRIM["trim_throttle"]
+    assert Channel().height(airspeed=speed - 15.0).throttle == 1.0
+    assert Channel().height(airspeed=speed + 15.0).throttle == 0.0
+
+
+def test_after_a_second_at_full_throttle_height_gives_way_to_speed() -> None:
+    def elevator(full_throttle: float) -> float:
+        channel = Channel()
+        channel.memory.full_throttle = full_throttle
+        return float(channel.height(up=480.0, airspeed=channel.speed - GAINS.slow_margin - 2.0).elevator)
+
+    assert elevator(1.1) > elevator(0.9)
+
+
+def test_wings_level_in_still_air_there_is_nothing_to_do() -> None:
+    commands = Channel().bank(0.0)
+    assert (commands.aileron, commands.rudder) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_bank_is_rolled_into_and_a_roll_is_damped(side: float) -> None:
+    # Positive aileron rolls right.
+    assert side * Channel().bank(side * 0.4).aileron > 0.0
+    assert side * Channel().bank(0.0, roll=side * 0.1).aileron < 0.0
+    assert side * Channel().bank(0.0, beta=side * 0.1).rudder <= 0.0
+
+
+def test_in_a_coordinated_turn_the_rudder_has_nothing_to_damp() -> None:
+    gains = replace(GAINS, rudder_per_yaw_rate=0.0, sideslip_gain=0.0)
+    turning = GRAVITY / gains.reference_airspeed * math.sin(0.4)
+    assert Channel(gains).bank(0.4, roll=0.4, yaw_rate=turning).rudder == pytest.approx(0.0, abs=1e-15)
+    assert Channel(gains).bank(0.4, roll=0.4).rudder == pytest.approx(-gains.yaw_rate_gain * turning)
+
+
+@pytest.mark.parametrize("wanted", [-0.6, 0.02, 0.6])
+def test_the_model_roll_arrives_within_its_limits_and_does_not_overshoot(wanted: float) -> None:
+    gains, bank, rate = GAINS.record(), 0.0, 0.0
+    rates, banks, changes = [], [], []
+    for _ in range(600):
+        bank, rate, change = roll_model(wanted, bank, rate, gains, DT)
+        banks.append(bank)
+        rates.append(abs(rate))
+        changes.append(abs(change))
+    assert banks[-1] == pytest.approx(wanted, abs=1e-6)
+    assert max(math.copysign(1.0, wanted) * np.array(banks)) <= abs(wanted) * (1.0 + 1e-3)
+    assert max(rates) <= GAINS.roll_rate_max * (1.0 + 1e-12)
+    assert max(changes) <= GAINS.roll_acceleration_max * (1.0 + 1e-12)
+    # The first tick's acceleration: of a critically damped oscillator at rest, or as much as is allowed.
+    assert changes[0] == pytest.approx(min(GAINS.roll_frequency**2 * abs(wanted), GAINS.roll_acceleration_max))

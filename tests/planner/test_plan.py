@@ -1,0 +1,148 @@
+"""A plan's text and back, what counts as feasible and safe, and files that are no plan."""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planner.plan import Certificate, Objective, Plan, Violation, parse_plan, plan_json, read_plan
+from tests.setups import small_scenario
+from world.errors import MissionError, PlanflyError, ScenarioError
+
+CERTIFICATE = Certificate(0.1, 20.0, 0.2, 9.0, 10.0, 50.0, ())
+
+
+def made(**changes: Any) -> Plan:
+    scenario = small_scenario()
+    plan = Plan(
+        scenario=scenario,
+        waypoints=np.stack([scenario.start, [3000.0, 1 / 3, 200.0], scenario.destination]),
+        violations=np.array([0, 0, 0, 0]),
+        objectives=np.array([1.01, 0.0, 2.5, 900.0]),
+        certificate=CERTIFICATE,
+        seed=7,
+        algorithm="umda",
+        evaluations=60,
+        history=np.array([[1.5, 0.25, 3.0], [1.01, 0.0, math.nan]]),
+        ended="budget",
+        flown_legs=1,
+    )
+    return replace(plan, **changes)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"certificate": Certificate(-0.1, math.inf, -0.2, math.nan, -1.0, math.inf, ("leg 1: too steep", "b"))},
+        {"history": np.zeros((0, 3)), "ended": "completed", "flown_legs": 0},
+    ],
+)
+def test_text_and_back_is_the_same_plan(changes: dict[str, Any]) -> None:
+    plan = made(**changes)
+    text = plan_json(plan)
+    again = parse_plan(text, "plan.json")
+    for name in ("waypoints", "violations", "objectives", "history"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(plan, name))
+    for name in ("seed", "algorithm", "evaluations", "ended", "flown_legs", "feasible", "safe"):
+        assert getattr(again, name) == getattr(plan, name)
+    # NaN is not equal to itself.
+    assert str(again.certificate) == str(plan.certificate)
+    assert again.scenario.spec == plan.scenario.spec
+    assert plan_json(again) == text
+
+
+def test_numbers_stand_under_their_names() -> None:
+    data = json.loads(plan_json(made(violations=np.array([1, 2, 3, 4]))))
+    assert data["violations"] == {"turn": 1, "slope": 2, "terrain": 3, "bounds": 4}
+    assert data["objectives"] == {
+        "length_ratio": 1.01,
+        "kill_exposure": 0.0,
+        "detection_exposure": 2.5,
+        "height_sum": 900.0,
+    }
+    assert data["certificate"]["turn_room_m"] == 20.0
+    assert data["history"][1] == [1.01, 0.0, None]
+    assert data["waypoints_east_north_amsl_m"][1] == [3000.0, 1 / 3, 200.0]
+    assert (len(Violation), len(Objective)) == (4, 4)
+
+
+def test_feasible_is_counted_and_continuous_and_safe_is_outside_missiles_too() -> None:
+    assert (made().feasible, made().safe) == (True, True)
+    failed = replace(CERTIFICATE, problems=("too low",))
+    assert not made(certificate=failed).feasible
+    for kind in Violation:
+        assert not made(violations=np.eye(4)[kind]).feasible
+    for distance, safe in ((-1.0, False), (0.0, False), (0.1, True), (math.inf, True)):
+        plan = made(certificate=replace(CERTIFICATE, kill_distance=distance))
+        assert (plan.feasible, plan.safe) == (True, safe)
+    assert not made(certificate=failed).safe
+
+
+def test_arrays_are_locked() -> None:
+    plan = made()
+    for name in ("waypoints", "violations", "objectives", "history"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(plan, name)[0] = 1
+
+
+def _without(key: str) -> Callable[[dict[str, Any]], None]:
+    return lambda data: data.pop(key)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda data: data.update(schema="planfly.plan/2"), r"^p\.json: schema: .*planfly\.plan/1"),
+        (_without("certificate"), r"^p\.json: certificate: Field required"),
+        (lambda data: data.update(colour=1), r"^p\.json: colour: "),
+        (lambda data: data.update(seed=-1), r"^p\.json: seed: -1: "),
+        (lambda data: data.update(ended="tired"), r"^p\.json: ended: "),
+        (lambda data: data["waypoints_east_north_amsl_m"][1].pop(), r"^p\.json: waypoints_east_north_amsl_m\.1: "),
+        (lambda data: data["waypoints_east_north_amsl_m"][1].append(1), r"^p\.json: waypoints_east_north_amsl_m\.1: "),
+        (lambda data: data.update(waypoints_east_north_amsl_m=[[0, 0, 0]]), r"^p\.json: waypoints_east_north_amsl_m: "),
+        (lambda data: data["waypoints_east_north_amsl_m"].insert(1, [5e5 + 1, 0, 0]), r"amsl_m\.1\.0: 500001"),
+        (lambda data: data["violations"].pop("turn"), r"^p\.json: violations: keys \['bounds', 'slope', 'terrain'\]"),
+        (lambda data: data["objectives"].update(beauty=1.0), r"^p\.json: objectives: keys \['beauty', "),
+        (lambda data: data["scenario"].pop("terrain"), r"^p\.json: terrain: Field required"),
+    ],
+)
+def test_one_fault_one_line(change: Callable[[dict[str, Any]], object], message: str) -> None:
+    data = json.loads(plan_json(made()))
+    change(data)
+    with pytest.raises(PlanflyError, match=message) as caught:
+        parse_plan(json.dumps(data), "p.json")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("number", ["NaN", "Infinity", "-Infinity"])
+def test_what_json_does_not_know_is_no_number(number: str) -> None:
+    text = plan_json(made()).replace("200.0", number, 1)
+    with pytest.raises(MissionError, match=f"p.json: not valid JSON: {number} is not a number"):
+        parse_plan(text, "p.json")
+
+
+def test_text_that_is_no_json_is_refused() -> None:
+    for text in ("", "{", "[" * 100_000):
+        with pytest.raises(MissionError, match=r"^p\.json: not valid JSON: "):
+            parse_plan(text, "p.json")
+
+
+def test_files_are_named_when_they_cannot_be_read(tmp_path: Path) -> None:
+    file = tmp_path / "plan.json"
+    file.write_text(plan_json(made()), encoding="utf-8")
+    np.testing.assert_array_equal(read_plan(file).waypoints, made().waypoints)
+    file.write_bytes(b"\xff")
+    with pytest.raises(MissionError, match=r"plan\.json: not a text file in UTF-8 \(byte 0\)"):
+        read_plan(file)
+    with pytest.raises(MissionError, match=f"^{tmp_path}: cannot be read: "):
+        read_plan(tmp_path)
+    text = plan_json(made()).replace('"name": "small"', '"name": 5')
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"plan\.json: name: 5: "):
+        read_plan(file)

@@ -1,0 +1,165 @@
+"""The tables of a scenario file: every default, every range, and every fault in one line with its key and value."""
+
+import math
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.world.small_file import SMALL, THREAT, refused, with_fault
+from world.errors import ScenarioError
+from world.scenario_file import check_scenario, parse_scenario
+from world.scenario_tables import ScenarioFile
+
+
+def test_every_default() -> None:
+    file = parse_scenario(SMALL, "small.toml")
+    assert file.model_dump(exclude={"terrain", "area", "start", "destination"}) == {
+        "name": "small",
+        "description": "",
+        "origin": None,
+        "threats": [],
+        "limits": {
+            "max_turn_deg": "aircraft",
+            "max_climb_deg": "aircraft",
+            "max_dive_deg": "aircraft",
+            "min_clearance_m": 30.0,
+        },
+        "planner": {
+            "algorithm": None,
+            "waypoints": 12,
+            "population": 200,
+            "generations": 100,
+            "across_m": None,
+            "goals": {"length_ratio": None, "kill_exposure": None},
+            "budget": None,
+            "seed": None,
+        },
+        "flight": {
+            "aircraft": "aerosonde",
+            "airspeed_mps": None,
+            "max_bank_deg": 30.0,
+            "guidance": "path",
+            "guidance_hz": 60,
+            "nav": "perfect",
+            "fly_over": False,
+            "motor_braking": False,
+            "battery_wh": None,
+        },
+        "wind": {"speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0, "turbulence": "none", "seed": None},
+    }
+
+
+# What is replaced in the small file or appended to it, and what the line must say.
+CASES: dict[str, tuple[str, str, str]] = {
+    "missing table": ("[area]\neast_m = [-5000, 5000]\nnorth_m = [-4000, 4000]\n", "", "area: missing"),
+    "nan": ("amsl_m = 400", "amsl_m = nan", "start.amsl_m: nan: allowed -500..9000"),
+    "inf": ("amsl_m = 400", "amsl_m = inf", "start.amsl_m: inf: allowed -500..9000"),
+    "minus inf": ("amsl_m = 400", "amsl_m = -inf", "start.amsl_m: -inf: allowed -500..9000"),
+    "nan in a list": ("[-5000, 5000]", "[-5000, nan]", "area.east_m.1: nan: allowed -500000..500000"),
+    "out of range": ("amsl_m = 400", "amsl_m = 9001", "start.amsl_m: 9001"),
+    "a number of 400 digits": ("amsl_m = 400", f"amsl_m = 1{'0' * 400}", "start.amsl_m: 1000"),
+    "quoted number": ("amsl_m = 400", 'amsl_m = "400"', 'start.amsl_m: "400": Input should be a valid number'),
+    "bool for a number": ("amsl_m = 400", "amsl_m = true", "start.amsl_m: true: Input should be a valid number"),
+    "bool in a list": ("[-5000, 5000]", "[-5000, true]", "area.east_m.1: true: Input should be a valid number"),
+    "text for a truth": ("", '[flight]\nfly_over = "yes"', 'flight.fly_over: "yes": Input should be a valid boolean'),
+    "number for a truth": ("", "[flight]\nfly_over = 1", "flight.fly_over: 1: Input should be a valid boolean"),
+    "number for a text": ('name = "small"', "name = 5", "name: 5: Input should be a valid string"),
+    "part of a generation": (
+        "",
+        "[planner]\ngenerations = 2.5",
+        "planner.generations: 2.5: Input should be a valid int",
+    ),
+    "a list for a number": ("amsl_m = 400", "amsl_m = [400]", "start.amsl_m: Input should be a valid number"),
+    "span of three": ("[-5000, 5000]", "[-5000, 0, 5000]", "area.east_m: List should have at most 2"),
+    "span upside down": ("[-5000, 5000]", "[5000, -5000]", "east_m: [5000, -5000]: the second must exceed"),
+    "ceiling under floor": (
+        "[start]",
+        "ceiling_amsl_m = 300\nfloor_amsl_m = 300\n[start]",
+        "area: ceiling_amsl_m: 300: must be above floor_amsl_m 300",
+    ),
+    "no height": ("amsl_m = 400", "", "start: amsl_m: missing; give amsl_m or height_m"),
+    "two heights": ("amsl_m = 400", "amsl_m = 400\nheight_m = 9", "start: height_m: give amsl_m or height_m, not both"),
+    "half a position": ("east_m = -4000", "", "start: position: give east_m and north_m, or lat_deg and lon_deg"),
+    "two positions": ("east_m = -4000", "east_m = -4000\nlat_deg = 46\nlon_deg = 8", "start: position: give"),
+    "latitude": ("", "[origin]\nlat_deg = 91\nlon_deg = 8", "origin.lat_deg: 91: allowed -89..89"),
+    "missing longitude": ("", "[origin]\nlat_deg = 46", "origin.lon_deg: Field required"),
+    "radius without scale": ("", THREAT.replace("kill_scale_m = 200", ""), "kill_radius_m and kill_scale_m: give both"),
+    "scale without radius": (
+        "",
+        THREAT.replace("kill_radius_m = 800", ""),
+        "kill_radius_m and kill_scale_m: give both",
+    ),
+    "a threat without either": ("", THREAT.split("kill_radius")[0], "threats.0: kill_radius_m: missing"),
+    "a radius of zero": ("", THREAT.replace("800", "0"), "threats.0.kill_radius_m: 0: allowed above 0..200000"),
+    "turn": ("", "[limits]\nmax_turn_deg = 200", 'limits.max_turn_deg: 200: allowed above 0..180, or "aircraft"'),
+    "turn by name": ("", '[limits]\nmax_turn_deg = "any"', 'limits.max_turn_deg: "any"'),
+    "climb of 90": ("", "[limits]\nmax_climb_deg = 90", "limits.max_climb_deg: 90: allowed above 0..below 90"),
+    "dive nan": ("", "[limits]\nmax_dive_deg = nan", "limits.max_dive_deg: nan: allowed above 0..below 90"),
+    "waypoints": ("", "[planner]\nwaypoints = 2", "planner.waypoints: 2: allowed 3..500"),
+    "seed": ("", "[planner]\nseed = -1", "planner.seed: -1: allowed 0..9223372036854775807"),
+    "goals": ("", "[planner.goals]\nlength_ratio = 0.5", "planner.goals.length_ratio: 0.5: allowed 1..100"),
+    "airspeed": ("", "[flight]\nairspeed_mps = 14", "flight.airspeed_mps: 14: allowed 15..60"),
+    "guidance": ("", '[flight]\nguidance = "luck"', 'flight.guidance: "luck"'),
+    "guidance_hz": ("", "[flight]\nguidance_hz = 45", "flight.guidance_hz: 45"),
+    "nav": ("", '[flight]\nnav = "sextant"', 'flight.nav: "sextant"'),
+    "wind": ("", "[wind]\nspeed_mps = 41", "wind.speed_mps: 41: allowed 0..40"),
+    "wind from": ("", "[wind]\nfrom_deg = 361", "wind.from_deg: 361: allowed -360..360"),
+    "turbulence": ("", '[wind]\nturbulence = "severe"', 'wind.turbulence: "severe"'),
+    "terrain kind": ('kind = "flat"', 'kind = "mars"', 'terrain.kind: "mars"'),
+    "another kind's key": ("amsl_m = 200", 'amsl_m = 200\npath = "x"', 'path: not a key of kind = "flat"'),
+    "kind without its key": ("amsl_m = 200", "", 'amsl_m: missing; kind = "flat" needs it'),
+    "a tile's name with a line break": (
+        'kind = "flat"\namsl_m = 200',
+        'kind = "dem"\npath = "a\\nb.tif"',
+        'terrain.path: "a\\nb.tif": control characters',
+    ),
+    "a name with a line break": ('"small"', '"a\\nb"', 'name: "a\\nb": control characters are not allowed'),
+    "a peak of no width": (
+        'kind = "flat"\namsl_m = 200',
+        'kind = "peaks"\npeak = [{east_m = 0, north_m = 0, height_m = 9, sigma_m = 1}]',
+        "terrain.peak.0.sigma_m: 1: allowed 10..100000",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
+    old, new, wanted = CASES[case]
+    assert wanted in refused(tmp_path, with_fault(old, new))
+
+
+def test_numbers_may_be_whole_and_ranges_include_their_ends() -> None:
+    text = SMALL.replace("amsl_m = 400", "amsl_m = 9000") + THREAT.replace("800", "200_000")
+    file = parse_scenario(text + "[limits]\nmax_turn_deg = 180\nmax_climb_deg = 89.999\n", "x")
+    assert file.start.amsl_m == 9000.0
+    assert isinstance(file.start.amsl_m, float)
+    assert file.limits.max_turn_deg == 180.0
+
+
+def test_every_number_has_a_range() -> None:
+    # The range is what keeps NaN out.
+    def tried(model: Any, path: tuple[str, ...] = ()) -> None:
+        for key, value in model.items():
+            if isinstance(value, dict):
+                tried(value, (*path, key))
+            elif isinstance(value, float):
+                data = full.model_dump(mode="json", exclude_none=True)
+                place = data
+                for part in path:
+                    place = place[part]
+                place[key] = math.nan
+                with pytest.raises(ScenarioError, match="nan: allowed"):
+                    check_scenario(data, "x")
+
+    full = ScenarioFile.model_validate(
+        tomllib.loads(
+            SMALL
+            + "course_deg = 5.0\n[origin]\nlat_deg = 46.0\nlon_deg = 8.0\n"
+            + "[planner]\nacross_m = 500.0\n[planner.goals]\nlength_ratio = 2.0\nkill_exposure = 1.0\n"
+            + "[flight]\nairspeed_mps = 25.0\nbattery_wh = 700.0\n"
+            + "[limits]\nmax_turn_deg = 60.0\nmax_climb_deg = 9.0\nmax_dive_deg = 9.0\n"
+        )
+    )
+    tried(full.model_dump(mode="json", exclude_none=True))
