@@ -60,7 +60,7 @@ def test_heights_are_stretched_to_about_a_tenth_of_the_ground(top: float, stretc
 
 def test_a_level_route_over_a_small_area_is_not_torn_apart() -> None:
     """It counts as 50 m of relief: 90 m of 1000 m are 1.8 times that."""
-    way = np.zeros_like(SETUP.route.waypoints)
+    way = SETUP.route.waypoints * np.array([1.0, 1.0, 0.0])
     setup = replace(SETUP, route=replace(SETUP.route, waypoints=way))
     assert exaggeration(setup, np.array([[0.0, 1000.0], [0.0, 1000.0]]), None) == 1.5
 
