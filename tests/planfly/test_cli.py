@@ -4,6 +4,7 @@ import argparse
 import errno
 import subprocess
 import sys
+from collections.abc import Callable
 
 import pytest
 
@@ -49,7 +50,7 @@ def test_a_fault_of_our_own_is_not_hidden(monkeypatch: pytest.MonkeyPatch) -> No
 def test_the_commands_own_code_is_the_process_exit_code(monkeypatch: pytest.MonkeyPatch) -> None:
     taken: list[str] = []
 
-    def find(name: str) -> registry.CommandFunction:
+    def find(name: str) -> Callable[[argparse.Namespace], int]:
         taken.append(name)
         return lambda _args: 4
 

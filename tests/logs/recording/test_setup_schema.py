@@ -1,6 +1,7 @@
 """Mission, route and envelope come back from their JSON tables to the last bit, and misfits are refused."""
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,14 @@ from tests.logs.made_flight import make_setup
 from tests.logs.recording.log_copies import same
 from world.errors import LogError
 
-SETUP = make_setup()
+PLAIN = make_setup()
+WATTS = {f"power_{name}": 100.0 / 3.0 * k * np.ones((3, 2)) for k, name in enumerate(("idle", "level", "full"))}
+# Circles and power, too, which a route and an envelope may go without.
+SETUP = replace(
+    PLAIN,
+    route=replace(PLAIN.route, arcs=np.array([0.0, 80.1, 0.0, 0.0])),
+    limits=replace(PLAIN.limits, envelope=replace(PLAIN.envelope, volts=44.4, **WATTS)),
+)
 
 
 def through_json(file: SetupModel) -> Any:
@@ -70,7 +78,7 @@ def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], mess
         ({"airspeed_mps": [18.0, 18.0, 20.0]}, r"envelope\.airspeed_mps: not increasing"),
         ({"climb_rad": [[0.1, 0.1]] * 2}, r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\] is expected"),
         ({"level_speed_min_mps": [16.0]}, r"envelope\.level_speed_min_mps: shape \[1\]: \[2\]"),
-        ({"power_level_w": [[1.0, 1.0]] * 3}, r"envelope\.power_idle_w: shape"),
+        ({"power_idle_w": []}, r"envelope\.power_idle_w: shape"),
     ],
 )
 def test_an_envelope_whose_tables_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:

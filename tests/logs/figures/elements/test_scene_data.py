@@ -58,6 +58,13 @@ def test_heights_are_stretched_to_about_a_tenth_of_the_ground(top: float, stretc
     assert exaggeration(setup, np.array([[0.0, 3000.0], [0.0, 1000.0]]), None) == stretch
 
 
+def test_a_level_route_over_a_small_area_is_not_torn_apart() -> None:
+    """It counts as 50 m of relief: 90 m of 1000 m are 1.8 times that."""
+    way = SETUP.route.waypoints * np.array([1.0, 1.0, 0.0])
+    setup = replace(SETUP, route=replace(SETUP.route, waypoints=way))
+    assert exaggeration(setup, np.array([[0.0, 1000.0], [0.0, 1000.0]]), None) == 1.5
+
+
 def test_the_track_is_thinned_to_both_its_ends() -> None:
     track = make_track()
     position = track.position.copy()
