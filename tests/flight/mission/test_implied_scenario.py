@@ -94,7 +94,8 @@ def test_a_mission_off_the_tile_is_refused() -> None:
 
 def test_a_mission_through_a_hill_has_a_scenario() -> None:
     """A mission through a hill is not bad input: it has a scenario, and its verdict says no."""
-    read = mission(wp(3000, 3000, 20, frame=0), wp(3000, 6000, 20, frame=0))
+    lines = [f"0 16 0 0 0 0 {lat} -84.2 20" for lat in (36.24, 36.27)]
+    read = mission(*lines, home="36.21 -84.2 300")
     scenario = implied_scenario(read, "jacksboro").scenario
     assert scenario.terrain is not None
     assert scenario.destination[2] > 100.0
