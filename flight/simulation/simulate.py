@@ -10,7 +10,7 @@ from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import straight
 from flight.guidance.fly_by_path import FlyByPath
 from flight.guidance.gains import load_gains
-from flight.guidance.guidance_memory import CROSS_TRACK, L1, VECTOR_FIELD
+from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
 from flight.simulation.airborne import FDM_HZ, Airborne
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.loop import make_loop
@@ -105,6 +105,9 @@ class Flight(Airborne):
         self._begin(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
         self.memory.law = LAWS[setup.guidance]
+        if setup.parameters is not None:
+            self.memory.law = ARDUPILOT
+            self._work.parameters = setup.parameters.record()
         self._disturb(setup)
         self._loop = self._make_loop(self.fdm.loop_access())
 

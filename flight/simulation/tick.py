@@ -6,7 +6,9 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
+from flight.ardupilot.pilot import fly_as_ardupilot
 from flight.dynamics.state import STATE
+from flight.guidance.guidance_memory import ARDUPILOT
 from flight.guidance.lateral import guide
 from flight.guidance.navigation_error import navigate
 from flight.guidance.path_kernels import Records
@@ -63,10 +65,16 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
         work.true, work.estimated, work.navigation, work.noise[timing.row].navigation,
         settings.navigation_sigma, settings.navigation_time, timing.dt,
     )  # fmt: skip
-    guide(
-        state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
-        path.waypoint[: settings.waypoints], work.gains, memory, work.commands, timing.dt,
+    pieces, nodes, waypoints = (
+        path.piece[: settings.pieces], path.node[: settings.nodes], path.waypoint[: settings.waypoints],
     )  # fmt: skip
+    if memory.law == ARDUPILOT:
+        fly_as_ardupilot(
+            state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.parameters, work.ardupilot,
+            work.commands, timing.dt,
+        )  # fmt: skip
+    else:
+        guide(state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.commands, timing.dt)
     finish_tick(work)
     return flight_status(work)
 
