@@ -73,6 +73,7 @@ class ProblemArrays(NamedTuple):
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by where they stand.
     slope_bounds: of the ground.
+    tracking: a record of `aircraft.tracking.TRACKING`: how far the autopilot strays from its legs.
     """
 
     heights: Heights
@@ -105,6 +106,7 @@ class ProblemArrays(NamedTuple):
     threat_cells: ThreatCells
     missiles: MissileIndex
     slope_bounds: SlopeBounds
+    tracking: Record
 
 
 def threat_records(threats: Threats) -> Records:
