@@ -13,7 +13,7 @@ from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import Trim, straight
 from flight.guidance.fly_by_path import FlyByPath, waypoint_records
 from flight.guidance.gains import load_gains
-from flight.guidance.guidance_memory import CROSS_TRACK, L1, VECTOR_FIELD
+from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.simulation.dryden import start_gusts
 from flight.simulation.flight_setup import FlightSetup
@@ -122,11 +122,18 @@ class Flight:
     fdm: the aircraft that flies.
     """
 
-    def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> None:
+    def __init__(
+        self,
+        setup: FlightSetup,
+        aircraft: Aircraft,
+        variation: Variation | None = None,
+        local_map: LocalMap | None = None,
+    ) -> None:
+        """Start it: local_map is the setup's where another flight of it has fitted one already."""
         limits, gains = setup.limits, load_gains(aircraft)
         self.path = setup.path
         self._ground = Ground(setup.scenario.terrain)
-        self.map = LocalMap.around(setup)
+        self.map = local_map or LocalMap.around(setup)
         self._steps = round(FDM_HZ / setup.guidance_hz)
         self.dt = self._steps / FDM_HZ
         self._workspace = Workspace(gains, self.path, waypoint_records(setup.route))
@@ -141,6 +148,9 @@ class Flight:
         self._start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = limits.max_bank + BANK_RESERVE
         self.memory.law = LAWS[setup.guidance]
+        if setup.parameters is not None:
+            self.memory.law = ARDUPILOT
+            self._work.parameters = setup.parameters.record()
         self._disturb(setup)
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed

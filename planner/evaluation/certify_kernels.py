@@ -17,9 +17,9 @@ from planner.evaluation.leg_geometry import (
     roll_length,
     turn_length,
 )
-from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
+from planner.evaluation.problem_arrays import ProblemArrays
 from planner.evaluation.strayed_pieces import strayed_pieces
-from world.kernels import compiled
+from world.kernels import Record, Records, compiled
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]

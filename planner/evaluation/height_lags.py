@@ -14,8 +14,7 @@ from aircraft.envelope import ground_speed
 from aircraft.path_limits import PerformanceTable, wind_speed_at
 from aircraft.tracking import faster_by
 from planner.evaluation.leg_geometry import Wind
-from planner.evaluation.problem_arrays import Record, Records
-from world.kernels import compiled_views, inlined
+from world.kernels import Record, Records, compiled_views, inlined
 
 # How far the aircraft is below a leg at a share f of it, m: steady + slant (1 - f) + rest E(f x decay), where E is the
 # decay; and the most and the least of that and 0.

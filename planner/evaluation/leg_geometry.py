@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY
 from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, roll_reversal_length
 from aircraft.tracking import corner_room, faster_by
-from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
-from world.kernels import compiled, compiled_views, inlined
+from planner.evaluation.problem_arrays import ProblemArrays
+from world.kernels import Record, Records, compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 # East and north of the unit vector that the wind blows towards.

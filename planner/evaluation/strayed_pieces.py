@@ -9,8 +9,8 @@ from aircraft.path_limits import downwind
 from planner.evaluation.fly_by_corners import legs_about
 from planner.evaluation.height_lags import HEIGHT_LAG, below_at, measure_lags
 from planner.evaluation.leg_geometry import CORNER, LEG, measure_corners, measure_legs
-from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
-from world.kernels import compiled
+from planner.evaluation.problem_arrays import ProblemArrays
+from world.kernels import Record, Records, compiled
 
 Floats = NDArray[np.float64]
 

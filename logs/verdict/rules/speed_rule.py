@@ -9,7 +9,17 @@ from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
-from logs.verdict.tolerances import GUST_SHARE, GUST_TIME, LEVEL, MEASURED_SHARE, OFF_MEAN, SATURATED, SLOWEST, TAKE_UP
+from logs.verdict.tolerances import (
+    GUST_SHARE,
+    GUST_SIGMAS,
+    GUST_TIME,
+    LEVEL,
+    MEASURED_SHARE,
+    OFF_MEAN,
+    SATURATED,
+    SLOWEST,
+    TAKE_UP,
+)
 from world.wind import W20
 
 
@@ -100,6 +110,6 @@ def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[f
     width = max(1, min(speed.size, round(1.0 / aligned.tick())))
     total = np.concatenate([[0.0], np.cumsum(speed)])
     least = float(((total[width:] - total[:-width]) / width).min())
-    spread = 2.0 * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
+    spread = GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
     steepened = leg > 0 and abs(float(demands.slopes[leg] - demands.slopes[leg - 1])) > LEVEL
     return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least
