@@ -1,5 +1,6 @@
 """Everything that decides a flight, fixed before it starts."""
 
+import copy
 import math
 from dataclasses import dataclass, field
 from typing import Literal
@@ -71,6 +72,12 @@ class FlightSetup:
     def max_bank(self) -> float:
         """Steepest bank in turns, rad."""
         return self.limits.max_bank
+
+    def in_scenario(self, scenario: Scenario) -> "FlightSetup":
+        """Set the same flight in another scenario; route, limits and path stay as they are."""
+        moved = copy.copy(self)
+        object.__setattr__(moved, "scenario", scenario)
+        return moved
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:

@@ -137,6 +137,8 @@ MEASURED_SHARE = 0.5
 TAKE_UP = 10.0
 # s.  How long a gust lasts.
 GUST_TIME = 10.0
+# Standard deviations.  How far the gusts of a leg may carry its mean airspeed.
+GUST_SIGMAS = 2.0
 # rad.  Bank beyond this is a departure.  The simulation's own threshold (flight/simulation/tick.py).
 MOST_BANK = math.radians(75.0)
 # m/s.  Airspeed below this is a departure of the Aerosonde, and this share of its slowest level speed, which for the
@@ -163,6 +165,8 @@ CHORD_TIME = 0.25
 ARRIVED = 10.0
 # m, m/s.  No position or speed of ours is larger; what is, is garbage.
 FARTHEST, FASTEST = 1e7, 1e4
+# rad, deflection, m/s.  Nor is an attitude, a control or a wind larger.
+MOST_PLAUSIBLE = 1e3
 # s.  Stays in a sphere on neighbouring segments that touch to within this are one.  Rounding.
 TOUCH = 1e-6
 # Diagonals of a block of segments.  From this far from a sphere's centre the segments are joined to longer ones, which

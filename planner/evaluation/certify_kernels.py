@@ -17,8 +17,8 @@ from planner.evaluation.leg_geometry import (
     roll_length,
     turn_length,
 )
-from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
-from world.kernels import compiled
+from planner.evaluation.problem_arrays import ProblemArrays
+from world.kernels import Record, Records, compiled
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]

@@ -21,14 +21,12 @@ from planner.evaluation.problem_arrays import (
     OBJECTIVES,
     VIOLATIONS,
     ProblemArrays,
-    Record,
-    Records,
     SlopeBounds,
     as_columns,
 )
 from planner.evaluation.terrain_clearance import TERRAIN_LEG, sample_terrain, segment_pixels, terrain_excess
 from world.frames import PolyMapRecord
-from world.kernels import compiled, compiled_views, inlined
+from world.kernels import Record, Records, compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

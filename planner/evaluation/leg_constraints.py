@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from aircraft.path_limits import arc_slope, downwind, slopes_along, wind_speed_at
 from planner.evaluation.clearance_buffer import RequiredClearance, required_clearance
 from planner.evaluation.leg_geometry import Wind, courses_at, roll_length, settling_length, turn_length
-from planner.evaluation.problem_arrays import ProblemArrays, Record, Records
-from world.kernels import compiled, compiled_views, inlined
+from planner.evaluation.problem_arrays import ProblemArrays
+from world.kernels import Record, Records, compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 

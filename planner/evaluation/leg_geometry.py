@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, roll_reversal_length
-from planner.evaluation.problem_arrays import ProblemArrays, Records
-from world.kernels import compiled, compiled_views, inlined
+from planner.evaluation.problem_arrays import ProblemArrays
+from world.kernels import Records, compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 # East and north of the unit vector that the wind blows towards.

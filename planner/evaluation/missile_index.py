@@ -1,17 +1,16 @@
 """Missiles by where they stand, and what a line past them is exposed to."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from world.geometry import window_exposure
-from world.kernels import compiled_views, inlined
+from world.kernels import Records, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Records = NDArray[Any]
 
 # Classes of missiles by radius, at most; and missiles a cell, on the mean.
 MOST_CLASSES = 8

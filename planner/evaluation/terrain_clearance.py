@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
-from planner.evaluation.problem_arrays import Records, SlopeBounds
+from planner.evaluation.problem_arrays import SlopeBounds
 from world.frames import PolyMapRecord, polymap
-from world.kernels import compiled_views, inlined
+from world.kernels import Records, compiled_views, inlined
 from world.terrain import TILE, pixel_height
 
 Floats = NDArray[np.float64]

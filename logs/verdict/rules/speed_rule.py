@@ -13,6 +13,7 @@ from logs.verdict.places import Place
 from logs.verdict.tolerances import (
     ACCELERATION,
     GUST_SHARE,
+    GUST_SIGMAS,
     GUST_TIME,
     LEVEL,
     MEASURED_SHARE,
@@ -146,6 +147,6 @@ def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[f
     lasts = float(time[-1] - time[0])
     gust = GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
     least = float(_second_means(aligned, rows).min())
-    spread = 2.0 * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
+    spread = GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
     steepened = leg > 0 and abs(float(demands.slopes[leg] - demands.slopes[leg - 1])) > LEVEL
     return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least
