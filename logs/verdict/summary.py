@@ -124,12 +124,24 @@ def summary_lines(
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "flown":
-        lines.append(f"Flown by: {_GUIDANCE[setup.guidance]}; navigation {_NAV[setup.nav]}")
+        lines.append(f"Flown by: {flown_by(setup)}; navigation {_NAV[setup.nav]}")
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     if prediction is not None:
         lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
     return tuple(lines)
+
+
+def flown_by(setup: FlightSetup) -> str:
+    """Who steers, in words: planfly's guidance or ArduPlane, with the parameters that decide most of its flight."""
+    parameters = setup.parameters
+    if parameters is None:
+        return _GUIDANCE[setup.guidance]
+    whose = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
+    return (
+        f"ArduPlane's law with {whose} (WP_RADIUS {parameters.wp_radius:g} m,"
+        f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
+    )
 
 
 def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
