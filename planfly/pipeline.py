@@ -124,9 +124,10 @@ def make_setup(
         battery=airframe.battery,
         seed=seed,
         plan=plan,
-        guidance=scenario.flight.guidance,
-        nav=scenario.flight.nav,
+        guidance=scenario.flight.steering.guidance,
+        nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
+        parameters=airframe.parameters,
     )
 
 

@@ -5,6 +5,7 @@
     ├── TerrainError    an elevation file
     ├── MissionError    a plan or mission file
     ├── FlightError     an aircraft model or a flight that cannot start
+    ├── ParameterError  a file of an autopilot's parameters
     └── LogError        a flight log
 
 Each message is one line: the file, the line or field, the value, and the allowed range.  The command
@@ -30,6 +31,10 @@ class MissionError(PlanflyError):
 
 class FlightError(PlanflyError):
     """An aircraft model or a start condition is unusable."""
+
+
+class ParameterError(PlanflyError):
+    """A file of an autopilot's parameters cannot be used as it stands."""
 
 
 class LogError(PlanflyError):

@@ -4,7 +4,7 @@ The models mirror the TOML key for key.  `world.scenario_file` reads a file into
 into a `Scenario`.
 """
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
@@ -44,6 +44,7 @@ Course = Annotated[float, _within(-360.0, 360.0)]
 Radius = Annotated[float, _within(0.0, 200_000.0, above=True)]
 Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_no_line_break)]
 FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(_no_line_break)]
+Autopilot = Literal["ardupilot", "ideal"]
 Guidance = Literal["path", "l1", "vector-field"]
 Navigation = Literal["perfect", "rtk", "gnss"]
 Seed = Annotated[int, _within(0, 2**63 - 1)]
@@ -179,7 +180,10 @@ Angle = Annotated[float, _within(0.0, 90.0, above=True, below=True, also=', or "
 
 
 class LimitsTable(_Table):
-    """[limits]: a number, or "aircraft" for what the envelope allows."""
+    """[limits]: a number, or "aircraft" for what the envelope allows.
+
+    corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
+    """
 
     max_turn_deg: Annotated[float, _within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
         "aircraft"
@@ -187,6 +191,7 @@ class LimitsTable(_Table):
     max_climb_deg: Angle = "aircraft"
     max_dive_deg: Angle = "aircraft"
     min_clearance_m: Annotated[float, _within(0.0, 5000.0)] = 30.0
+    corridor_m: Annotated[float, _within(1.0, 5000.0)] | None = None
 
 
 class GoalsTable(_Table):
@@ -218,21 +223,71 @@ def names_folder(aircraft: str) -> bool:
     return "/" in aircraft or "\\" in aircraft
 
 
-class FlightTable(_Table):
-    """[flight].
+# Who flies where a scenario names neither an autopilot nor what belongs to one.
+DEFAULT_AUTOPILOT: Autopilot = "ideal"
+# How well an autopilot knows where it is, where a scenario does not say.
+_USUAL_NAVIGATION: dict[Autopilot, Navigation] = {"ardupilot": "gnss", "ideal": "perfect"}
 
-    guidance: the law that steers.  nav: how well guidance knows where it is, see `flight.guidance.navigation_error`.
+
+class Steering(NamedTuple):
+    """Who flies.
+
+    autopilot: "ardupilot" for ArduPlane's laws, "ideal" for planfly's guidance.
+    guidance: the law of "ideal", which no other autopilot asks for.
+    nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
+    """
+
+    autopilot: Autopilot
+    guidance: Guidance
+    nav: Navigation
+
+
+class FlightTable(_Table):
+    """[flight]; what is None was not stated, and `steering` says what that comes to.
+
+    autopilot: who flies; guidance alone means "ideal", params alone "ardupilot".
+    params: ArduPilot's parameters, a file.
+    guidance: the law of "ideal".
+    nav: how well the autopilot knows where it is, see `flight.guidance.navigation_error`.
     """
 
     aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
     airspeed_mps: Annotated[float, _within(15.0, 60.0)] | None = None
     max_bank_deg: Annotated[float, _within(5.0, 60.0)] = 30.0
-    guidance: Guidance = "path"
+    autopilot: Autopilot | None = None
+    params: FilePath | None = None
+    guidance: Guidance | None = None
     guidance_hz: Literal[30, 60] = 60
-    nav: Navigation = "perfect"
+    nav: Navigation | None = None
     fly_over: bool = False
     motor_braking: bool = False
     battery_wh: Annotated[float, _within(0.0, 100_000.0, above=True)] | None = None
+
+    @model_validator(mode="after")
+    def _one_autopilot(self) -> "FlightTable":
+        autopilot = self.steering.autopilot
+        if self.guidance is not None and autopilot != "ideal":
+            raise ValueError('guidance: not a key of autopilot = "ardupilot"')
+        if self.params is not None and autopilot != "ardupilot":
+            raise ValueError('params: not a key of autopilot = "ideal", which guidance alone means')
+        return self
+
+    @property
+    def steering(self) -> Steering:
+        """Who flies, and how well it knows where it is."""
+        implied: Autopilot = DEFAULT_AUTOPILOT
+        if self.guidance is not None:
+            implied = "ideal"
+        elif self.params is not None:
+            implied = "ardupilot"
+        autopilot = self.autopilot or implied
+        return Steering(autopilot, self.guidance or "path", self.nav or _USUAL_NAVIGATION[autopilot])
+
+    def stated(self) -> "FlightTable":
+        """The same flight with nothing left to a default of who flies: as plans and logs hold it."""
+        autopilot, guidance, nav = self.steering
+        who = {"autopilot": autopilot} if autopilot != "ideal" else {"guidance": guidance}
+        return self.model_copy(update={**who, "nav": nav})
 
 
 class WindTable(_Table):

@@ -5,8 +5,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aircraft.corridor import corridor_half_width
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
+from flight.ardupilot.parameters import ArduPilotParameters
 from flight.guidance.fly_by_path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
@@ -28,9 +30,10 @@ class FlightSetup:
     battery: energy carried, Wh.
     seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
     plan: None for a mission that a person brought.
-    guidance: the law that steers.
+    guidance: the law that steers where ``parameters`` is None.
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
+    parameters: of the ArduPlane that flies; None where planfly's guidance does.
     path: that is to be followed, of route and limits.
     """
 
@@ -46,6 +49,7 @@ class FlightSetup:
     guidance: Guidance = "path"
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
+    parameters: ArduPilotParameters | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -56,6 +60,11 @@ class FlightSetup:
     def envelope(self) -> Envelope:
         """Table of the aircraft's climbs, descents, speeds and powers."""
         return self.limits.envelope
+
+    @property
+    def corridor(self) -> float:
+        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        return corridor_half_width(self.scenario.limits.corridor_m, None)
 
     @property
     def airspeed(self) -> float:

@@ -13,7 +13,7 @@ from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import Trim, straight
 from flight.guidance.fly_by_path import FlyByPath, waypoint_records
 from flight.guidance.gains import load_gains
-from flight.guidance.guidance_memory import CROSS_TRACK, L1, VECTOR_FIELD
+from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
 from flight.guidance.navigation_error import ERRORS, start_navigation
 from flight.simulation.dryden import start_gusts
 from flight.simulation.flight_setup import FlightSetup
@@ -148,6 +148,9 @@ class Flight:
         self._start(setup, model, gains.reference_airspeed)
         self.memory.max_bank = limits.max_bank + BANK_RESERVE
         self.memory.law = LAWS[setup.guidance]
+        if setup.parameters is not None:
+            self.memory.law = ARDUPILOT
+            self._work.parameters = setup.parameters.record()
         self._disturb(setup)
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed

@@ -6,7 +6,9 @@ import numpy as np
 from numba import literal_unroll
 from numpy.typing import NDArray
 
+from flight.ardupilot.pilot import fly_as_ardupilot
 from flight.dynamics.state import STATE
+from flight.guidance.guidance_memory import ARDUPILOT
 from flight.guidance.lateral import guide
 from flight.guidance.navigation_error import navigate
 from flight.guidance.path_kernels import Records
@@ -81,10 +83,16 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
         true, work.estimated, work.navigation, noise.navigation,
         settings.navigation_sigma, settings.navigation_time, timing.dt,
     )  # fmt: skip
-    guide(
-        state, work.estimated, path.piece[: settings.pieces], path.node[: settings.nodes],
-        path.waypoint[: settings.waypoints], work.gains, memory, work.commands, timing.dt,
+    pieces, nodes, waypoints = (
+        path.piece[: settings.pieces], path.node[: settings.nodes], path.waypoint[: settings.waypoints],
     )  # fmt: skip
+    if memory.law == ARDUPILOT:
+        fly_as_ardupilot(
+            state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.parameters, work.ardupilot,
+            work.commands, timing.dt,
+        )  # fmt: skip
+    else:
+        guide(state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.commands, timing.dt)
     _blow(state, work.wind, work.gusts, noise.turbulence, clearance, true.up, cos, sin, air, timing.dt)
     air.ground = ground if not math.isnan(ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.ardupilot.law_memory import ARDUPILOT_MEMORY
+from flight.ardupilot.parameters import ARDUPILOT_PARAMETERS
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.fly_by_path import FlyByPath
 from flight.guidance.gains import GAINS, Gains
@@ -76,6 +78,8 @@ WORKSPACE = record_dtype(
     ("navigation", NAVIGATION_LAGS),
     ("memory", GUIDANCE_MEMORY),
     ("gains", GAINS),
+    ("ardupilot", ARDUPILOT_MEMORY),
+    ("parameters", ARDUPILOT_PARAMETERS),
     ("timing", TIMING),
     ("settings", SETTINGS),
     ("position_map", POLYMAP),  # latitude and longitude to east and north

@@ -21,12 +21,15 @@ from logs.recording.setup_schema import (
     EnvelopeFile,
     Finite,
     MissionFile,
+    ParametersFile,
     RouteFile,
     SetupModel,
     envelope_file,
     mission_file,
+    parameters_file,
     read_envelope,
     read_mission_table,
+    read_parameters,
     read_route,
     route_file,
 )
@@ -67,6 +70,7 @@ class _Setup(SetupModel):
     guidance: Guidance
     nav: Navigation
     guidance_hz: Literal[30, 60]
+    parameters: ParametersFile | None = None  # a log of before there were any was flown by planfly's guidance
     mission: MissionFile
     route: RouteFile
     envelope: EnvelopeFile
@@ -130,6 +134,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         guidance=setup.guidance,
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
+        parameters=None if setup.parameters is None else parameters_file(setup.parameters),
         mission=mission_file(setup.mission),
         route=route_file(setup.route),
         envelope=envelope_file(setup.envelope),
@@ -173,6 +178,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         guidance=file.guidance,
         nav=file.nav,
         guidance_hz=file.guidance_hz,
+        parameters=None if file.parameters is None else read_parameters(file.parameters, f"{source}: {SETUP_FILE}"),
     )
     return StoredSetup(setup, file.versions)
 

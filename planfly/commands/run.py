@@ -15,11 +15,11 @@ from planfly.refine import refine
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, write_missions, write_pictures, write_verdict
+from planfly.terminal.scenario_options import scenario_change
 from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
 from world.atomic_files import write_whole
 from world.scenario import Scenario, load_scenario
-from world.scenario_variants import with_flight
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class _Task:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
-    scenario = with_flight(load_scenario(args.scenario), guidance=args.guidance, nav=args.nav)
+    scenario = scenario_change(args)(load_scenario(args.scenario))
     seed = choose_seed(scenario, args.seed)
     airframe = load_airframe(scenario)
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _command_line(args: argparse.Namespace, seed: int) -> str:
-    options = (("refine", args.refine), ("guidance", args.guidance), ("nav", args.nav))
+    options = [(name, getattr(args, name)) for name in ("refine", "params", "guidance", "nav")]
     given = "".join(f" --{name} {value}" for name, value in options if value)
     return f"planfly run {args.scenario} --seed {seed}{given}"
 

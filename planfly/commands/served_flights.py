@@ -3,7 +3,7 @@
 import contextlib
 import math
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -34,6 +34,7 @@ from planfly.pipeline import make_setup
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
+from world.scenario_variants import with_flight
 
 DEFAULT_SCENARIO = "jacksboro"
 # Most texts about one verdict; the log has the rest.
@@ -46,6 +47,7 @@ class ServeOptions:
 
     mission: a file's path, "" for none.
     scenario, terrain: None where not named.
+    flight: entries of the scenario's [flight] that take the place of its own; None for those it keeps.
     speed: times real time.
     logs: the folder of the flight logs.
     """
@@ -55,6 +57,7 @@ class ServeOptions:
     terrain: str | None
     speed: float
     logs: Path
+    flight: dict[str, str | float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,10 +72,14 @@ class ServedScenario:
 
 def open_served(options: ServeOptions) -> ServedScenario:
     """Load what is served.  Raises PlanflyError."""
+
+    def change(scenario: Scenario) -> Scenario:
+        return with_flight(scenario, **options.flight)
+
     if options.mission:
-        opened = open_mission(Path(options.mission), options.scenario, options.terrain)
+        opened = open_mission(Path(options.mission), options.scenario, options.terrain, change=change)
         return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
-    scenario = load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain)
+    scenario = change(load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain))
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
 
 

@@ -79,16 +79,24 @@ def _flown_by(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def _steering(parser: argparse.ArgumentParser) -> None:
+def _pilot(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--params", metavar="FILE", help="ArduPlane flies, with these parameters: as a ground station writes them"
+    )
     parser.add_argument(
         "--guidance",
         choices=("path", "l1", "vector-field"),
-        help="who steers: planfly's own (path), L1 as ArduPlane flies it, or Beard and McLain's vector field",
+        help="planfly's guidance flies: its own law (path), L1 along the legs, or Beard and McLain's vector field",
     )
+
+
+def _steering(parser: argparse.ArgumentParser) -> None:
+    _pilot(parser)
     parser.add_argument(
         "--nav",
         choices=("perfect", "rtk", "gnss"),
-        help="how well guidance knows where it is: errors of 0, 0.05 or 1.5 m on each axis",
+        help="how well it knows where it is: errors of 0, 0.05 or 1.5 m on each axis (default: gnss for ArduPlane, "
+        "perfect for planfly's guidance)",
     )
 
 
@@ -145,6 +153,7 @@ def _add_run_and_plan(command: _Command) -> None:
         action="append",
         help="with --from: a threat that has popped up, in m; --add-threat=-... where EAST is negative; repeatable",
     )
+    _pilot(plan)
     plan.add_argument("--out", metavar="FILE", help="the plan file (default: runs/<name>-seed<N>/plan.json, replaced)")
     _overwrite(plan)
 
@@ -191,6 +200,7 @@ def _add_log_commands(command: _Command) -> None:
     check.add_argument("file", metavar="LOG.mcap|MISSION", help="a flight log, or plan.json, .waypoints, .plan")
     _world(check)
     _flown_by(check)
+    _pilot(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     _overwrite(check)
     _add_replay_and_recover(command)
@@ -274,6 +284,7 @@ def _add_serve(command: _Command) -> None:
     )  # fmt: skip
     serve.add_argument("mission", metavar="MISSION", nargs="?", help="plan.json, .waypoints or .plan to begin with")
     _world(serve)
+    _steering(serve)
     serve.add_argument(
         "--to", metavar="IP:PORT,...", default="127.0.0.1:14550",
         help="where ground stations listen (default: 127.0.0.1:14550)",
