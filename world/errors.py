@@ -4,7 +4,8 @@
     ├── ScenarioError   a scenario file or a planner option
     ├── TerrainError    an elevation file
     ├── MissionError    a plan or mission file
-    ├── FlightError     an aircraft model or a flight that cannot start
+    ├── FlightError     an aircraft model or a start condition
+    │   └── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
     └── LogError        a flight log
 
 Each message is one line: the file, the line or field, the value, and the allowed range.  The command
@@ -30,6 +31,20 @@ class MissionError(PlanflyError):
 
 class FlightError(PlanflyError):
     """An aircraft model or a start condition is unusable."""
+
+
+class StartError(FlightError):
+    """A flight cannot begin as its mission has it: the aircraft and the place are known, and no flight begins there.
+
+    source: what asks for it.  reason: why not.
+
+    >>> str(StartError("a.plan", "no way made"))
+    'a.plan: no way made'
+    """
+
+    def __init__(self, source: str, reason: str) -> None:
+        super().__init__(f"{source}: {reason}")
+        self.reason = reason
 
 
 class LogError(PlanflyError):

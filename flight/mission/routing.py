@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from flight.mission.arc_misses import arc_misses
 from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission, command_name
-from flight.mission.itinerary import Itinerary, ItineraryStop, Notes, make_itinerary
+from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
 from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, SpiralSlopes, lay_circles
+from flight.mission.notes import Notes
 from flight.mission.route import Route
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo, to_map
@@ -46,13 +48,11 @@ def make_route(
     """Route of a mission on the map about ``origin``.
 
     terrain: None where none is known; heights above terrain are then an error.
-    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and
-        sets none).
-    fly_over: whether waypoints are flown through instead of by.
-    limits: the aircraft's, for the radius of a loiter that states none and the slope of a spiral; None takes 80 m and
-        5 %.
-    vertical_legs: whether a position straight above or below the one before it becomes a leg of `VERTICAL_STEP` m,
-        which the verdict's slope rule then refuses; otherwise it is an error.
+    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed, a station's estimate, sets none).
+    fly_over: whether waypoints are flown through instead of by; one whose arc would miss its acceptance always is.
+    limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
+        a spiral (5 %).
+    vertical_legs: whether a place straight above or below the one before is a leg of `VERTICAL_STEP` m, not an error.
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `SAME_PLACE`, or `VERTICAL_STEP` if vertical.  Raises MissionError, naming the
@@ -71,35 +71,46 @@ def make_route(
     """
     itinerary = make_itinerary(mission, default_airspeed)
     notes = Notes()
-    kept = _placed_stops(mission.source, itinerary, origin, terrain, notes, vertical_legs)
+    heights = _Heights(mission.source, itinerary, origin, terrain, notes)
+    kept = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
     points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
     if len(points) < 2:
         raise MissionError(f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected")
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
-    if mission.cruise_speed not in (None, default_airspeed) and stops[1].airspeed == default_airspeed:
-        notes.add(
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
-            f" started at {default_airspeed:g} m/s"
-        )
+    airspeed = np.array([stop.airspeed for stop in stops[1:]])
+    acceptance = np.array([stop.acceptance for stop in stops])
+    _note_cruise_speed(mission, default_airspeed, stops[1], notes)
     return Route(
         waypoints=waypoints,
-        airspeed=np.array([stop.airspeed for stop in stops[1:]]),
-        acceptance=np.array([stop.acceptance for stop in stops]),
-        fly_over=np.where(arcs > 0.0, False, fly_over),
+        airspeed=airspeed,
+        acceptance=acceptance,
+        fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_started(itinerary, stops[0], origin, waypoints),
         notes=itinerary.notes + notes.lines(),
         arcs=arcs,
+        endless=itinerary.endless,
+        takeoff_ground=math.nan if itinerary.takeoff is None else heights.ground_at_home(),
+        landing_ground=heights.touchdown(itinerary.landing),
     )
 
 
+def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:
+    """Note a cruiseSpeed other than the default airspeed (m/s), if that is flown to the first stop."""
+    if mission.cruise_speed not in (None, airspeed) and first.airspeed == airspeed:
+        notes.add(
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
+            f" started at {airspeed:g} m/s"
+        )
+
+
 def _placed_stops(
-    source: str, itinerary: Itinerary, origin: GeoOrigin, terrain: Terrain | None, notes: Notes, vertical_legs: bool
+    source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
 ) -> list[PlacedStop]:
     """Stops on the map, without those at the position of the one before."""
-    heights = _Heights(source, itinerary, origin, terrain, notes)
+    notes = heights.notes
     flat = _on_map(source, itinerary.stops, origin)
     kept: list[PlacedStop] = []
     for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
@@ -211,17 +222,30 @@ class _Heights:
             self._home_amsl = self._find_home(stop, self.home)
         return self._home_amsl
 
-    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
-        under = math.nan
+    def touchdown(self, stop: ItineraryStop | None) -> float:
+        """Height of a place to land at, NaN for none, none stated, and no terrain to count it from."""
+        if stop is None or math.isnan(stop.alt) or (self.terrain is None and stop.frame not in AMSL | OVER_HOME):
+            return math.nan
+        east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
+        return self.amsl(stop, float(east), float(north), math.nan)
+
+    def ground_at_home(self) -> float:
+        """Height of the ground at home, NaN where it is not known."""
+        home = self.home
         if self.terrain is not None:
             east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
             if abs(float(east)) <= MAP_EXTENT and abs(float(north)) <= MAP_EXTENT:
-                under = float(self.terrain.height(east, north))
+                return float(self.terrain.height(east, north))
+        return math.nan
+
+    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
+        under = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - under) > _HOME_ERROR:
+                unset = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
                     f"home is at {home.alt:.1f} m AMSL, and the ground there at {under:.1f} m:"
-                    " heights over home count from the former"
+                    f" heights over home count from the former{unset}"
                 )
             return home.alt
         if math.isnan(under):

@@ -22,7 +22,7 @@ from flight.simulation.loop import make_loop
 from flight.simulation.tick import ENDS, tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows, quantised
 from flight.simulation.workspace import BLOCK_TICKS, READ_FIELDS, Workspace
-from world.errors import FlightError
+from world.errors import FlightError, StartError
 from world.frames import to_geo
 from world.geometry import leg_courses
 from world.random_streams import NAVIGATION, TURBULENCE, stream
@@ -73,7 +73,7 @@ def simulate(
     progress: is called with the distance flown and the whole, m.
     variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
 
-    Raises FlightError for a flight that cannot start.
+    Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
 
     >>> from aircraft.catalog import load_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -145,6 +145,7 @@ class Flight:
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle
+        self._work.settings.battery = setup.battery
         self._fly = self._loop(self.fdm.loop_access())
         slow = _slowest_leg(setup, limits)
         self.most_ticks = int((PATIENCE * self.path.length / slow + PATIENCE_SECONDS) / self.dt)
@@ -173,13 +174,12 @@ class Flight:
         east, north, up = (float(value) for value in points[0])
         under = self._ground.height(east, north)
         if not math.isnan(under) and up <= under:
-            raise FlightError(
-                f"{setup.mission.source}: start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
-            )
+            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+            raise StartError(setup.mission.source, reason)
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
         level = straight(model, reference, up)
         if level is None:
-            raise FlightError(f"{setup.aircraft}: no level flight at {reference:.1f} m/s and {up:.0f} m AMSL")
+            raise StartError(setup.aircraft, f"no level flight at {reference:.1f} m/s and {up:.0f} m AMSL")
         step = points[1] - points[0]
         # A map course is the true course and this.
         turn = self.map.convergence(lat, lon)
@@ -221,7 +221,7 @@ class Flight:
         try:
             return self.fdm.start(*begin, course, speed, 0.0, wind, ground)
         except FlightError as error:
-            raise FlightError(f"{setup.mission.source}: {error}") from error
+            raise StartError(setup.mission.source, str(error)) from error
 
     def block(self, count: int) -> tuple[Rows, str]:
         """Fly up to ``count`` ticks: their rows, and how the flight ended ("" while it goes on)."""

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 STEEPEST_BANK = math.radians(75.0)
 # What `tick` returns, and how the flight ended by then.
-COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED = 1, 2, 3, 4, 5, 6
+COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
 ENDS = {
@@ -33,6 +33,7 @@ ENDS = {
     BANKED: "departure: bank beyond 75 degrees",
     STALLED: "departure: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
+    EMPTY: "nothing is left in the battery or the tank",
 }
 _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
@@ -93,7 +94,7 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
     timing.tick += 1
     timing.row += 1
     _output(work.output, work.commands, air, work.scale_above, work.scale_below)
-    return _status(state, memory, clearance, settings.slowest)
+    return _status(state, memory, clearance, settings.slowest, air.energy >= settings.battery)
 
 
 @compiled
@@ -108,7 +109,9 @@ def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compil
 
 
 @compiled
-def _status(state: Record, memory: Record, clearance: float, slowest: float) -> int:  # pragma: no cover
+def _status(
+    state: Record, memory: Record, clearance: float, slowest: float, empty: bool
+) -> int:  # pragma: no cover - compiled
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
@@ -118,7 +121,7 @@ def _status(state: Record, memory: Record, clearance: float, slowest: float) -> 
     if memory.done:
         near = abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR
         return COMPLETED if near else MISSED
-    return 0
+    return EMPTY if empty else 0
 
 
 @compiled

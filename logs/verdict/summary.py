@@ -27,15 +27,22 @@ _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
 def headline(findings: Sequence[Finding], flyable: bool) -> str:
     """First line: the answer, and what failed or was not judged."""
     if flyable:
-        terrain = [item for item in findings if item.rule == "clearance" and item.ok is None]
-        if not terrain:
-            return "flyable"
-        whole = len(terrain) == sum(item.rule == "clearance" for item in findings)
-        return "flyable; terrain not judged" if whole else f"flyable; terrain not judged on {len(terrain)} legs"
+        return "; ".join(["flyable", *_not_judged(findings)])
     failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
     named = _spread(failed)
     more = len(failed) - len(named)
     return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+
+
+def _not_judged(findings: Sequence[Finding]) -> list[str]:
+    """What a flyable mission was not judged by, though it has it."""
+    out = []
+    terrain = [item for item in findings if item.rule == "clearance" and item.ok is None]
+    if terrain:
+        whole = len(terrain) == sum(item.rule == "clearance" for item in findings)
+        out.append("terrain not judged" + ("" if whole else f" on {len(terrain)} legs"))
+    silent = {item.rule for item in findings if item.ok is None}
+    return out + [f"{RULES[rule]} not judged" for rule in ("takeoff", "landing") if rule in silent]
 
 
 def _spread(failed: list[Finding]) -> list[Finding]:
@@ -98,9 +105,13 @@ def summary_lines(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    # Limits of that autopilot's own, which say nothing of the aircraft.
+    lines += [
+        f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
+    ]
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")

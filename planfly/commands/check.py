@@ -41,10 +41,10 @@ def check(args: argparse.Namespace) -> int:
 
 def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
     """Read a log, over another terrain where one is named.  Raises ScenarioError for options that it cannot take."""
-    given = [name for name in ("aircraft", "airspeed") if getattr(args, name) is not None]
+    given = [name for name in ("aircraft", "airspeed", "wind", "turbulence") if getattr(args, name) is not None]
     if given:
         raise ScenarioError(
-            f"{source}: --{given[0]}: a log is judged with the aircraft and the speeds it was flown with"
+            f"{source}: --{given[0]}: a log is judged with the aircraft, the speeds and the wind it was flown with"
         )
     if args.scenario:
         raise ScenarioError(

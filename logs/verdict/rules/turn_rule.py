@@ -45,6 +45,7 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
     facts = [
         f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")
     ]
+    facts += _flown_over(demands, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
@@ -72,6 +73,21 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
         unit="deg",
         method=method,
     )
+
+
+def _flown_over(demands: RouteDemands, i: int, turn: float) -> list[str]:
+    """That a waypoint is flown over because its arc would miss its acceptance, and what that takes."""
+    radius, acceptance = float(demands.radius[i]), float(demands.setup.route.acceptance[i])
+    if not demands.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
+        return []
+    offset = fly_by_offset(turn, radius)
+    if offset <= acceptance:
+        return []
+    beside = radius * (1.0 - math.cos(turn))
+    return [
+        f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
+        f" that leads up to {beside:.0f} m beside the next leg"
+    ]
 
 
 def _too_sharp(demands: RouteDemands, i: int, planned: float, limit: float, source: str) -> Message:
