@@ -13,7 +13,7 @@ from flight.mission.notes import Notes
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.geometry import leg_courses
-from world.scenario_tables import MAP_EXTENT
+from world.scenario_types import MAP_EXTENT
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]

@@ -14,7 +14,7 @@ from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
