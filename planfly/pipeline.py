@@ -7,7 +7,8 @@ from pathlib import Path
 from flight.mission.end_courses import with_end_courses
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
-from flight.mission.routing import make_route
+from flight.mission.placing import PlacedMission
+from flight.mission.routing import lay_route, make_route
 from flight.mission_files.formats import mission_text
 from flight.simulation.airborne import Airborne
 from flight.simulation.flight_setup import FlightSetup
@@ -105,17 +106,17 @@ def make_setup(
     seed: int,
     *,
     plan: Plan | None = None,
-    vertical_legs: bool = False,
+    placed: PlacedMission | None = None,
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario.
 
-    vertical_legs: as for `flight.mission.routing.make_route`.
+    placed: the mission's places on the scenario's map where they are known already.
     """
-    limits = airframe.limits
-    fly_over = scenario.flight.fly_over
-    route = make_route(
-        mission, scenario.origin, scenario.terrain, airframe.airspeed, fly_over, limits, vertical_legs=vertical_legs
-    )
+    limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
+    if placed is None:
+        route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits)
+    else:
+        route = lay_route(placed, airspeed, fly_over, limits)
     route = with_end_courses(route, scenario, limits)
     return FlightSetup(
         scenario=scenario,

@@ -180,7 +180,10 @@ Angle = Annotated[float, _within(0.0, 90.0, above=True, below=True, also=', or "
 
 
 class LimitsTable(_Table):
-    """[limits]: a number, or "aircraft" for what the envelope allows."""
+    """[limits]: a number, or "aircraft" for what the envelope allows.
+
+    corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
+    """
 
     max_turn_deg: Annotated[float, _within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
         "aircraft"
@@ -188,6 +191,7 @@ class LimitsTable(_Table):
     max_climb_deg: Angle = "aircraft"
     max_dive_deg: Angle = "aircraft"
     min_clearance_m: Annotated[float, _within(0.0, 5000.0)] = 30.0
+    corridor_m: Annotated[float, _within(1.0, 5000.0)] | None = None
 
 
 class GoalsTable(_Table):

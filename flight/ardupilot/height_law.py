@@ -62,7 +62,7 @@ def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -
     if abs(rise) < parameters.glide_slope_min or rise == 0.0 or along >= 1.0:
         return end
     left = 1.0 - max(0.0, along)
-    height = end - rise * left
+    height: float = end - rise * left
     here: float = estimated.up
     above = parameters.glide_slope_threshold
     if above <= 0.0 or rise <= 0.0 or here <= height + above:

@@ -67,11 +67,17 @@ class Airborne(ABC):
     """
 
     def __init__(
-        self, setup: FlightSetup, aircraft: Aircraft, gains: Gains, variation: Variation | None = None
+        self,
+        setup: FlightSetup,
+        aircraft: Aircraft,
+        gains: Gains,
+        variation: Variation | None = None,
+        local_map: LocalMap | None = None,
     ) -> None:
+        """Load it: local_map is the setup's where another flight of it has fitted one already."""
         self.path = setup.path
         self._ground = Ground(setup.scenario.terrain)
-        self.map = LocalMap.around(setup)
+        self.map = local_map or LocalMap.around(setup)
         self._steps = round(FDM_HZ / setup.guidance_hz)
         self.dt = self._steps / FDM_HZ
         self._workspace = Workspace(gains, self.path, waypoint_records(setup.route))

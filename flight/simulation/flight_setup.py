@@ -1,9 +1,11 @@
 """Everything that decides a flight, fixed before it starts."""
 
+import copy
 import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aircraft.corridor import corridor_half_width
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.ardupilot.parameters import ArduPilotParameters
@@ -63,6 +65,11 @@ class FlightSetup:
         return self.limits.envelope
 
     @property
+    def corridor(self) -> float:
+        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        return corridor_half_width(self.scenario.limits.corridor_m, None)
+
+    @property
     def airspeed(self) -> float:
         """Airspeed until the mission sets another, m/s."""
         return self.limits.airspeed
@@ -71,6 +78,12 @@ class FlightSetup:
     def max_bank(self) -> float:
         """Steepest bank in turns, rad."""
         return self.limits.max_bank
+
+    def in_scenario(self, scenario: Scenario) -> "FlightSetup":
+        """Set the same flight in another scenario; route, limits and path stay as they are."""
+        moved = copy.copy(self)
+        object.__setattr__(moved, "scenario", scenario)
+        return moved
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:

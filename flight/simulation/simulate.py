@@ -13,6 +13,7 @@ from flight.guidance.gains import load_gains
 from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
 from flight.simulation.airborne import FDM_HZ, Airborne
 from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.local_map import LocalMap
 from flight.simulation.loop import make_loop
 from flight.simulation.tick import tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows
@@ -97,9 +98,16 @@ def fly_to_end(flight: Airborne, sink: Sink | None = None, progress: Progress | 
 class Flight(Airborne):
     """A flight that our guidance steers: `simulate` flies it in one go, the live vehicle in step with a clock."""
 
-    def __init__(self, setup: FlightSetup, aircraft: Aircraft, variation: Variation | None = None) -> None:
+    def __init__(
+        self,
+        setup: FlightSetup,
+        aircraft: Aircraft,
+        variation: Variation | None = None,
+        local_map: LocalMap | None = None,
+    ) -> None:
+        """Start it: local_map is the setup's where another flight of it has fitted one already."""
         gains = load_gains(aircraft)
-        super().__init__(setup, aircraft, gains, variation)
+        super().__init__(setup, aircraft, gains, variation, local_map)
         # Guidance knows the model, not how the aircraft differs from it.
         model = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking)
         self._begin(setup, model, gains.reference_airspeed)

@@ -26,6 +26,7 @@ from logs.recording.chunk_layout import (
     CHUNK,
     NOT_INCREASING,
     OUT_OF_RANGE,
+    SECOND_NS,
     Layout,
     MessageRecords,
     last_log_time,
@@ -39,7 +40,6 @@ from logs.recording.setup_attachments import pack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
-    SECOND_NS,
     STATE_NAME,
     STATE_TOPIC,
     encode_rows,

@@ -14,6 +14,7 @@ from logs.verdict.places import Disagreement
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
 from logs.verdict.rules.completion_rule import completion_findings
+from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
@@ -64,6 +65,7 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
         *threat_findings(demands, aligned),
         *bounds_findings(demands, aligned),
         *waypoint_findings(demands, aligned),
+        *corridor_findings(demands, aligned),
         *speed_findings(demands, aligned),
         *energy_findings(demands, aligned),
         *departure_findings(demands, aligned),

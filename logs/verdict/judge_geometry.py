@@ -8,6 +8,7 @@ from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.places import PLAN
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
+from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.px4_rule import mission_findings
@@ -15,6 +16,7 @@ from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
 from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
+from logs.verdict.rules.waypoint_rule import waypoint_findings
 from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 from planner.plan import Plan, Violation
@@ -28,6 +30,8 @@ def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
         *clearance_findings(demands, None, geometric=True),
         *threat_findings(demands, None, geometric=True),
         *bounds_findings(demands, None, geometric=True),
+        *waypoint_findings(demands, None, geometric=True),
+        *corridor_findings(demands, None, geometric=True),
         *speed_findings(demands, None, geometric=True),
         *energy_findings(demands, None, geometric=True),
     )

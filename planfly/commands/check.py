@@ -53,4 +53,4 @@ def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
     log = read_log(source)
     if not args.terrain:
         return log
-    return replace(log, setup=replace(log.setup, scenario=over_terrain(log.setup.scenario, args.terrain)))
+    return replace(log, setup=log.setup.in_scenario(over_terrain(log.setup.scenario, args.terrain)))

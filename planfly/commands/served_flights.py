@@ -13,6 +13,7 @@ from flight.live.flight_process import (
     FlightJudged,
     JudgeMission,
     MissionJudged,
+    PreparedFlight,
     ProcessReady,
     send_event,
     serve_flights,
@@ -118,7 +119,7 @@ class ServedFlights:
             rows, _ = Flight(setup, self.aircraft).block(30)
             judge_flight(setup, as_track(rows), "warm")
 
-    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
+    def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission on its geometry, and see that it can be started."""
         served = self._served
         try:
@@ -136,7 +137,8 @@ class ServedFlights:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        return setup, MissionJudged(order.number, True, verdict.flyable, texts, home, items, start)
+        judged = MissionJudged(order.number, True, verdict.flyable, texts, home, items, start)
+        return PreparedFlight(setup, flight.map), judged
 
     def open_log(self, setup: FlightSetup) -> "ServedLog":
         """Open the next free ``flight-NNN.mcap``."""

@@ -13,7 +13,7 @@ def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
 def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
     found = [failed(rule, FLIGHT, -1.0) for rule in RULES]
     assert headline(found[-4:], False) == ("not flyable: departure (why), completion (why), speed (why), energy (why)")
-    assert headline(found, False).endswith(", +8 more")
+    assert headline(found, False).endswith(", +9 more")
     assert headline(found, False).startswith("not flyable: departure (why), completion (why), mission (why), slope (")
 
 
