@@ -23,10 +23,10 @@ from planfly.terminal.argument_types import (
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from planfly.terminal.shared_options import (
     aircraft_options,
-    autopilot_option,
     overwrite_option,
     own_link_options,
     pilot_options,
+    program_option,
     steering_options,
     world_options,
 )
@@ -91,7 +91,7 @@ def _add_run_and_plan(command: _Command) -> None:
         help="where it does not fly, tighten and try again, up to N times",
     )
     steering_options(run)
-    autopilot_option(run)
+    program_option(run)
     overwrite_option(run)
     # Names and summaries only: what they stand for is imported with the command.
     from planner.search.algorithms import algorithm_lines
@@ -162,7 +162,7 @@ def _add_export_and_fly(command: _Command) -> None:
         help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is that of these rows",
     )  # fmt: skip
     steering_options(fly)
-    autopilot_option(fly)
+    program_option(fly)
     overwrite_option(fly)
 
 

@@ -47,7 +47,7 @@ def steering_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def autopilot_option(parser: argparse.ArgumentParser) -> None:
+def program_option(parser: argparse.ArgumentParser) -> None:
     """Add the program of a real autopilot."""
     parser.add_argument(
         "--autopilot",
