@@ -97,10 +97,10 @@ def random_setup(seed: int) -> tuple[FlightSetup, Airframe]:
         spec["flight"] = {"autopilot": "ardupilot", "nav": "perfect"}
         try:
             scenario = from_spec(spec, f"random {seed}")
-        except ScenarioError:
+            airframe = load_airframe(scenario)
+            plan = make_plan(scenario, airframe, seed)
+        except ScenarioError:  # an end within a missile's reach
             continue
-        airframe = load_airframe(scenario)
-        plan = make_plan(scenario, airframe, seed)
         if plan.feasible:
             mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
             return make_setup(scenario, airframe, mission, seed), airframe
