@@ -73,7 +73,11 @@ def plan_scenario(number: int, autopilot: str = "ardupilot") -> Scenario:
         "threats": _threats(rng, ends, half_e),
     }
     for name, place in zip(("start", "destination"), ends, strict=True):
-        spec[name] = {"east_m": float(place[0]), "north_m": float(place[1]), "height_m": float(rng.uniform(90.0, 200.0))}
+        spec[name] = {
+            "east_m": float(place[0]),
+            "north_m": float(place[1]),
+            "height_m": float(rng.uniform(90.0, 200.0)),
+        }
     return from_spec(spec, spec["name"])
 
 
