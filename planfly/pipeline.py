@@ -87,7 +87,7 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     number = choose_seed(world, seed)
     airframe = load_airframe(world)
     plan = make_plan(world, airframe, number)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
     setup = make_setup(world, airframe, mission, number, plan=plan)
