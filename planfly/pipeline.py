@@ -1,7 +1,7 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flight.mission.end_courses import with_end_courses
@@ -17,7 +17,9 @@ from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.levels import FlownBeside
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.flights_beside import airframe_answer, find_deciding_parameter
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.scenario import Scenario, load_scenario
@@ -57,12 +59,14 @@ class JudgedFlight:
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
+    beside: what other flights had to say of it; None where none were flown.
     """
 
     track: Track
     ended: str
     verdict: Verdict
     events: tuple[LogEvent, ...]
+    beside: FlownBeside | None = None
 
 
 def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
@@ -137,6 +141,9 @@ def fly_and_judge(
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
+
+    An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
+    one passes, flights with other parameters.
     """
 
     def report(done: float, whole: float) -> None:
@@ -145,17 +152,24 @@ def fly_and_judge(
 
     if log is None:
         flown = simulate(setup, airframe.aircraft, progress=report)
-        return _judged(setup, flown.track, flown.ended)
+        return _judged(setup, airframe, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
         flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=report)
-        judged = _judged(setup, thin_track(flown.track, every), flown.ended)
+        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(judged.ended, judged.verdict)
+        recorder.finish(judged.ended, judged.verdict, judged.beside)
     return judged
 
 
-def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:
+def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    return JudgedFlight(track, ended, judge_flight(setup, track, ended), (event,))
+    beside = None
+    if setup.parameters is not None:
+        beside = FlownBeside(airframe_answer(setup, airframe.aircraft))
+    verdict = judge_flight(setup, track, ended, beside=beside)
+    if beside is not None and beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
+        beside = replace(beside, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
+        verdict = judge_flight(setup, track, ended, beside=beside)
+    return JudgedFlight(track, ended, verdict, (event,), beside)

@@ -4,6 +4,7 @@ import math
 
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message
+from logs.verdict.levels import LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.places import PLAN
 from logs.verdict.rules.bounds_rule import bounds_findings
@@ -65,8 +66,9 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     )
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
-    lines = summary_lines(findings, flyable, setup, "geometric")
-    return Verdict(findings, flyable, complete, lines, "geometric", notes=setup.route.notes)
+    levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
 
 
 def judge_plan_only(plan: Plan) -> Verdict:
