@@ -1,7 +1,7 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flight.mission.end_courses import with_end_courses
@@ -18,8 +18,10 @@ from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.levels import FlownBeside
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.flights_beside import airframe_answer, find_deciding_parameter
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -63,6 +65,7 @@ class JudgedFlight:
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
+    beside: what other flights had to say of it; None where none were flown.
     """
 
     setup: FlightSetup
@@ -70,6 +73,7 @@ class JudgedFlight:
     ended: str
     verdict: Verdict
     events: tuple[LogEvent, ...]
+    beside: FlownBeside | None = None
 
 
 def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
@@ -152,6 +156,9 @@ def fly_and_judge(
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
 
+    An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
+    one passes, flights with other parameters.
+
     A flight that cannot begin, or that needs more than `MOST_STORES` times the energy carried, has no row and no log:
     its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it to its
     end; no log is left then.
@@ -161,7 +168,7 @@ def fly_and_judge(
         return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
     try:
         if autopilot is None:
-            return _record_and_judge(setup, Flight(setup, airframe.aircraft), log, advance, every)
+            return _record_and_judge(setup, airframe, Flight(setup, airframe.aircraft), log, advance, every)
         return _fly_program(setup, airframe, log, advance, every, autopilot)
     except StartError as error:
         return _unflown(setup, f"not started: {error.reason}")
@@ -181,7 +188,7 @@ def _fly_program(
     with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, flight, log, advance, every)
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every)
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)
@@ -201,7 +208,7 @@ def autopilot_log(log: Path) -> Path:
 
 
 def _record_and_judge(
-    setup: FlightSetup, flight: Airborne, log: Path | None, advance: Advance | None, every: int
+    setup: FlightSetup, airframe: Airframe, flight: Airborne, log: Path | None, advance: Advance | None, every: int
 ) -> JudgedFlight:
     def report(done: float, whole: float) -> None:
         if advance is not None:
@@ -209,13 +216,13 @@ def _record_and_judge(
 
     if log is None:
         flown = fly_to_end(flight, progress=report)
-        return _judged(setup, flown.track, flown.ended)
+        return _judged(setup, airframe, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
         flown = fly_to_end(flight, recorder.write_rows, report)
-        judged = _judged(setup, thin_track(flown.track, every), flown.ended)
+        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(judged.ended, judged.verdict)
+        recorder.finish(judged.ended, judged.verdict, judged.beside)
     return judged
 
 
@@ -224,7 +231,14 @@ def _unflown(setup: FlightSetup, ended: str) -> JudgedFlight:
     return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
-def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:
+def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    return JudgedFlight(setup, track, ended, judge_flight(setup, track, ended), (event,))
+    beside = None
+    if setup.parameters is not None:
+        beside = FlownBeside(airframe_answer(setup, airframe.aircraft))
+    verdict = judge_flight(setup, track, ended, beside=beside)
+    if beside is not None and beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
+        beside = replace(beside, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
+        verdict = judge_flight(setup, track, ended, beside=beside)
+    return JudgedFlight(setup, track, ended, verdict, (event,), beside)
