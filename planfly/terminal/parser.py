@@ -77,6 +77,8 @@ def _flown_by(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--airspeed", metavar="M/S", type=positive, help="until the mission sets one (default: the aircraft's cruise)"
     )
+    parser.add_argument("--wind", metavar="SPEED,FROM", type=wind, help="steady wind, m/s and degrees it blows from")
+    parser.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
 
 
 def _pilot(parser: argparse.ArgumentParser) -> None:
@@ -181,8 +183,6 @@ def _add_export_and_fly(command: _Command) -> None:
     fly.add_argument(
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
-    fly.add_argument("--wind", metavar="SPEED,FROM", type=wind, help="steady wind, m/s and degrees it blows from")
-    fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=seed, help="of the turbulence (default: the plan's, or 1)")
     fly.add_argument(
         "--log-hz", metavar="HZ", type=int, choices=(60, 30, 20, 10), default=60,
