@@ -22,7 +22,7 @@ RULES = {
     "bounds": "bounds",
     "waypoint": "waypoints",
     "speed": "airspeed",
-    "stall": "stall margin",
+    "stall": "stall",
     "takeoff": "take-off",
     "landing": "landing",
     "energy": "energy",
