@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from flight.mission.end_courses import with_end_courses
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
@@ -148,15 +150,22 @@ def fly_and_judge(
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
 
-    needed = needed_energy(setup)
-    if needed > MOST_STORES * setup.battery:
-        return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
+    stores = _stores_needed(setup)
+    if stores > MOST_STORES:
+        return _unflown(setup, f"not started: it takes {stores:.0f} times the energy carried")
     try:
         return _fly(setup, airframe, log, report, every)
     except StartError as error:
         if log is not None:
             log.unlink(missing_ok=True)
         return _unflown(setup, f"not started: {error.reason}")
+
+
+def _stores_needed(setup: FlightSetup) -> float:
+    """How many times the energy carried a route takes by prediction; 0 where not even full power all the way would."""
+    seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
+    most = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
+    return needed_energy(setup) / setup.battery if most > MOST_STORES * setup.battery else 0.0
 
 
 def _fly(setup: FlightSetup, airframe: Airframe, log: Path | None, report: Progress, every: int) -> JudgedFlight:
