@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
 from aircraft.path_limits import Limits
+from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
+from flight.ardupilot.tracking import tracking_error
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.flight_setup import make_limits
 from world.errors import ScenarioError
@@ -18,11 +20,13 @@ class Airframe:
     aircraft: its entry in the catalog.
     limits: of scenario and aircraft together; they hold the envelope.
     battery: energy carried, Wh.
+    parameters: of the ArduPlane that flies it; None where planfly's guidance does.
     """
 
     aircraft: Aircraft
     limits: Limits
     battery: float
+    parameters: ArduPilotParameters | None = None
 
     @property
     def airspeed(self) -> float:
@@ -45,7 +49,8 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 def load_airframe(scenario: Scenario) -> Airframe:
     """The scenario's aircraft, its envelope, and the limits that both set.
 
-    Raises ScenarioError for an unknown aircraft, or a speed that it cannot fly.
+    Raises ScenarioError for an unknown aircraft, or a speed that it cannot fly, and ParameterError for a bad file of
+    ArduPilot's parameters.
 
     >>> from world.scenario import load_scenario
     >>> airframe = load_airframe(load_scenario("tight"))
@@ -58,6 +63,8 @@ def load_airframe(scenario: Scenario) -> Airframe:
         model_hash(aircraft)
     except ValueError as error:
         raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
+    ardupilot = table.steering.autopilot == "ardupilot"
+    parameters = load_parameters(aircraft, table.params) if ardupilot else None
     airspeed = aircraft.airspeed if table.airspeed_mps is None else table.airspeed_mps
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
         raise ScenarioError(
@@ -66,11 +73,15 @@ def load_airframe(scenario: Scenario) -> Airframe:
         )
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
-    return Airframe(aircraft, make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg)), battery)
+    limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
+    if parameters is not None:
+        tracking = tracking_error(parameters, airspeed, table.steering.nav, fly_over=table.fly_over)
+        limits = replace(limits, tracking=tracking)
+    return Airframe(aircraft, limits, battery, parameters)
 
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     """An airframe within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
-    return replace(airframe, limits=limits)
+    return replace(airframe, limits=replace(limits, tracking=old.tracking))

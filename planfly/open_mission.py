@@ -7,6 +7,7 @@ from pathlib import Path
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
 from flight.mission.items import Mission
+from flight.mission.placing import place_stops
 from flight.mission_files.formats import read_mission
 from flight.simulation.flight_setup import FlightSetup
 from planfly.airframe import Airframe, choose_seed, load_airframe
@@ -83,11 +84,13 @@ def open_mission(
     mission = read_mission(path)
     if scenario_name is not None:
         scenario = change(load_scenario(scenario_name, terrain))
+        placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
-        scenario = change(implied_scenario(mission, terrain, vertical_legs=True))
+        implied = implied_scenario(mission, terrain, vertical_legs=True)
+        scenario, placed = change(implied.scenario), implied.placed
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
-    return OpenedMission(make_setup(scenario, airframe, mission, number, vertical_legs=True), airframe, path.stem)
+    return OpenedMission(make_setup(scenario, airframe, mission, number, placed=placed), airframe, path.stem)
 
 
 def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _unchanged) -> OpenedPlan:
@@ -98,7 +101,8 @@ def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _
     plan = read_plan(path, terrain=terrain)
     scenario = change(plan.scenario)
     airframe = load_airframe(scenario)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=str(path))
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=str(path), tracking=tracking)
     return OpenedPlan(plan, scenario, airframe, mission)
 
 

@@ -6,6 +6,7 @@
     ├── MissionError    a plan or mission file
     ├── FlightError     an aircraft model or a start condition
     │   └── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
+    ├── ParameterError  a file of an autopilot's parameters
     └── LogError        a flight log
 
 Each message is one line: the file, the line or field, the value, and the allowed range.  The command
@@ -31,6 +32,10 @@ class MissionError(PlanflyError):
 
 class FlightError(PlanflyError):
     """An aircraft model or a start condition is unusable."""
+
+
+class ParameterError(PlanflyError):
+    """A file of an autopilot's parameters cannot be used as it stands."""
 
 
 class StartError(FlightError):

@@ -12,11 +12,14 @@ from typing import Any, TypeAlias, TypeVar, cast
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 # A record of named fields, as `record_dtype` makes: mypy cannot know which.
 Record: TypeAlias = Any
+# An array of them.
+Records: TypeAlias = NDArray[Any]
 _ROOMS = ("aircraft", "world", "planner", "flight", "logs")
 
 

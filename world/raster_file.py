@@ -18,6 +18,9 @@ ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 # A window, or an .npz file, with more pixels than this is refused before it is allocated.
 MOST_PIXELS = 120_000_000
+# Rows of the tile that matplotlib ships, and what it states as xmin, xmax, ymin and ymax, deg; a copy of it under
+# another name is known by them, to a hundredth of a pixel.
+_TILE_ROWS, _TILE_EDGES, _SAME_EDGE = 344, (-84.41375, -84.07791667, 36.73291667, 36.44625), 1e-5
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +78,7 @@ def one_line(error: BaseException) -> str:
 def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz with `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees.
 
-    The order within each pair does not matter: the tile that matplotlib ships has ymin and ymax swapped.
+    The order within each pair does not matter, but for the tile that matplotlib ships: see `_edges`.
     Raises TerrainError.
     """
     heights, edges = _read_npz(file, name)
@@ -84,8 +87,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
             f"{name}: elevation: a 2-D array of numbers of at least 2 x 2 is expected,"
             f" got {heights.dtype} of shape {heights.shape}"
         )
-    west, east = sorted(edges[:2])
-    south, north = sorted(edges[2:])
+    west, east, south, north = _edges(edges, heights.shape[0])
     if not (-180.0 <= west < east <= 360.0 and -90.0 <= south < north <= 90.0):
         raise TerrainError(
             f"{name}: xmin..ymax: {edges}: degrees of longitude -180..360 and latitude -90..90 are expected"
@@ -103,6 +105,22 @@ def open_npz(file: Path, name: str) -> RasterFile:
     col, row = outline(cols, rows)
     corners = np.stack([west + (col + 0.5) * pitch_x, north - (row + 0.5) * pitch_y], axis=1)
     return RasterFile(name, (rows, cols), to_source, corners, file_sha256(file), read)
+
+
+def _edges(stated: list[float], rows: int) -> tuple[float, float, float, float]:
+    """West, east, south and north edge, deg, of what a file states as xmin, xmax, ymin, ymax.
+
+    In matplotlib's tile of 344 rows ymax, 36.44625, is the north edge, and ymin, 36.73292, is that plus the tile's
+    height where it should be less: read as south and north edge the tile stands 0.28667 degrees too far north.  So the
+    ground says: the highest pixel lies 0.2479 degrees south of the tile's north edge, and Cross Mountain, as high, at
+    36.1983 N; the lake ends 0.2208 degrees south of it, and Norris Dam stands at 36.2242 N (both places:
+    https://en.wikipedia.org/wiki/Cross_Mountain_(Tennessee), https://en.wikipedia.org/wiki/Norris_Dam).
+    """
+    west, east = sorted(stated[:2])
+    south, north = sorted(stated[2:])
+    if rows == _TILE_ROWS and np.allclose(stated, _TILE_EDGES, rtol=0.0, atol=_SAME_EDGE):
+        south, north = south - (north - south), south
+    return west, east, south, north
 
 
 def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:

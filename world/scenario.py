@@ -78,7 +78,8 @@ class Scenario:
 
     def to_json(self) -> dict[str, Any]:
         """The scenario as plain JSON data; `from_spec` reads it back."""
-        return self.spec.model_dump(mode="json", exclude_none=True)
+        stated = self.spec.model_copy(update={"flight": self.spec.flight.stated()})
+        return stated.model_dump(mode="json", exclude_none=True)
 
 
 @cache
@@ -177,9 +178,7 @@ def from_spec(
             ground = _made_terrain(spec.terrain, bounds)
     if ground is not None and spec.terrain.vertical_error_m is not None:
         ground = replace(ground, vertical_error=spec.terrain.vertical_error_m)
-    if names_folder(spec.flight.aircraft):
-        folder = str(Path(base or "", spec.flight.aircraft).resolve())
-        spec = spec.model_copy(update={"flight": spec.flight.model_copy(update={"aircraft": folder})})
+    spec = spec.model_copy(update={"flight": _with_whole_paths(spec.flight, base)})
     # What was taken from the tile is written down, so that a log without the tile makes the same scenario.
     place = checked_table(lambda: OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg), f"{source}: origin")
     area = spec.area or checked_table(
@@ -187,6 +186,16 @@ def from_spec(
     )
     spec = spec.model_copy(update={"origin": place, "area": area})
     return _assemble(spec, source, origin, bounds, ground, external=external, replaced=terrain is not None)
+
+
+def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
+    """The table with the folder of its aircraft and its file of parameters as absolute paths."""
+    changes = {}
+    if names_folder(flight.aircraft):
+        changes["aircraft"] = str(Path(base or "", flight.aircraft).resolve())
+    if flight.params is not None:
+        changes["params"] = str(Path(base or "", flight.params).resolve())
+    return flight.model_copy(update=changes)
 
 
 def _with_terrain(spec: ScenarioFile, terrain: str, source: str, base: Path | None) -> ScenarioFile:

@@ -78,6 +78,7 @@ def with_wind(scenario: Scenario, speed: float | None, from_course: float | None
 def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     """A scenario with other entries of [flight]; None keeps what it has.
 
+    A law of guidance takes the place of an autopilot and its parameters, and they take that of a law.
     Raises ScenarioError for a value that a scenario file may not have either.
 
     >>> from world.scenario import load_scenario
@@ -85,7 +86,10 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
     28.0
     """
     given = {key: value for key, value in changes.items() if value is not None}
-    table = checked_table(lambda: FlightTable(**(scenario.flight.model_dump() | given)), f"{scenario.name}: flight")
+    kept = scenario.flight.model_dump()
+    if "guidance" in given or "params" in given or "autopilot" in given:
+        kept |= {"autopilot": None, "guidance": None, "params": None}
+    table = checked_table(lambda: FlightTable(**(kept | given)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
 
 

@@ -40,7 +40,7 @@ class Threats:
 def threat_label(name: str, index: int) -> str:
     """What a threat is called: its own name, or its number from 1 where it has none ("").
 
-    >>> threat_label("Powell Valley", 0), threat_label("", 2)
-    ('Powell Valley', 'threat 3')
+    >>> threat_label("east valley", 0), threat_label("", 2)
+    ('east valley', 'threat 3')
     """
     return name or f"threat {index + 1}"

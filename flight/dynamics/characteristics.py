@@ -14,7 +14,7 @@ from flight.dynamics.trim import Trim, linearise, straight
 Floats = NDArray[np.float64]
 
 # Height of all measurements, m above sea level.
-AMSL = 500.0
+TRIM_AMSL = 500.0
 # Latitude and longitude of all measurements, degrees; steps are flown due north from there.
 _POSITION = (45.0, 0.0)
 _RATE_HZ = 120.0
@@ -93,7 +93,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
     fdm = Fdm(aircraft)
     rows = []
     for airspeed in np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, count):
-        found = straight(fdm, float(airspeed), AMSL)
+        found = straight(fdm, float(airspeed), TRIM_AMSL)
         if found is None:
             continue
         fdm.balance(found.vector())
@@ -102,7 +102,7 @@ def trim_table(aircraft: Aircraft, count: int = 7) -> tuple[TrimRow, ...]:
     return tuple(rows)
 
 
-def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = AMSL) -> tuple[Mode, ...]:
+def modes_at(aircraft: Aircraft, airspeed: float, amsl: float = TRIM_AMSL) -> tuple[Mode, ...]:
     """The named modes of level flight at this airspeed (m/s) and height (m), empty where there is no such flight.
 
     >>> from aircraft.catalog import load_aircraft
@@ -162,7 +162,7 @@ def step_responses(aircraft: Aircraft) -> tuple[StepResponse, ...]:
     elevator, aileron, rudder = (
         0.1 * most for most in (aircraft.max_elevator, aircraft.max_aileron, aircraft.max_rudder)
     )
-    level = straight(Fdm(aircraft), aircraft.airspeed, AMSL)
+    level = straight(Fdm(aircraft), aircraft.airspeed, TRIM_AMSL)
     throttle = 0.1 if level is None or level.throttle < 0.9 else -0.1
     along, across = ("pitch", "alpha", "airspeed", "amsl"), ("roll", "roll_rate", "beta", "yaw")
     return (
@@ -177,7 +177,7 @@ def _respond(
     aircraft: Aircraft, control: str, size: float, held: float, seconds: float, quantities: tuple[str, ...]
 ) -> StepResponse:
     fdm = Fdm(aircraft, rate_hz=_RATE_HZ)
-    commands = fdm.start(*_POSITION, AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
+    commands = fdm.start(*_POSITION, TRIM_AMSL, 0.0, aircraft.airspeed, terrain_amsl=-1000.0).commands()
     moved = commands._replace(**{control: getattr(commands, control) + size})
     count = round(seconds * _RATE_HZ)
     states = np.zeros(count + 1, STATE)

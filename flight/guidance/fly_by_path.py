@@ -150,7 +150,20 @@ def waypoint_records(route: Route) -> Records:
     # A stated radius is what switches legs; only where there is none is a fly-over waypoint passed through.
     waypoints["fly_over"], waypoints["acceptance"] = route.fly_over & (route.acceptance == 0.0), route.acceptance
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
+    waypoints["up"] = route.waypoints[:, 2]
+    _set_circles(waypoints[1:-1], route)
     return waypoints
+
+
+def _set_circles(corners: Records, route: Route) -> None:
+    """Radius and centre of the loiter that each of a route's corners belongs to."""
+    turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
+    corners["circle"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
+    # The centre is square to the course in the middle of the turn.
+    middle = courses[:-1] + 0.5 * turns
+    out = corners["circle"] / np.cos(0.5 * turns)
+    corners["centre_east"] = corners["east"] + out * np.cos(middle)
+    corners["centre_north"] = corners["north"] - out * np.sin(middle)
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:

@@ -4,12 +4,13 @@ import numpy as np
 
 from world.kernels import record_dtype
 
-# Laws that may steer; `flight.simulation.simulate.LAWS` has them by their names in a scenario's `[flight] guidance`.
-CROSS_TRACK, L1, VECTOR_FIELD = range(3)
+# Who may steer; `flight.simulation.simulate.LAWS` has the laws of planfly's guidance by their names in a scenario's
+# `[flight] guidance`.
+CROSS_TRACK, L1, VECTOR_FIELD, ARDUPILOT = range(4)
 
 GUIDANCE_MEMORY = record_dtype(
     # Set before the first tick.
-    ("law", np.int64),  # `CROSS_TRACK`, `L1` or `VECTOR_FIELD`
+    ("law", np.int64),  # `CROSS_TRACK`, `L1`, `VECTOR_FIELD` or `ARDUPILOT`
     "max_bank",  # rad, of the command
     "trim_elevator",  # rad, of level flight at the reference airspeed
     "trim_alpha",  # rad

@@ -48,7 +48,7 @@ def steer_height(
     push = min(8.0, max(-6.0, min(push, ceiling)))
     if not held and abs(error) < 5.0:
         memory.height_sum = min(5.0, max(-5.0, memory.height_sum + error * dt))
-    _set_elevator(state, gains, memory, commands, airspeed, climb_rate, push)
+    steer_elevator(state, gains, memory, commands, climb_rate, push)
     _set_throttle(estimated, gains, memory, commands, airspeed, ahead_slope, along, dt)
 
 
@@ -76,16 +76,14 @@ def _push_ceiling(
 
 
 @compiled
-def _set_elevator(
-    state: Record,
-    gains: Record,
-    memory: Record,
-    commands: Record,
-    airspeed: float,
-    climb_rate: float,
-    push: float,
+def steer_elevator(
+    state: Record, gains: Record, memory: Record, commands: Record, climb_rate: float, push: float
 ) -> None:  # pragma: no cover - compiled
-    """Elevator for an acceleration upwards (m/s^2): load factor, angle of attack, elevator."""
+    """Elevator for an acceleration upwards (m/s^2): load factor, angle of attack, elevator.
+
+    climb_rate: m/s.
+    """
+    airspeed = max(8.0, state.airspeed)
     # Lift is slower than the ailerons: it is asked for the bank that comes.
     roll = state.roll
     banked = roll + gains.load_lead * memory.bank_rate
@@ -155,13 +153,24 @@ def steer_bank(
     """Aileron from a bank command through a model of how the aircraft shall roll; rudder for coordination and damping.
 
     The model answers the command as a critically damped oscillator within the limits of roll rate and acceleration, so
-    it never overshoots.  The ailerons get what the model's roll takes, what is left of the error, and, against gusts
-    and the propeller, what rolled the aircraft beyond its ailerons' own doing.
+    it never overshoots; `follow_roll` makes the aircraft roll as it does.
+    """
+    bank, rate, turn = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
+    follow_roll(state, gains, memory, commands, bank, rate, turn, dt)
+
+
+@compiled
+def follow_roll(
+    state: Record, gains: Record, memory: Record, commands: Record, bank: float, rate: float, turn: float, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Aileron and rudder for a roll that is given: bank (rad), roll rate (rad/s) and roll acceleration (rad/s^2).
+
+    The ailerons get what this roll takes, what is left of the error, and, against gusts and the propeller, what rolled
+    the aircraft beyond its ailerons' own doing.
     """
     airspeed = max(8.0, state.airspeed)
     scale = gains.reference_airspeed / airspeed
-    memory.bank, rate, turn = roll_model(bank, memory.bank, memory.bank_rate, gains, dt)
-    memory.bank_rate = rate
+    memory.bank, memory.bank_rate = bank, rate
     per_rate, per_acceleration = (
         gains.aileron_per_roll_rate * scale,
         gains.aileron_per_roll_acceleration * scale * scale,

@@ -53,6 +53,24 @@ def guide(
     memory: of `flight.guidance.guidance_memory.GUIDANCE_MEMORY`.
     commands: of `flight.dynamics.state.COMMANDS`.
     """
+    course = find_on_path(estimated, pieces, memory)
+    memory.speed_command = waypoints[memory.leg].airspeed
+    if memory.law == L1:
+        bank = _l1(state, estimated, waypoints, gains, memory, dt)
+    elif memory.law == VECTOR_FIELD:
+        bank = _field(estimated, pieces[memory.piece].curvature, gains, memory, course, dt)
+    else:
+        bank = _along_path(state, estimated, pieces, gains, memory, course, dt)
+    steer_height(state, estimated, nodes, gains, memory, commands, course, dt)
+    steer_bank(state, gains, memory, commands, bank, dt)
+
+
+@compiled_views
+def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
+    """Note in the memory where on the path the aircraft is, and return the path's course there, rad.
+
+    estimated, pieces, memory: as `guide` takes them.
+    """
     k = memory.piece
     along, cross, course = project(pieces[k], estimated.east, estimated.north)
     while along > pieces[k].length and k + 1 < pieces.shape[0]:
@@ -63,16 +81,8 @@ def guide(
     memory.distance = piece.start + along
     memory.leg = piece.leg + (1 if memory.distance > piece.leg_change else 0)
     memory.cross_track = cross
-    memory.speed_command = waypoints[memory.leg].airspeed
     memory.done = k + 1 == pieces.shape[0] and along >= piece.length
-    if memory.law == L1:
-        bank = _l1(state, estimated, waypoints, gains, memory, dt)
-    elif memory.law == VECTOR_FIELD:
-        bank = _field(estimated, piece.curvature, gains, memory, course, dt)
-    else:
-        bank = _along_path(state, estimated, pieces, gains, memory, course, dt)
-    steer_height(state, estimated, nodes, gains, memory, commands, course, dt)
-    steer_bank(state, gains, memory, commands, bank, dt)
+    return course
 
 
 @compiled
@@ -205,7 +215,8 @@ def _l1(
     if k + 2 < waypoints.shape[0] and l1_reached(estimated, a, b, length, radius):
         k += 1
         memory.l1_leg = k
-    angle, aim = l1_angles(estimated, waypoints[k], waypoints[k + 1], length)
+    a, b = waypoints[k], waypoints[k + 1]
+    angle, aim = l1_angles(estimated, a.east, a.north, b.east, b.north, length)
     memory.l1_sum = l1_integrate(aim, memory.l1_sum, gains.l1_integral, dt)
     if not math.isnan(aim):
         angle += aim + memory.l1_sum

@@ -20,6 +20,10 @@ WAYPOINT = record_dtype(
     ("fly_over", np.bool_),
     "acceptance",  # m; 0 where the mission states none
     "airspeed",  # m/s, of the leg
+    "up",  # m AMSL
+    "circle",  # m, radius of the loiter that it is a corner of, positive to the right; 0 for none
+    "centre_east",  # m, of that circle
+    "centre_north",
 )
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.
 WAYPOINT_RADIUS = 90.0
@@ -39,17 +43,17 @@ def l1_length(speed: float, period: float, damping: float) -> float:  # pragma: 
 
 @compiled
 def l1_angles(
-    estimated: Record, a: Record, b: Record, length: float
+    estimated: Record, a_east: float, a_north: float, b_east: float, b_north: float, length: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Angle from the ground velocity to the leg or the waypoint it heads for, and from there to its aim, rad.
 
-    estimated: a record of `flight.guidance.navigation_error.MOTION`.  a, b: the leg's ends, of `WAYPOINT`.  The second
-    angle is NaN while it heads straight for a waypoint.  Both are positive where the aircraft has to turn left.
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.  a, b: the leg's ends, m.  The second angle is NaN
+    while it heads straight for a waypoint.  Both are positive where the aircraft has to turn left.
     """
-    leg_e, leg_n = b.east - a.east, b.north - a.north
+    leg_e, leg_n = b_east - a_east, b_north - a_north
     run = max(1e-6, math.hypot(leg_e, leg_n))
     leg_e, leg_n = leg_e / run, leg_n / run
-    from_e, from_n = estimated.east - a.east, estimated.north - a.north
+    from_e, from_n = estimated.east - a_east, estimated.north - a_north
     along = from_e * leg_e + from_n * leg_n
     cross = from_e * leg_n - from_n * leg_e
     distance = math.hypot(from_e, from_n)
@@ -57,7 +61,7 @@ def l1_angles(
     if distance > length and along < -_CAPTURE * max(1.0, distance):
         return wrap(course - math.atan2(-from_e, -from_n)), math.nan
     if along > run + _PASSED * math.hypot(estimated.velocity_east, estimated.velocity_north):
-        return wrap(course - math.atan2(b.east - estimated.east, b.north - estimated.north)), math.nan
+        return wrap(course - math.atan2(b_east - estimated.east, b_north - estimated.north)), math.nan
     aim = math.asin(min(_CAPTURE, max(-_CAPTURE, cross / max(0.1, length))))
     return wrap(course - math.atan2(leg_e, leg_n)), aim
 
@@ -83,7 +87,8 @@ def l1_reached(
 ) -> bool:  # pragma: no cover - compiled
     """Whether L1 turns to the next leg: within its turn distance of b, or past the line square to the leg there.
 
-    estimated, a, b: as `l1_angles` takes them.  radius: m, for a right angle; smaller turns start later.
+    estimated: as `l1_angles` takes it.  a, b: the leg's ends, of `WAYPOINT`.  radius: m, for a right angle; smaller
+    turns start later.
     """
     leg_e, leg_n = b.east - a.east, b.north - a.north
     to_e, to_n = b.east - estimated.east, b.north - estimated.north

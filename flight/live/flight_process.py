@@ -29,6 +29,7 @@ from flight.live.snapshot import Snapshot, SnapshotMaker
 from flight.live.status_text import CRITICAL, StatusText
 from flight.mission.items import Home, Mission
 from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.local_map import LocalMap
 from flight.simulation.simulate import TICK, Flight
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import PlanflyError
@@ -122,14 +123,22 @@ class LogSink(Protocol):
         """Close the log of a flight that could not go on."""
 
 
+@dataclass(frozen=True, slots=True)
+class PreparedFlight:
+    """A mission that can be started, and the map fitted around it."""
+
+    setup: FlightSetup
+    local_map: LocalMap
+
+
 class FlightFactory(Protocol):
     """What the application gives the process that flies.  speed: times real time."""
 
     aircraft: Aircraft
     speed: float
 
-    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
-        """Judge a mission; the setup is None where it cannot be flown."""
+    def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
+        """Judge a mission; None in place of the flight where it cannot be flown."""
 
     def open_log(self, setup: FlightSetup) -> LogSink:
         """Open the log of the next flight."""
@@ -146,15 +155,15 @@ def serve_flights(connection: Connection, factory: FlightFactory) -> None:
     >>> link_end.send(EndFlight(quit=True))
     >>> serve_flights(flying_end, factory=None)  # an order to quit asks nothing of the factory
     """
-    setup: FlightSetup | None = None
+    prepared: PreparedFlight | None = None
     try:
         while True:
             order = connection.recv()
             if isinstance(order, JudgeMission):
-                setup, judged = factory.prepare(order)
+                prepared, judged = factory.prepare(order)
                 send_event(connection, judged)
-            elif isinstance(order, StartFlight) and setup is not None:
-                if not _fly(connection, setup, factory):
+            elif isinstance(order, StartFlight) and prepared is not None:
+                if not _fly(connection, prepared, factory):
                     return
             elif isinstance(order, EndFlight) and order.quit:
                 return
@@ -183,16 +192,16 @@ def read_event(data: bytes) -> Snapshot | Event:
     return found
 
 
-def _fly(connection: Connection, setup: FlightSetup, factory: FlightFactory) -> bool:
+def _fly(connection: Connection, prepared: PreparedFlight, factory: FlightFactory) -> bool:
     """Fly in step with the clock; False when the process is to end."""
     try:
-        flight = Flight(setup, factory.aircraft)
-        log = factory.open_log(setup)
+        flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
+        log = factory.open_log(prepared.setup)
     except (PlanflyError, OSError) as error:
         send_event(connection, FlightEnded(f"not started: {error}"))
         send_event(connection, FlightJudged(False, (StatusText(f"flight not started: {error}", CRITICAL),)))
         return True
-    snapshots = SnapshotMaker(setup, flight.map)
+    snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
     try:
         ended, go_on = _in_step(connection, flight, snapshots, log, factory.speed)
         if go_on:

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,13 @@ from numpy.typing import NDArray
 
 from flight.mission.items import Mission
 from flight.mission.itinerary import ItineraryStop, make_itinerary
-from flight.mission.routing import HIGHEST, make_route
+from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops
 from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
 from world.scenario import GROUND_BUFFER, Scenario, from_spec
-from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
+from world.scenario_tables import AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
+from world.scenario_types import MAP_EXTENT
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -26,38 +28,44 @@ AREA_BUFFER = 2000.0
 _HOME_DISTANCE = 100_000.0
 
 
+@dataclass(frozen=True, slots=True)
+class ImpliedScenario:
+    """The scenario made around a mission, and the mission's places in it."""
+
+    scenario: Scenario
+    placed: PlacedMission
+
+
 def implied_scenario(
     mission: Mission, terrain_path: str | None, flight: FlightTable | None = None, *, vertical_legs: bool = False
-) -> Scenario:
+) -> ImpliedScenario:
     """Scenario for a mission that has none: its surroundings, no threats, default limits, ``external`` set.
 
     terrain_path: an elevation file or embedded name, None for no terrain at all.
     flight: the aircraft and how it flies, the defaults if None.
-    vertical_legs: as for `flight.mission.routing.make_route`.
+    vertical_legs: as for `flight.mission.placing.place_stops`.
 
     The area is the box of the positions flown to, their circles and 2 km around, clipped at the tile's edge.  Start
-    and destination are the route's ends; where those are not above ground they are lifted to 1 m, because a scenario's
-    ends must be, while the route (and its verdict) keeps the mission's heights.  Raises MissionError, and TerrainError
-    where the mission leaves the tile.
+    and destination are the first and last of these positions; where they are not above ground they are lifted to 1 m,
+    because a scenario's ends must be, while the route (and its verdict) keeps the mission's heights.  Raises
+    MissionError, and TerrainError where the mission leaves the tile.
 
     >>> from flight.mission.items import Command, Frame, MissionItem
     >>> items = [
     ...     MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, lat, -84.2, 700.0)
     ...     for k, lat in enumerate((36.50, 36.51), 1)
     ... ]
-    >>> scenario = implied_scenario(Mission(None, tuple(items)), terrain_path=None)
+    >>> scenario = implied_scenario(Mission(None, tuple(items)), terrain_path=None).scenario
     >>> scenario.external, scenario.bounds.round().tolist()
     (True, [[-2000.0, 2000.0], [-2000.0, 3110.0]])
     """
     flight = flight or FlightTable()
-    stops = make_itinerary(mission, 0.0).stops
-    origin = mission_origin(mission, stops)
-    box, flown = _boxes(mission, stops, origin)
+    itinerary = make_itinerary(mission)
+    origin = mission_origin(mission, itinerary.stops)
+    box, flown = _boxes(mission, itinerary.stops, origin)
     terrain, table, box = _ground(terrain_path, origin, box, flown)
-    # The speed of a route does not matter for its ends.
-    speed = flight.airspeed_mps or 25.0
-    route = make_route(mission, origin, terrain, speed, flight.fly_over, vertical_legs=vertical_legs)
-    top = float(route.waypoints[:, 2].max())
+    placed = place_stops(mission, origin, terrain, itinerary=itinerary, vertical_legs=vertical_legs)
+    top = max(float(place.position[2]) for place in placed.stops)
     if terrain is not None:
         top = max(top, float(np.nanmax(terrain.heights)))
     spec = ScenarioFile(
@@ -66,11 +74,11 @@ def implied_scenario(
         origin=OriginTable(lat_deg=origin.lat_deg, lon_deg=origin.lon_deg),
         terrain=table,
         area=AreaTable(east_m=box[0].tolist(), north_m=box[1].tolist(), ceiling_amsl_m=min(top + AREA_BUFFER, HIGHEST)),
-        start=_end(route.waypoints[0], terrain),
-        destination=_end(route.waypoints[-1], terrain),
+        start=_end(placed.stops[0].position, terrain),
+        destination=_end(placed.stops[-1].position, terrain),
         flight=flight,
     )
-    return from_spec(spec, mission.source, ground=terrain, external=True)
+    return ImpliedScenario(from_spec(spec, mission.source, ground=terrain, external=True), placed)
 
 
 def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOrigin:
@@ -95,11 +103,8 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
 
 def _boxes(mission: Mission, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> tuple[Floats, Floats]:
     """Area, and smallest box of the positions flown to; both (2, 2) [[e0, e1], [n0, n1]] m."""
-    points = np.stack(to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops]))
-    if not (np.abs(points) <= MAP_EXTENT).all():
-        # The error that names the item.
-        make_route(mission, origin, None, 1.0, False)
-    flown = np.stack([points.min(axis=1), points.max(axis=1)], axis=1)
+    points = on_map(mission.source, stops, origin)
+    flown = np.stack([points.min(axis=0), points.max(axis=0)], axis=1)
     around = AREA_BUFFER + max(abs(stop.loiter.radius) if stop.loiter is not None else 0.0 for stop in stops)
     return np.clip(flown + np.array([-around, around]), -MAP_EXTENT, MAP_EXTENT), flown
 

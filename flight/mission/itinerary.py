@@ -70,7 +70,7 @@ class ItineraryStop:
     command: the item's MAV_CMD.
     alt: m in the item's frame, NaN to keep the last height.
     frame: the item's MAV_FRAME.
-    airspeed: m/s on the leg that ends here.
+    airspeed: m/s on the leg that ends here, NaN for the aircraft's own.
     acceptance: radius, m, 0 where none is stated.
     loiter: the circle flown about it, None for none.
     """
@@ -107,13 +107,13 @@ class Itinerary:
     landing: ItineraryStop | None = None
 
 
-def make_itinerary(mission: Mission, default_airspeed: float) -> Itinerary:
+def make_itinerary(mission: Mission) -> Itinerary:
     """Walk through the mission as an autopilot would.
 
-    default_airspeed: m/s until the mission's first DO_CHANGE_SPEED.  Raises MissionError for a mission without a
-    position, a jump to an item that is not there, and a mission that unrolls to more than `MOST_STOPS` places.
+    Raises MissionError for a mission without a position, a jump to an item that is not there, and a mission that
+    unrolls to more than `MOST_STOPS` places.
     """
-    walk = _Walk(mission, default_airspeed)
+    walk = _Walk(mission)
     reached = set()
     for item in _in_flying_order(mission, walk):
         reached.add(item.seq)
@@ -164,9 +164,9 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
 class _Walk:
     """Stops, speed and notes after the items so far."""
 
-    def __init__(self, mission: Mission, airspeed: float) -> None:
+    def __init__(self, mission: Mission) -> None:
         self.source = mission.source
-        self.default = self.airspeed = airspeed
+        self.airspeed = math.nan
         self.notes = Notes()
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
@@ -275,7 +275,7 @@ class _Walk:
             self.notes.add(f"DO_CHANGE_SPEED of type {kind:g}, neither airspeed nor ground speed: ignored", item.seq)
             return
         if speed == -2.0:
-            self.airspeed = self.default
+            self.airspeed = math.nan
         elif speed > 0.0:
             self.airspeed = speed
             if kind == 1.0:

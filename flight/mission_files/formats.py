@@ -9,9 +9,9 @@ from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
 from flight.mission_files.wpl import fence_text, parse_waypoints, rally_text, waypoints_text
 from world.errors import MissionError
 
-Kind = Literal["waypoints", "plan", "fence", "rally"]
+FileKind = Literal["waypoints", "plan", "fence", "rally"]
 
-KINDS: dict[str, Kind] = {
+KINDS: dict[str, FileKind] = {
     ".waypoints": "waypoints",
     ".plan": "plan",
     ".txt": "waypoints",
@@ -19,7 +19,7 @@ KINDS: dict[str, Kind] = {
     ".rally": "rally",
 }
 
-_WRITERS: dict[Kind, Callable[[Mission], str]] = {
+_WRITERS: dict[FileKind, Callable[[Mission], str]] = {
     "waypoints": waypoints_text,
     "plan": plan_file_text,
     "fence": fence_text,
@@ -28,7 +28,7 @@ _WRITERS: dict[Kind, Callable[[Mission], str]] = {
 _UTF16 = (b"\xff\xfe", b"\xfe\xff")
 
 
-def mission_kind(path: Path) -> Kind:
+def mission_kind(path: Path) -> FileKind:
     """Form that a file's suffix names.  Raises MissionError for any other suffix.
 
     >>> mission_kind(Path("survey.plan")), mission_kind(Path("survey.txt"))
@@ -70,7 +70,7 @@ def parse_mission(text: str, source: str) -> Mission:
     return parse_waypoints(text, source)
 
 
-def mission_text(mission: Mission, kind: Kind) -> str:
+def mission_text(mission: Mission, kind: FileKind) -> str:
     r"""Mission as the text of a file; the same mission always gives the same bytes.
 
     kind: "waypoints" (QGC WPL 110), "plan" (QGroundControl's JSON), or its "fence" or "rally" points alone, as WPL.

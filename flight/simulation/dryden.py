@@ -10,11 +10,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.dynamics.jsbsim_properties import FOOT
 from world.kernels import Record, compiled, record_dtype
 
 Floats = NDArray[np.float64]
 
-_FOOT = 0.3048
 # State of the five first-order filters of unit variance: one along the wind, two in a row across and down.
 GUST_FILTERS = record_dtype("along", "across_first", "across_second", "down_first", "down_second")
 
@@ -26,11 +26,11 @@ def dryden_scales(height: float) -> tuple[float, float, float]:  # pragma: no co
     MIL-F-8785C 3.7.3.4 with heights in feet: L_w = h, L_u = h / (0.177 + 0.000823 h)^1.2,
     sigma_u / sigma_w = 1 / (0.177 + 0.000823 h)^0.4, 10 ft <= h <= 1,000 ft.
     """
-    h = min(1000.0, max(10.0, height / _FOOT))
+    h = min(1000.0, max(10.0, height / FOOT))
     base = 0.177 + 0.000823 * h
     # One power for both: base^1.2 = base root, base^-0.4 = root^-2.
     root = base**0.2
-    return h / (base * root) * _FOOT, h * _FOOT, 1.0 / (root * root)
+    return h / (base * root) * FOOT, h * FOOT, 1.0 / (root * root)
 
 
 def start_gusts(noise: Floats, filters: Record) -> None:

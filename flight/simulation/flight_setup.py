@@ -1,17 +1,21 @@
 """Everything that decides a flight, fixed before it starts."""
 
+import copy
 import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aircraft.corridor import corridor_half_width
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
+from flight.ardupilot.parameters import ArduPilotParameters
 from flight.guidance.fly_by_path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
+from flight.simulation.autopilot_program import AutopilotProgram
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,9 +31,11 @@ class FlightSetup:
     battery: energy carried, Wh.
     seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
     plan: None for a mission that a person brought.
-    guidance: the law that steers.
+    guidance: the law that steers where ``parameters`` is None.
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
+    parameters: of the ArduPlane that flies; None where planfly's guidance does.
+    program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
     path: that is to be followed, of route and limits.
     """
 
@@ -45,6 +51,8 @@ class FlightSetup:
     guidance: Guidance = "path"
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
+    parameters: ArduPilotParameters | None = None
+    program: AutopilotProgram | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -57,6 +65,12 @@ class FlightSetup:
         return self.limits.envelope
 
     @property
+    def corridor(self) -> float:
+        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        radius = None if self.parameters is None else self.parameters.wp_radius
+        return corridor_half_width(self.scenario.limits.corridor_m, radius)
+
+    @property
     def airspeed(self) -> float:
         """Airspeed until the mission sets another, m/s."""
         return self.limits.airspeed
@@ -65,6 +79,12 @@ class FlightSetup:
     def max_bank(self) -> float:
         """Steepest bank in turns, rad."""
         return self.limits.max_bank
+
+    def in_scenario(self, scenario: Scenario) -> "FlightSetup":
+        """Set the same flight in another scenario; route, limits and path stay as they are."""
+        moved = copy.copy(self)
+        object.__setattr__(moved, "scenario", scenario)
+        return moved
 
 
 def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:

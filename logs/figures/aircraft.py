@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope, turn_radius
-from flight.dynamics.characteristics import AMSL, Mode, StepResponse, TrimRow
+from flight.dynamics.characteristics import TRIM_AMSL, Mode, StepResponse, TrimRow
 from logs.figures.elements import style
 
 Floats = NDArray[np.float64]
@@ -98,13 +98,13 @@ def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
 def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     speeds = np.linspace(aircraft.airspeed_min, aircraft.airspeed_max, 60)
     for k, wind in enumerate(_WINDS):
-        climb, dive = np.degrees([envelope.slope_limits(float(v), AMSL, wind) for v in speeds]).T
+        climb, dive = np.degrees([envelope.slope_limits(float(v), TRIM_AMSL, wind) for v in speeds]).T
         name = "calm" if wind == 0.0 else f"{abs(wind):.0f} m/s {'tail' if wind > 0.0 else 'head'}wind"
         look = {"color": _SHADES[k], "linestyle": _DASHES[k], "linewidth": 1.3}
         axes.plot(speeds, climb, label=name, **look)
         axes.plot(speeds, -dive, **look)
     axes.axhline(0.0, color="#555555", linewidth=0.8)
-    _frame(axes, f"steepest climb and dive over the ground, at {AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
+    _frame(axes, f"steepest climb and dive over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
     _headroom(axes)
     axes.legend(loc="upper right", ncols=2)
 
@@ -136,7 +136,7 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
         figure = style.new_figure(8.0)
         axes = figure.subplots(2, 2)
         figure.subplots_adjust(left=0.075, right=0.93, top=0.87, bottom=0.065, wspace=0.28, hspace=0.32)
-        _title(figure, f"{aircraft.title}: level flight and its modes", f"JSBSim trims at {AMSL:.0f} m AMSL, calm")
+        _title(figure, f"{aircraft.title}: level flight and its modes", f"JSBSim trims at {TRIM_AMSL:.0f} m AMSL, calm")
         speeds = np.array([row.trim.airspeed for row in trims])
         for k, name in enumerate(("alpha", "elevator", "aileron", "rudder")):
             values = np.degrees([getattr(row.trim, name) for row in trims])
@@ -211,10 +211,8 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
         figure = style.new_figure(1.3 + 1.7 * deep)
         axes = figure.subplots(deep, len(steps), squeeze=False, sharex="col")
         figure.subplots_adjust(left=0.05, right=0.985, top=0.865, bottom=0.065, wspace=0.24, hspace=0.28)
-        subtitle = (
-            f"from level flight at {aircraft.airspeed:g} m/s and {AMSL:.0f} m, one control moved at 1 s, no guidance"
-        )
-        _title(figure, f"{aircraft.title}: how it answers", subtitle)
+        level = f"level flight at {aircraft.airspeed:g} m/s and {TRIM_AMSL:.0f} m"
+        _title(figure, f"{aircraft.title}: how it answers", f"from {level}, one control moved at 1 s, no guidance")
         for column, step in enumerate(steps):
             for row in range(deep):
                 panel = axes[row, column]

@@ -5,13 +5,13 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from aircraft.envelope import GRAVITY
 from flight.simulation.control_limits import control_limits, held_at_limit
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
 from logs.figures.elements.panels import Panel, Series, doubles, draw_panels, time_axis
 
-_GRAVITY = 9.80665
 # Power is the battery's energy over this long, s: less would show its float32 steps.
 _POWER_WINDOW = 2.0
 
@@ -54,7 +54,7 @@ def draw_energy(setup: FlightSetup, track: Track) -> Figure:
     span = np.maximum(seconds - seconds[late], 1e-9)
     power = np.where(late < np.arange(len(track)), 3600.0 * (used - used[late]) / span, np.nan)
     height = track.position[:, 2]
-    kinetic = doubles(track.airspeed) ** 2 / (2.0 * _GRAVITY)
+    kinetic = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
     panels = [
         Panel("battery energy\nused (Wh)", [Series("used", used, filled=True)]),
         Panel("power\n(W)", [Series(f"mean of {_POWER_WINDOW:g} s", power)]),

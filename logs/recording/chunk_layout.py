@@ -24,7 +24,7 @@ _INDEX_OPCODE: Final = 7
 # A message index's frame, channel and length, and one of its entries.
 _INDEX_HEAD: Final = 15
 _INDEX_ENTRY: Final = 16
-_SECOND_NS: Final = 1_000_000_000
+SECOND_NS: Final = 1_000_000_000
 
 # A message on its way into a chunk: where it comes from (its first byte in the blob of messages, or `FROM_ROWS` for the
 # next state row), bytes, channel, log time (ns), and where it starts in its chunk.
@@ -115,9 +115,9 @@ def _stamped(log_times: Ints, channel: int, tag: int, bodies: Bytes) -> tuple[By
     for k in range(count):
         log_time = log_times[k]
         timestamp[0] = 0x08
-        size = _put_varint(timestamp, 1, log_time // _SECOND_NS)
+        size = _put_varint(timestamp, 1, log_time // SECOND_NS)
         timestamp[size] = 0x10
-        size = _put_varint(timestamp, size + 1, log_time % _SECOND_NS)
+        size = _put_varint(timestamp, size + 1, log_time % SECOND_NS)
         at = _put_head(out, at, 2 + size + body_size, channel, log_time)
         out[at], out[at + 1] = tag, size
         at += 2
@@ -171,9 +171,9 @@ def _order(
             entry.source, entry.length, entry.channel = other.source, other.length, other.channel
             entry.log_time = other.log_time
             j += 1
-        second = entry.log_time // _SECOND_NS
+        second = entry.log_time // SECOND_NS
         if k == 0 or (
-            k > firsts[chunks - 1] and (size + entry.length > limit or second != merged[k - 1].log_time // _SECOND_NS)
+            k > firsts[chunks - 1] and (size + entry.length > limit or second != merged[k - 1].log_time // SECOND_NS)
         ):
             firsts[chunks] = k
             chunks += 1

@@ -8,7 +8,7 @@ from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from numpy.typing import NDArray
 
 from logs.recording import foxglove_scene as scene
-from logs.recording.chunk_layout import MessageRecords, single_record, stamped_records
+from logs.recording.chunk_layout import SECOND_NS, MessageRecords, single_record, stamped_records
 from logs.recording.protobuf_arrays import (
     Encoded,
     as_bytes,
@@ -17,7 +17,7 @@ from logs.recording.protobuf_arrays import (
     submessage,
     tagged_doubles,
 )
-from logs.recording.state_channel import EPOCH_NS, SECOND_NS
+from logs.recording.state_channel import EPOCH_NS
 from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]

@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from aircraft.envelope import Envelope
+from flight.ardupilot.parameters import ArduPilotParameters, Origin, stored_parameters
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
-from world.errors import LogError
+from flight.simulation.autopilot_program import AutopilotProgram
+from world.errors import LogError, ParameterError
 from world.geometry import leg_runs
 
 Floats = NDArray[np.float64]
@@ -93,6 +95,25 @@ class EnvelopeFile(SetupModel):
     power_level_w: Table = []
     power_full_w: Table = []
     battery_v: Finite = 0.0
+
+
+class ParametersFile(SetupModel):
+    """ArduPlane's parameters as a table, in its units: each value, and who states it."""
+
+    values: dict[str, Finite]
+    origins: dict[str, Origin]
+    unused: list[str]
+    source: str
+
+
+class ProgramFile(SetupModel):
+    """An `AutopilotProgram` as a table."""
+
+    version: str
+    sha256: str
+    parameters: dict[str, Finite]
+    changed: dict[str, Finite]
+    unused: list[str]
 
 
 def _item_file(item: MissionItem) -> _Item:
@@ -240,3 +261,38 @@ def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
         power_full=power("power_full_w"),
         volts=file.battery_v,
     )
+
+
+def parameters_file(parameters: ArduPilotParameters) -> ParametersFile:
+    """Write ArduPlane's parameters as a table."""
+    return ParametersFile(
+        values={name: value for name, value, _ in parameters.values},
+        origins={name: origin for name, _, origin in parameters.values},
+        unused=list(parameters.unused),
+        source=parameters.source,
+    )
+
+
+def read_parameters(file: ParametersFile, source: str) -> ArduPilotParameters:
+    """Read the parameters of a table.  Raises LogError for a value that is not allowed."""
+    values = [(name, value, file.origins.get(name, "default")) for name, value in file.values.items()]
+    try:
+        return stored_parameters(values, tuple(file.unused), file.source)
+    except ParameterError as error:
+        raise LogError(f"{source}: parameters.values: {error}") from error
+
+
+def program_file(program: AutopilotProgram) -> ProgramFile:
+    """Write which autopilot flew as a table."""
+    return ProgramFile(
+        version=program.version,
+        sha256=program.sha256,
+        parameters=dict(program.parameters),
+        changed=dict(program.changed),
+        unused=list(program.unused),
+    )
+
+
+def read_program(file: ProgramFile) -> AutopilotProgram:
+    """Read which autopilot flew."""
+    return AutopilotProgram(file.version, file.sha256, file.parameters, file.changed, tuple(file.unused))

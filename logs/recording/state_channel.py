@@ -24,7 +24,6 @@ StateRecords = NDArray[np.void]
 
 # log_time of simulation time 0: 2000-01-01T00:00:00Z in ns since 1970.  Not 0, which MCAP reads as "no messages".
 EPOCH_NS = 946_684_800_000_000_000
-SECOND_NS = 1_000_000_000
 
 STATE_NAME = "planfly.State"
 LOG_NAME = "foxglove.Log"

@@ -4,10 +4,12 @@ import math
 
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
+from logs.verdict.levels import LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.places import FLIGHT, PLAN
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
+from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.px4_rule import mission_findings
@@ -17,6 +19,7 @@ from logs.verdict.rules.stall_rule import stall_findings
 from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
 from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
+from logs.verdict.rules.waypoint_rule import waypoint_findings
 from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 from planner.plan import Plan, Violation
@@ -30,6 +33,8 @@ def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
         *clearance_findings(demands, None, geometric=True),
         *threat_findings(demands, None, geometric=True),
         *bounds_findings(demands, None, geometric=True),
+        *waypoint_findings(demands, None, geometric=True),
+        *corridor_findings(demands, None, geometric=True),
         *speed_findings(demands, None, geometric=True),
         *stall_findings(demands, None, geometric=True),
         *takeoff_landing_findings(demands),
@@ -65,8 +70,9 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     )
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
-    lines = summary_lines(findings, flyable, setup, "geometric")
-    return Verdict(findings, flyable, complete, lines, "geometric", notes=setup.route.notes)
+    levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
 
 
 def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> Verdict:
@@ -85,8 +91,9 @@ def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> V
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )
     findings = (*with_suggestions(demands, None, geometric_findings(demands)), stopped)
-    lines = summary_lines(findings, False, setup, "geometric")
-    return Verdict(findings, False, False, lines, "geometric", notes=setup.route.notes)
+    levels = (LevelAnswer("geometry", False, headline(findings, False)),)
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes)
 
 
 def judge_plan_only(plan: Plan) -> Verdict:

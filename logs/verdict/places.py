@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 # "flight", "mission" and "plan" are the whole of it; "missile" and "radar" are a threat's two spheres.
-Kind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar"]
+PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar"]
 
 # What a change is of.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", a "turn" at
 # most.  By a step: "height" of a leg, "inset" of the path from the area's edges, "distance" from a missile,
@@ -30,7 +30,7 @@ class Place:
     Place(kind='waypoint', index=3, item=4, name='')
     """
 
-    kind: Kind
+    kind: PlaceKind
     index: int | None = None
     item: int | None = None
     name: str = ""
@@ -68,9 +68,14 @@ Suggestion = tuple[Change, ...]
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """A rule at a place that the geometric and the flown level judge differently; True: passes."""
+    """A rule at a place that another level and the verdict judge differently.
+
+    level: the other level, a name of `logs.verdict.levels.LevelName`.
+    there, here: whether it passes at that level, and in the verdict.
+    """
 
     rule: str
     place: Place
-    geometric: bool
-    flown: bool
+    level: str
+    there: bool
+    here: bool

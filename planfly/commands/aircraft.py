@@ -50,7 +50,7 @@ def aircraft(args: argparse.Namespace) -> int:
 
 
 def _print_and_draw(chosen: "Aircraft", identity: str, *, motor_braking: bool) -> dict[str, bytes]:
-    from flight.dynamics.characteristics import AMSL, modes_at, step_responses, trim_table
+    from flight.dynamics.characteristics import TRIM_AMSL, modes_at, step_responses, trim_table
     from flight.dynamics.envelope_tables import load_envelope
     from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
     from logs.figures.elements.style import png_bytes
@@ -64,8 +64,8 @@ def _print_and_draw(chosen: "Aircraft", identity: str, *, motor_braking: bool) -
     print(f"{chosen.name}: {chosen.title}")
     print(f"  model    {identity[:16]}")
     _print_limits(chosen, envelope)
-    _print_trims(trims, AMSL)
-    _print_modes(cruise, chosen.airspeed, AMSL)
+    _print_trims(trims, TRIM_AMSL)
+    _print_modes(cruise, chosen.airspeed, TRIM_AMSL)
     _print_envelope(chosen, envelope)
     _print_turns(chosen)
     with progress("drawing"):

@@ -41,10 +41,12 @@ def check(args: argparse.Namespace) -> int:
 
 def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
     """Read a log, over another terrain where one is named.  Raises ScenarioError for options that it cannot take."""
-    given = [name for name in ("aircraft", "airspeed", "wind", "turbulence") if getattr(args, name) is not None]
+    names = ("aircraft", "airspeed", "wind", "turbulence", "params", "guidance")
+    given = [name for name in names if getattr(args, name) is not None]
     if given:
         raise ScenarioError(
-            f"{source}: --{given[0]}: a log is judged with the aircraft, the speeds and the wind it was flown with"
+            f"{source}: --{given[0]}: a log is judged with the aircraft, the speeds, the wind and the autopilot it was"
+            " flown with"
         )
     if args.scenario:
         raise ScenarioError(
@@ -53,4 +55,4 @@ def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
     log = read_log(source)
     if not args.terrain:
         return log
-    return replace(log, setup=replace(log.setup, scenario=over_terrain(log.setup.scenario, args.terrain)))
+    return replace(log, setup=log.setup.in_scenario(over_terrain(log.setup.scenario, args.terrain)))

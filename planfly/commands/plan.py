@@ -12,6 +12,7 @@ from types import FrameType
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
+from planfly.terminal.scenario_options import scenario_change
 from planfly.terminal.targets import default_folder, named_or_default
 from planner.plan import Objective, Plan, plan_json, read_plan
 from planner.search.explain_failure import what_blocks
@@ -26,7 +27,7 @@ from world.scenario_variants import with_planner, with_threats
 
 def plan(args: argparse.Namespace) -> int:
     """Plan, and write the plan file; 4 where the plan is not safe."""
-    scenario, old = _prepare(args, load_scenario(args.scenario))
+    scenario, old = _prepare(args, scenario_change(args)(load_scenario(args.scenario)))
     seed = choose_seed(scenario, args.seed)
     default = default_folder(scenario.name, seed) / ("plan.json" if old is None else "replan.json")
     target = named_or_default(args.out, default, args.overwrite, Path(args.scenario))

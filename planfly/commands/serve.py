@@ -14,6 +14,7 @@ from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 from planfly.commands.served_flights import ServeOptions, fly_process, open_served
 from planfly.terminal.link_options import link_access, stop_signals
+from planfly.terminal.scenario_options import flight_entries
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.scenario import Scenario
@@ -22,7 +23,8 @@ from world.scenario import Scenario
 def serve(args: argparse.Namespace) -> int:
     """``planfly serve``."""
     access = link_access(args)
-    options = ServeOptions(args.mission or "", args.scenario, args.terrain, args.speed, Path(args.log))
+    mission, logs = args.mission or "", Path(args.log)
+    options = ServeOptions(mission, args.scenario, args.terrain, args.speed, logs, flight_entries(args))
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():
         raise PlanflyError(f"--log {options.logs}: is a file; a folder is expected")

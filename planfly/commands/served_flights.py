@@ -3,7 +3,7 @@
 import contextlib
 import math
 import signal
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from flight.live.flight_process import (
     FlightJudged,
     JudgeMission,
     MissionJudged,
+    PreparedFlight,
     ProcessReady,
     send_event,
     serve_flights,
@@ -33,6 +34,7 @@ from planfly.pipeline import make_setup
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.scenario import Scenario, load_scenario
+from world.scenario_variants import with_flight
 
 DEFAULT_SCENARIO = "jacksboro"
 # Most texts about one verdict; the log has the rest.
@@ -45,6 +47,7 @@ class ServeOptions:
 
     mission: a file's path, "" for none.
     scenario, terrain: None where not named.
+    flight: entries of the scenario's [flight] that take the place of its own; None for those it keeps.
     speed: times real time.
     logs: the folder of the flight logs.
     """
@@ -54,6 +57,7 @@ class ServeOptions:
     terrain: str | None
     speed: float
     logs: Path
+    flight: dict[str, str | float | None] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +72,14 @@ class ServedScenario:
 
 def open_served(options: ServeOptions) -> ServedScenario:
     """Load what is served.  Raises PlanflyError."""
+
+    def change(scenario: Scenario) -> Scenario:
+        return with_flight(scenario, **options.flight)
+
     if options.mission:
-        opened = open_mission(Path(options.mission), options.scenario, options.terrain)
+        opened = open_mission(Path(options.mission), options.scenario, options.terrain, change=change)
         return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
-    scenario = load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain)
+    scenario = change(load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain))
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
 
 
@@ -111,7 +119,7 @@ class ServedFlights:
             rows, _ = Flight(setup, self.aircraft).block(30)
             judge_flight(setup, as_track(rows), "warm")
 
-    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
+    def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
         """Judge a mission on its geometry, and see that it can be started."""
         served = self._served
         try:
@@ -129,7 +137,8 @@ class ServedFlights:
             home = Home(start.lat_deg, start.lon_deg, start.amsl - (0.0 if math.isnan(start.height) else start.height))
         items = tuple(int(item) for item in setup.route.items)
         texts = mission_texts(setup, verdict)
-        return setup, MissionJudged(order.number, True, verdict.flyable, texts, home, items, start)
+        judged = MissionJudged(order.number, True, verdict.flyable, texts, home, items, start)
+        return PreparedFlight(setup, flight.map), judged
 
     def open_log(self, setup: FlightSetup) -> "ServedLog":
         """Open the next free ``flight-NNN.mcap``."""

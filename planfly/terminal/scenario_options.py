@@ -1,25 +1,36 @@
-"""Options that make another scenario of the one given: aircraft, airspeed, who steers, and the wind."""
+"""Options that make another scenario of the one given: aircraft, airspeed, who flies, and the wind."""
 
 import argparse
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 from world.scenario import Scenario
 from world.scenario_variants import with_flight, with_wind
 
 
+def flight_entries(args: argparse.Namespace) -> dict[str, str | float | None]:
+    """Entries of a scenario's [flight] that the options state; None for those that were not given."""
+    params = getattr(args, "params", None)
+    return {
+        "aircraft": getattr(args, "aircraft", None),
+        "airspeed_mps": getattr(args, "airspeed", None),
+        # A real one is an ArduPlane.
+        "autopilot": None if getattr(args, "autopilot", None) is None else "ardupilot",
+        "guidance": getattr(args, "guidance", None),
+        "nav": getattr(args, "nav", None),
+        # Whatever folder the scenario is in.
+        "params": None if params is None else str(Path(params).resolve()),
+    }
+
+
 def scenario_change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
-    """What the options given change in a scenario; a command without wind or guidance options changes none of these."""
+    """What the options given change in a scenario; options that a command does not have change nothing."""
 
     def change(scenario: Scenario) -> Scenario:
-        given = {
-            "aircraft": args.aircraft,
-            "airspeed_mps": args.airspeed,
-            "guidance": getattr(args, "guidance", None),
-            "nav": getattr(args, "nav", None),
-        }
         speed, from_deg = getattr(args, "wind", None) or (None, None)
         from_course = None if from_deg is None else math.radians(from_deg)
-        return with_wind(with_flight(scenario, **given), speed, from_course, getattr(args, "turbulence", None))
+        flown = with_flight(scenario, **flight_entries(args))
+        return with_wind(flown, speed, from_course, getattr(args, "turbulence", None))
 
     return change

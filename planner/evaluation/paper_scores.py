@@ -31,13 +31,11 @@ from planner.evaluation.problem_arrays import (
     OBJECTIVES,
     VIOLATIONS,
     ProblemArrays,
-    Record,
-    Records,
     as_columns,
 )
 from planner.evaluation.threat_grid import Short, ThreatCells
 from world.geometry import CLOSEST
-from world.kernels import compiled, compiled_views
+from world.kernels import Record, Records, compiled, compiled_views
 from world.terrain import EDGE
 
 Floats = NDArray[np.float64]

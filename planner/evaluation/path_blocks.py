@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.problem_arrays import Record
 from world.frames import PolyMapRecord
-from world.kernels import compiled_views
+from world.kernels import Record, compiled_views
 
 Floats = NDArray[np.float64]
 

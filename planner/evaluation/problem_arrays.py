@@ -1,6 +1,6 @@
 """What compiled code evaluates paths with: a scenario and its limits as numbers and arrays."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,13 +10,11 @@ from planner.evaluation.missile_index import MissileIndex
 from planner.evaluation.threat_grid import ThreatCells
 from planner.plan import Objective, Violation
 from world.frames import PolyMapRecord
+from world.kernels import Record, Records
 from world.threats import Threats
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
-# A numpy array whose rows have named fields, and one of its rows; which fields, a dtype says.
-Records = NDArray[Any]
-Record = Any
 
 # One unit of the scenario: its position (m), and radius and scale (m) of its missile and its radar.
 THREAT = np.dtype(
@@ -73,6 +71,7 @@ class ProblemArrays(NamedTuple):
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by where they stand.
     slope_bounds: of the ground.
+    tracking: a record of `aircraft.tracking.TRACKING`: how far the autopilot strays from its legs.
     """
 
     heights: Heights
@@ -105,6 +104,7 @@ class ProblemArrays(NamedTuple):
     threat_cells: ThreatCells
     missiles: MissileIndex
     slope_bounds: SlopeBounds
+    tracking: Record
 
 
 def threat_records(threats: Threats) -> Records:

@@ -1,16 +1,15 @@
 """Which threats may reach a place: lists by the cells of a grid, so that an evaluation asks only those nearby."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import compiled
+from world.kernels import Records, compiled
 
 Floats = NDArray[np.float64]
 Short = NDArray[np.int32]
-Records = NDArray[Any]
 
 # Side of a cell, as a share of the median radius; and cells of one grid, at most.
 CELL_SIDE = 0.2

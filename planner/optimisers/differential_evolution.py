@@ -4,17 +4,15 @@ Storn and Price, "Differential Evolution", Journal of Global Optimization 11, 19
 ranking, and nothing of what they stand for.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
-from planner.optimisers.umda import Floats, Ints
+from planner.optimisers.box_search import BoxSearch, Floats, Ints
 
 # Weight of a difference and rate of crossover: the middle of what Storn and Price advise.
 WEIGHT, CROSSOVER = 0.5, 0.9
 
 
-class DifferentialEvolution:
+class DifferentialEvolution(BoxSearch):
     """Each row is challenged by a mix of others and gives way to one that ranks no worse, in ask and tell.
 
     >>> def rank(scores):
@@ -26,39 +24,12 @@ class DifferentialEvolution:
     >>> bool(search.scores.min() < 1e-3)
     True
 
-    lower, upper: (d,) box.
-    rank: (n, c) scores -> (n,) ranks, smaller is better.
-    population: even number of rows.
-    initial: (population, d) first samples; None for uniform.
-
-    Half the rows are challenged at a time, so that a generation costs what it costs the estimation of distribution
-    algorithms.  samples and scores are the population, (n, d) and (n, c); without rows before the first `tell`.
+    The arguments are those of `BoxSearch`.  Half the rows are challenged at a time, so that a generation costs what it
+    costs the estimation of distribution algorithms.  samples and scores are the population, (n, d) and (n, c); without
+    rows before the first `tell`.
     """
 
-    def __init__(
-        self,
-        lower: Floats,
-        upper: Floats,
-        rank: Callable[[Floats], Ints],
-        population: int,
-        rng: np.random.Generator,
-        *,
-        initial: Floats | None = None,
-    ) -> None:
-        self.lower, self.upper = lower, upper
-        self._rank = rank
-        self._rng = rng
-        self._half = population // 2
-        self._turn = 0
-        if initial is None:
-            initial = rng.uniform(lower, upper, (population, lower.size))
-        self._asked = np.clip(initial, lower, upper)
-        self.samples: Floats = np.empty((0, lower.size))
-        self.scores: Floats = np.empty((0, 0))
-
-    def ask(self) -> Floats:
-        """Rows (n, d) inside the box that want scores: the whole population first, then challengers of half of it."""
-        return self._asked
+    _turn = 0
 
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of what was asked, let the better of each pair live, and mix the next challengers."""

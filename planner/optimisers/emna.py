@@ -7,8 +7,9 @@ knows a box, samples and a ranking, and nothing of what they stand for.
 
 import numpy as np
 
+from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance, times_lower
-from planner.optimisers.umda import Floats, Umda
+from planner.optimisers.umda import Umda
 
 # Added to each variance, as a share of their mean: fewer rows than variables make a covariance singular.
 COVARIANCE_RIDGE = 1e-9

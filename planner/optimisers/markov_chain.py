@@ -7,8 +7,9 @@ box, groups of columns, samples and a ranking, and nothing of what they stand fo
 
 import numpy as np
 
+from planner.optimisers.box_search import Floats
 from planner.optimisers.linear_algebra import cholesky, covariance
-from planner.optimisers.umda import Floats, Umda
+from planner.optimisers.umda import Umda
 from world.kernels import compiled
 
 # Added to each variance of a group, as a share of their mean.

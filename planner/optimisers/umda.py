@@ -8,18 +8,15 @@ they stand for.
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
+from planner.optimisers.box_search import BoxSearch, Floats, Ints
 from planner.optimisers.linear_algebra import times_sparse
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Draws of a sample that falls outside the box before it is clipped to it.
 REDRAWS = 10
 
 
-class Umda:
+class Umda(BoxSearch):
     """Keeps the better half of a population, and samples the other half from its marginals, in ask and tell.
 
     >>> def rank(scores):
@@ -31,10 +28,8 @@ class Umda:
     >>> bool(search.scores.min() < 1e-6)
     True
 
-    lower, upper: (d,) box.
-    rank: (n, c) scores -> (n,) ranks, smaller is better.
-    population: even number of rows.
-    initial: (population, d) first samples; None for uniform.
+    The other arguments are those of `BoxSearch`.
+
     basis: (d, d) orthogonal matrix whose columns are the directions in which the marginals are independent; None for
     the variables themselves.
     floor: (d,) smallest standard deviation along each direction, or None.
@@ -54,21 +49,9 @@ class Umda:
         basis: Floats | None = None,
         floor: Floats | None = None,
     ) -> None:
-        self.lower, self.upper = lower, upper
-        self._rank = rank
-        self._half = population // 2
-        self._rng = rng
+        super().__init__(lower, upper, rank, population, rng, initial=initial)
         self._basis = basis
         self._floor = floor
-        if initial is None:
-            initial = rng.uniform(lower, upper, (population, lower.size))
-        self._asked = np.clip(initial, lower, upper)
-        self.samples: Floats = np.empty((0, lower.size))
-        self.scores: Floats = np.empty((0, 0))
-
-    def ask(self) -> Floats:
-        """Rows (n, d) inside the box that want scores: the whole population first, then half of it."""
-        return self._asked
 
     def tell(self, scores: Floats) -> None:
         """Take the scores (n, c) of what was asked; keep the better half and sample the next rows."""

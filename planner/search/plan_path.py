@@ -1,6 +1,7 @@
 """An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import find_algorithm
+from planner.search.algorithms import Algorithm, find_algorithm
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
@@ -93,7 +94,7 @@ def plan_path(
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
-    problem = make_problem(scenario, limits)
+    problem = make_problem(scenario, limits_for(chosen, limits))
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     # No path is further from a missile's sphere than its own ends are.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
@@ -113,6 +114,11 @@ def plan_path(
         history=np.array(search.history).reshape(-1, 3),
         ended=search.ended,
     )
+
+
+def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
+    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
+    return limits if algorithm.graded else replace(limits, tracking=None)
 
 
 def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:

@@ -5,7 +5,6 @@ a route within the bound is found it is the cheapest of all.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +14,10 @@ from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.seeding.grid_prices import Grid, find_obstacles, position_of, set_prices
-from world.kernels import compiled
+from world.kernels import Records, compiled
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
-Records = NDArray[Any]
 
 # Steps across a grid's cell that one stage forward may make.
 SIDEWAYS = 3

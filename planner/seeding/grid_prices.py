@@ -1,7 +1,7 @@
 """What a m of way costs in the cells of a grid: near the ground, and inside kill spheres."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +10,10 @@ from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.problem_arrays import ProblemArrays
 from world.frames import polymap
-from world.kernels import compiled
+from world.kernels import Records, compiled
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
-Records = NDArray[Any]
 
 # Cost of a m inside a kill sphere, in m of path.
 KILL_COST = 40.0

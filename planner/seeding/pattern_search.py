@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from planner.evaluation.encoding import Encoding, RotatedFrame, rotated_frame
 from planner.evaluation.graded_scores import PathScratch, make_scratch, score_path
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
-from planner.evaluation.problem_arrays import OBJECTIVES, VIOLATIONS, ProblemArrays, Record, Records
-from world.kernels import compiled
+from planner.evaluation.problem_arrays import OBJECTIVES, VIOLATIONS, ProblemArrays
+from world.kernels import Record, Records, compiled
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -17,8 +17,9 @@ import numpy as np
 
 from flight.dynamics.fdm import Fdm
 from flight.mission.from_plan import plan_mission
+from flight.simulation.airborne import FDM_HZ
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import FDM_HZ, simulate
+from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
@@ -126,8 +127,8 @@ def in_child(*argv: str, rounds: int = 2) -> float:
 
 def long_flight(folder: Path) -> tuple[Path, float]:
     """Fly five laps above the demo's ridges, in wind and turbulence: the log, and the hours in it."""
-    corners = [(36.56, -84.28), (36.56, -84.22), (36.60, -84.22), (36.60, -84.28)] * 5
-    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.58\t-84.25\t1150\t1"]
+    corners = [(36.273, -84.28), (36.273, -84.22), (36.313, -84.22), (36.313, -84.28)] * 5
+    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.293\t-84.25\t1150\t1"]
     lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(corners, 1)]
     mission, log = folder / "laps.waypoints", folder / "laps.mcap"
     mission.write_text("\n".join(lines) + "\n", encoding="utf-8")

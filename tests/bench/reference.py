@@ -12,10 +12,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from planner.evaluation.problem_arrays import ProblemArrays, Records
+from planner.evaluation.problem_arrays import ProblemArrays
 from planner.optimisers.preference import Level
 from world.frames import PolyMapRecord
 from world.geometry import CLOSEST
+from world.kernels import Records
 from world.terrain import EDGE
 
 Floats = NDArray[np.float64]

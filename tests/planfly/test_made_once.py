@@ -7,13 +7,29 @@ import sys
 from collections import Counter
 from collections.abc import Callable
 from importlib import import_module
+from multiprocessing import Pipe
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
+import numpy as np
 import pytest
 
+from flight.live.flight_process import (
+    EndFlight,
+    FlightJudged,
+    JudgeMission,
+    StartFlight,
+    read_event,
+    serve_flights,
+)
 from planfly.cli import main
 from planfly.commands.registry import COMMAND_NAMES, find_command
+from planfly.commands.served_flights import ServedFlights, ServeOptions
+from tests.planfly.conftest import FIELD
+from tests.setups import waypoint_mission
+from tests.world.elevation_files import from_origin, write_raster
+from world.scenario import load_scenario
 
 STAGES = (
     "planfly.airframe:load_airframe",
@@ -21,7 +37,9 @@ STAGES = (
     "flight.simulation.flight_setup:make_limits",
     "planner.search.plan_path:plan_path",
     "flight.mission.from_plan:plan_mission",
-    "flight.mission.routing:make_route",
+    "flight.mission.itinerary:make_itinerary",
+    "flight.mission.placing:place_stops",
+    "flight.mission.routing:lay_route",
     "planfly.pipeline:make_setup",
     "flight.guidance.fly_by_path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
@@ -33,7 +51,8 @@ STAGES = (
 )
 OURS = ("planfly", "logs", "flight", "planner", "world", "aircraft")
 ONCE = dict.fromkeys(("load_airframe", "load_envelope", "make_limits"), 1)
-OPENED = dict.fromkeys(("plan_mission", "make_route", "make_setup", "fly_by_path"), 1)
+ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "lay_route", "make_setup", "fly_by_path"), 1)
+OPENED = ROUTED | {"plan_mission": 1}
 ALIGNED = dict.fromkeys(("route_demands", "lay_track"), 1)
 FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "simulate", "judge_flight"), 1)
 LOG = ALIGNED | dict.fromkeys(("make_limits", "fly_by_path"), 1)
@@ -51,8 +70,8 @@ def counted(function: Callable[..., Any], entered: Counter[str]) -> Callable[...
 
 
 @pytest.fixture
-def count(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Count:
-    """Give a command; get the stages that it entered, and how often each."""
+def entered(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
+    """Stages entered since the test began, and how often each."""
     # What a command imports by itself would keep the counting function after the test.
     for name in COMMAND_NAMES:
         find_command(name)
@@ -70,6 +89,12 @@ def count(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Count:
         for module in [module for key, module in sys.modules.items() if key.partition(".")[0] in OURS]:
             if vars(module).get(name) is function:
                 monkeypatch.setattr(module, name, counting)
+    return entered
+
+
+@pytest.fixture
+def count(entered: Counter[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Count:
+    """Give a command; get the stages that it entered, and how often each."""
     monkeypatch.chdir(tmp_path)
 
     def carry_out(*argv: str, code: int) -> dict[str, int]:
@@ -112,9 +137,35 @@ def test_a_replay_aligns_its_track_once(count: Count, flight: Path) -> None:
 
 def test_a_mission_that_a_person_brought_is_flown_or_judged_along_one_path(count: Count) -> None:
     flown = count("fly", str(MISSION), "--terrain", "jacksboro", code=0)
-    # The scenario that is made around it needs the route's ends and heights before there are any limits.
-    assert flown.pop("make_route") == 2
-    assert flown == {key: n for key, n in (ONCE | FLIGHT).items() if key not in ("plan_mission", "make_route")}
-    judged = count("check", str(MISSION), "--terrain", "jacksboro", code=0)
-    assert {key: n for key, n in judged.items() if n != 1} == {"make_route": 2}
-    assert judged["fly_by_path"] == judged["route_demands"] == 1
+    assert flown == {key: n for key, n in (ONCE | FLIGHT).items() if key != "plan_mission"}
+    judged = ONCE | ROUTED | {"judge_geometry": 1, "route_demands": 1}
+    assert count("check", str(MISSION), "--terrain", "jacksboro", code=0) == judged
+    assert count("check", str(MISSION), "--scenario", "jacksboro", code=4) == judged
+
+
+def test_a_log_judged_over_another_terrain_keeps_its_path(count: Count, flight: Path, tmp_path: Path) -> None:
+    level = np.full((100, 100), 5.0, dtype=np.float32)
+    ground = write_raster(tmp_path / "level.tif", level, "EPSG:4326", from_origin(7.98, 46.02, 8e-4, 4e-4))
+    elsewhere = count("check", str(flight / "flight.mcap"), "--terrain", str(ground), code=4)
+    assert elsewhere == LOG | {"judge_flight": 1}
+
+
+def test_a_served_mission_is_prepared_once_and_flown_from_that(entered: Counter[str], tmp_path: Path) -> None:
+    (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
+    field = str(tmp_path / "field.toml")
+    flights = ServedFlights(ServeOptions("", field, None, 100.0, tmp_path / "logs"))
+    assert dict(entered) == ONCE
+    entered.clear()
+    points = np.array([[0.0, 0.0, 150.0], [500.0, 0.0, 150.0]])
+    level = waypoint_mission(points, np.array([25.0]), load_scenario(field).origin)
+    link_end, flying_end = Pipe()
+    process = Thread(target=serve_flights, args=(flying_end, flights))
+    process.start()
+    for order in (JudgeMission(level, 1), StartFlight()):
+        link_end.send(order)
+    while not isinstance(read_event(link_end.recv_bytes()), FlightJudged):
+        pass
+    link_end.send(EndFlight(quit=True))
+    process.join(20.0)
+    judged = dict.fromkeys(("judge_geometry", "judge_flight", "lay_track"), 1)
+    assert dict(entered) == ROUTED | judged | {"around": 1, "route_demands": 2}

@@ -89,11 +89,11 @@ def test_any_reference_system(crs: str, tmp_path: Path) -> None:
 def _jacksboro() -> tuple[Floats, Floats, Floats]:
     """Heights, and the latitudes and longitudes of their pixel centres, read without our code.
 
-    The file's ymin and ymax are the edges of 344 rows of 3 arc seconds, in the wrong order.
+    The tile's 344 rows of 3 arc seconds begin at the north edge that the file states as its ymax.
     """
     with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as data:
         heights = data["elevation"].astype(np.float64)
-        north, west = float(max(data["ymin"], data["ymax"])), float(min(data["xmin"], data["xmax"]))
+        north, west = float(data["ymax"]), float(data["xmin"])
         pitch = float(data["dx"])
     rows, cols = heights.shape
     return heights, north - (np.arange(rows) + 0.5) * pitch, west + (np.arange(cols) + 0.5) * pitch
@@ -116,6 +116,44 @@ def test_jacksboro_at_its_pixel_centres() -> None:
     at_lat, at_lon = to_geo(origin, random_e, random_n)
     wanted = reference(np.column_stack([at_lat, at_lon]))
     assert terrain.height(random_e, random_n) == pytest.approx(wanted, abs=0.1)
+
+
+# Places of the ground, as maps have them, deg: https://en.wikipedia.org/wiki/Cross_Mountain_(Tennessee), 1,077 m, the
+# highest of the range, and https://en.wikipedia.org/wiki/Norris_Dam.
+CROSS_MOUNTAIN = 36.1983, -84.2308
+NORRIS_DAM = 36.2242, -84.0917
+
+
+def _tile_pixel(lat: float, lon: float) -> tuple[float, float]:
+    """Row and column of the tile, as our reading places it."""
+    col, row = open_raster("jacksboro").to_source(np.array(lon), np.array(lat))
+    return float(row), float(col)
+
+
+def test_cross_mountain_is_the_highest_pixel() -> None:
+    heights, lat, lon = _jacksboro()
+    row, col = np.unravel_index(np.argmax(heights), heights.shape)
+    assert heights[row, col] == pytest.approx(1077.0, abs=2.0)
+    assert _tile_pixel(*CROSS_MOUNTAIN) == pytest.approx((row, col), abs=1.0)
+    assert (lat[row], lon[col]) == pytest.approx(CROSS_MOUNTAIN, abs=1.0 / 1200.0)
+
+
+def test_norris_dam_stands_where_the_lake_ends() -> None:
+    heights, _, _ = _jacksboro()
+    row, col = _tile_pixel(*NORRIS_DAM)
+    # North of the dam the lake's level, 305 m; south of it the river, 40 m lower.  The dam is the row between.
+    at = round(col)
+    lake = np.flatnonzero(np.abs(heights[:, at] - 305.0) < 0.5)
+    last = int(lake[np.abs(lake - row) < 10].max())
+    assert heights[last + 2, at] < 270.0
+    assert row == pytest.approx(last + 1, abs=1.0)
+
+
+def test_a_copy_of_the_tile_lies_where_the_tile_does(tmp_path: Path) -> None:
+    copy = tmp_path / "copy.npz"
+    copy.write_bytes(Path(str(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False))).read_bytes())
+    assert open_raster(str(copy)).centre == open_raster("jacksboro").centre
+    assert open_raster("jacksboro").centre.lat_deg == pytest.approx((36.15958 + 36.44625) / 2, abs=1e-5)
 
 
 def test_jacksboro_lies_the_right_way_round() -> None:

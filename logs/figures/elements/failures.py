@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.places import Kind
+from logs.verdict.places import PlaceKind
 from world.geometry import leg_runs
 
 Floats = NDArray[np.float64]
@@ -33,7 +33,7 @@ def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
     )
 
 
-def _rules_at(failed: list[Finding], kind: Kind, count: int) -> dict[int, tuple[str, ...]]:
+def _rules_at(failed: list[Finding], kind: PlaceKind, count: int) -> dict[int, tuple[str, ...]]:
     """Rules that failed at the first so many places of a kind, by the place's number."""
     found: dict[int, list[str]] = {}
     for finding in failed:

@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
+from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST
+from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MOST_PLAUSIBLE
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
-Rows = NDArray[np.int64]
+RowNumbers = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
 # Largest table of the assignment of rows to waypoints, cells; the track is thinned to stay within it.
@@ -44,7 +45,7 @@ class AlignedTrack:
     track: Track
     bad_rows: int
     first_bad: float
-    rows: Rows
+    rows: RowNumbers
     distance: Floats
     passed: NDArray[np.bool_]
     course: Floats
@@ -89,7 +90,9 @@ def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     apexes = demands.apexes()
     rows, distance = _assign(clean, apexes)
     last = len(clean) - 1
-    passed = (rows < last) | (distance <= demands.fly_by_offset + ARRIVED)
+    off = np.hypot(*(clean.position[rows, :2] - apexes[:, :2]).T)
+    arrived = [max(float(offset) + ARRIVED, reach(demands, i).radius) for i, offset in enumerate(demands.fly_by_offset)]
+    passed = (rows < last) | (off <= arrived)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
@@ -140,9 +143,9 @@ def _usable(track: Track) -> NDArray[np.bool_]:
     for name, largest in (
         ("position", FARTHEST),
         ("velocity", FASTEST),
-        ("attitude", 1e3),
-        ("controls", 1e3),
-        ("wind", 1e3),
+        ("attitude", MOST_PLAUSIBLE),
+        ("controls", MOST_PLAUSIBLE),
+        ("wind", MOST_PLAUSIBLE),
     ):
         # A NaN is not within any bound.
         good &= (np.abs(getattr(track, name)) <= largest).all(axis=1)
@@ -151,7 +154,7 @@ def _usable(track: Track) -> NDArray[np.bool_]:
     return np.asarray(good & (time > before))
 
 
-def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
+def _assign(track: Track, apexes: Floats) -> tuple[RowNumbers, Floats]:
     """Row of each waypoint's passage: the assignment in time order with the least sum of squared distances."""
     position, count, last = track.position, len(apexes), len(track) - 1
     tick = max(1e-6, float(track.time[-1] - track.time[0]) / last)
@@ -183,7 +186,7 @@ def _assign(track: Track, apexes: Floats) -> tuple[Rows, Floats]:
 @compiled
 def _align(
     position: Floats, marks: Floats, step: int, capture: float
-) -> tuple[Rows, NDArray[np.bool_]]:  # pragma: no cover - compiled
+) -> tuple[RowNumbers, NDArray[np.bool_]]:  # pragma: no cover - compiled
     """Find the chord (of ``step`` rows) of each mark, in time order, with the least sum of min(distance, capture)^2.
 
     By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures.

@@ -20,7 +20,14 @@ from flight.simulation.simulate import simulate
 from tests.setups import MakeSetup
 from world.kernels import Record
 
-A, B = np.array([(0.0, 0.0, 0.0, False, 0.0, 25.0), (0.0, 1000.0, math.pi / 4, False, 0.0, 25.0)], WAYPOINT)
+A, B = np.array(
+    [
+        (0.0, 0.0, 0.0, False, 0.0, 25.0, 500.0, 0.0, 0.0, 0.0),
+        (0.0, 1000.0, math.pi / 4, False, 0.0, 25.0, 500.0, 0.0, 0.0, 0.0),
+    ],
+    WAYPOINT,
+)
+LEG = (A.east, A.north, B.east, B.north)
 
 
 def _at(east: float, north: float, course: float = 0.0) -> Record:
@@ -32,18 +39,18 @@ def test_l1_is_the_second_order_law_it_claims() -> None:
     # Near its line the law is cross" = -(2 pi / period)^2 cross - 2 damping (2 pi / period) cross'... of the paper.
     length = l1_length(25.0, 17.0, 0.75)
     assert length == pytest.approx(17.0 * 0.75 * 25.0 / math.pi)
-    angle, aim = l1_angles(_at(1.0, 500.0), A, B, length)
+    angle, aim = l1_angles(_at(1.0, 500.0), *LEG, length)
     pull = l1_acceleration(angle + aim, 25.0, length, 0.75)
     assert pull == pytest.approx(-((2.0 * math.pi / 17.0) ** 2), rel=1e-3)
-    angle, aim = l1_angles(_at(0.0, 500.0, 0.01), A, B, length)
+    angle, aim = l1_angles(_at(0.0, 500.0, 0.01), *LEG, length)
     damping = l1_acceleration(angle + aim, 25.0, length, 0.75)
     assert damping == pytest.approx(-2.0 * 0.75 * (2.0 * math.pi / 17.0) * 25.0 * 0.01, rel=1e-3)
 
 
 def test_l1_far_away_and_at_its_corners() -> None:
-    assert l1_angles(_at(900.0, 500.0), A, B, 100.0)[1] == pytest.approx(math.pi / 4)
-    assert math.isnan(l1_angles(_at(0.0, -500.0), A, B, 100.0)[1])
-    assert math.isnan(l1_angles(_at(0.0, 1100.0), A, B, 100.0)[1])
+    assert l1_angles(_at(900.0, 500.0), *LEG, 100.0)[1] == pytest.approx(math.pi / 4)
+    assert math.isnan(l1_angles(_at(0.0, -500.0), *LEG, 100.0)[1])
+    assert math.isnan(l1_angles(_at(0.0, 1100.0), *LEG, 100.0)[1])
     # Half of a right angle turns at half the distance; a waypoint flown over at its own.
     assert l1_reached(_at(0.0, 956.0), A, B, 200.0, 90.0)
     assert not l1_reached(_at(0.0, 954.0), A, B, 200.0, 90.0)

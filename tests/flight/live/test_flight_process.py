@@ -14,6 +14,7 @@ from flight.live.flight_process import (
     FlightJudged,
     JudgeMission,
     MissionJudged,
+    PreparedFlight,
     StartFlight,
     read_event,
     serve_flights,
@@ -21,6 +22,7 @@ from flight.live.flight_process import (
 from flight.live.snapshot import Snapshot
 from flight.mission.items import Mission
 from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.local_map import LocalMap
 from flight.simulation.track import Track
 from tests.mission_lines import setup_of, wp
 
@@ -57,8 +59,8 @@ class OneSetup:
     def __post_init__(self) -> None:
         self.aircraft = load_aircraft("aerosonde")
 
-    def prepare(self, order: JudgeMission) -> tuple[FlightSetup | None, MissionJudged]:
-        return self.setup, MissionJudged(order.number, True, True, ())
+    def prepare(self, order: JudgeMission) -> tuple[PreparedFlight | None, MissionJudged]:
+        return PreparedFlight(self.setup, LocalMap.around(self.setup)), MissionJudged(order.number, True, True, ())
 
     def open_log(self, setup: FlightSetup) -> MemoryLog:
         return self.log

@@ -44,7 +44,7 @@ def test_samples_fly_over_the_tile(name: str) -> None:
     """Each sample's legs, and that an Aerosonde can fly them: what the flight tests build on."""
     legs, items = LEGS[name]
     read = read_mission(SAMPLES / name)
-    scenario = implied_scenario(read, "jacksboro")
+    scenario = implied_scenario(read, "jacksboro").scenario
     flown = make_route(read, scenario.origin, scenario.terrain, 25.0, False)
     assert flown.legs == legs
     assert [item for item, _ in groupby(flown.items.tolist())] == items
@@ -62,7 +62,7 @@ def test_samples_fly_over_the_tile(name: str) -> None:
 @pytest.mark.parametrize("name", sorted(set(LEGS) - ON_TERRAIN))
 def test_samples_have_a_scenario_without_terrain(name: str) -> None:
     read = read_mission(SAMPLES / name)
-    scenario = implied_scenario(read, None)
+    scenario = implied_scenario(read, None).scenario
     assert scenario.terrain is None
     assert make_route(read, scenario.origin, None, 25.0, False).legs == LEGS[name][0]
     again = from_spec(scenario.to_json(), "log", external=True)
@@ -78,7 +78,7 @@ def test_heights_over_terrain_need_terrain() -> None:
 
 def test_a_log_gives_the_same_scenario() -> None:
     """A log keeps the scenario's JSON and the terrain, and makes the same scenario of them."""
-    scenario = implied_scenario(read_mission(SAMPLES / "qgc.waypoints"), "jacksboro")
+    scenario = implied_scenario(read_mission(SAMPLES / "qgc.waypoints"), "jacksboro").scenario
     again = from_spec(scenario.to_json(), "log", ground=scenario.terrain, external=True)
     assert again.to_json() == scenario.to_json()
     assert again.origin == scenario.origin
@@ -94,15 +94,16 @@ def test_a_mission_off_the_tile_is_refused() -> None:
 
 def test_a_mission_through_a_hill_has_a_scenario() -> None:
     """A mission through a hill is not bad input: it has a scenario, and its verdict says no."""
-    read = mission(wp(3000, 3000, 20, frame=0), wp(3000, 6000, 20, frame=0))
-    scenario = implied_scenario(read, "jacksboro")
+    lines = [f"0 16 0 0 0 0 {lat} -84.2 20" for lat in (36.24, 36.27)]
+    read = mission(*lines, home="36.21 -84.2 300")
+    scenario = implied_scenario(read, "jacksboro").scenario
     assert scenario.terrain is not None
     assert scenario.destination[2] > 100.0
     assert make_route(read, scenario.origin, scenario.terrain, 25.0, False).waypoints[:, 2].tolist() == [20.0, 20.0]
 
 
 def origin_of(read: Mission) -> GeoOrigin:
-    return mission_origin(read, make_itinerary(read, 25.0).stops)
+    return mission_origin(read, make_itinerary(read).stops)
 
 
 def test_the_origin_is_home_if_home_is_near() -> None:

@@ -102,5 +102,5 @@ def test_nothing_is_dropped_in_silence(command: int) -> None:
 
 
 def test_long_missions_walk_in_linear_time() -> None:
-    stops = make_itinerary(mission(*[wp(k, k) for k in range(9000)]), 25.0).stops
+    stops = make_itinerary(mission(*[wp(k, k) for k in range(9000)])).stops
     assert len(stops) == 9000

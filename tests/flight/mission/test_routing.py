@@ -17,7 +17,7 @@ SAMPLES = Path(__file__).parents[1] / "missions"
 
 def test_heights_over_an_unknown_home_count_from_sea_level() -> None:
     mission = read_mission(SAMPLES / "endless.waypoints")
-    scenario = implied_scenario(mission, None)
+    scenario = implied_scenario(mission, None).scenario
     route = make_route(mission, scenario.origin, None, 25.0, False)
     assert route.waypoints[0, 2] == mission.items[0].alt
     assert any("count from 0 m AMSL" in note for note in route.notes)

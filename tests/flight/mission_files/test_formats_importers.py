@@ -21,7 +21,7 @@ def test_mavsdk_importers_get_the_same_integers(tmp_path: Path) -> None:
     names = []
     for kind in ("plan", "waypoints"):
         file = tmp_path / f"a.{kind}"
-        file.write_text(mission_text(mission, kind), encoding="ascii", newline="")  # type: ignore[arg-type]  # a Kind
+        file.write_text(mission_text(mission, kind), encoding="ascii", newline="")  # type: ignore[arg-type]  # a FileKind
         names.append(str(file))
     done = subprocess.run(
         [sys.executable, str(IMPORTERS), *names], capture_output=True, text=True, timeout=60, check=False

@@ -10,9 +10,10 @@ from mcap.records import Chunk, Message
 from mcap.stream_reader import StreamReader, breakup_chunk
 
 from flight.simulation.flight_setup import FlightSetup
+from logs.recording.chunk_layout import SECOND_NS
 from logs.recording.reader import read_log
 from logs.recording.recorder import CHUNK_SIZE
-from logs.recording.state_channel import EPOCH_NS, SECOND_NS
+from logs.recording.state_channel import EPOCH_NS
 from tests.logs.made_flight import make_track, record
 from tests.logs.recording.mcap_messages import chunks
 

@@ -7,8 +7,9 @@ import pytest
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
+from logs.recording.chunk_layout import SECOND_NS
 from logs.recording.foxglove_scene import body_rotation
-from logs.recording.state_channel import EPOCH_NS, SECOND_NS
+from logs.recording.state_channel import EPOCH_NS
 from tests.logs.recording.mcap_messages import messages
 from world.frames import to_geo
 

@@ -189,7 +189,7 @@ def test_the_default_scenario_stands_by(serve: Callable[..., Served]) -> None:
     vehicle = serve()
     with UdpStation(vehicle.port) as station:
         place = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT")
-        assert math.isclose(place.lat / 1e7, 36.5, abs_tol=0.2)
+        assert math.isclose(place.lat / 1e7, 36.3, abs_tol=0.1)
         assert math.isclose(place.relative_alt / 1e3, 150.0, abs_tol=1.0)
         state = station.until(lambda m: m.get_type() == "MISSION_CURRENT")
         assert state.mission_state == mavlink.MISSION_STATE_NO_MISSION

@@ -47,8 +47,8 @@ def test_a_mission_is_judged_before_it_is_flown(options: ServeOptions) -> None:
     flights = ServedFlights(options)
     assert flights.speed == 5.0
     level = mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0))
-    setup, judged = flights.prepare(JudgeMission(level, 3))
-    assert setup is not None
+    prepared, judged = flights.prepare(JudgeMission(level, 3))
+    assert prepared is not None
     assert (judged.number, judged.possible, judged.flyable) == (3, True, True)
     assert judged.texts[0].text.startswith("mission: 2 waypoints, 1.5 km; ")
     # Home is the ground below the start where the mission has none: field is level, at the sea.
@@ -57,19 +57,19 @@ def test_a_mission_is_judged_before_it_is_flown(options: ServeOptions) -> None:
     steep = mission(options, (0.0, 0.0, 150.0), (500.0, 0.0, 450.0))
     _, judged = flights.prepare(JudgeMission(steep, 4))
     assert (judged.possible, judged.flyable) == (True, False)
-    setup, judged = flights.prepare(JudgeMission(Mission(None, ()), 5))
-    assert setup is None
+    prepared, judged = flights.prepare(JudgeMission(Mission(None, ()), 5))
+    assert prepared is None
     assert (judged.number, judged.possible, judged.flyable) == (5, False, False)
     assert [text.severity for text in judged.texts] == [CRITICAL]
 
 
 def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOptions) -> None:
     flights = ServedFlights(options)
-    setup, _ = flights.prepare(JudgeMission(mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0)), 1))
-    assert setup is not None
+    prepared, _ = flights.prepare(JudgeMission(mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0)), 1))
+    assert prepared is not None
     options.logs.mkdir()
     (options.logs / "flight-001.mcap").write_bytes(b"another's")
-    log = flights.open_log(setup)
+    log = flights.open_log(prepared.setup)
     made = make_track(seconds=1.0)
     track = replace(made, leg=np.zeros_like(made.leg))
     log.write(track.rows(0, 30))
@@ -82,7 +82,7 @@ def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOpt
     assert read.recorded_verdict is not None
     assert read.recorded_verdict["flyable"] is judged.flyable is False
     assert (options.logs / "flight-001.mcap").read_bytes() == b"another's"
-    cut = flights.open_log(setup)
+    cut = flights.open_log(prepared.setup)
     cut.write(track)
     cut.abandon()
     assert not read_log(options.logs / "flight-003.mcap").complete

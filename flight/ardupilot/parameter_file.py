@@ -1,0 +1,105 @@
+"""Files of ArduPilot parameters, in the forms that ground stations write.
+
+QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
+own default files have a name and a value with blanks between, Mission Planner has a comma.  In all of them a `#` begins
+a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File Format").
+"""
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from world.errors import ParameterError
+
+# A vehicle has some 1,500 parameters in lines of 40 bytes.
+MOST_BYTES = 4 * 2**20
+# ArduPilot's names have at most sixteen characters (MAVLink, PARAM_VALUE).
+_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# A line of QGroundControl's: vehicle, component, name, value, type.
+_QGC_FIELDS = 5
+_WHOLE = re.compile(r"[0-9]{1,5}")
+_BETWEEN = re.compile(r"[\s,=]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One parameter of a file.
+
+    where: file and line, for messages.
+    """
+
+    name: str
+    value: float
+    where: str
+
+
+def read_parameter_file(path: Path) -> dict[str, Entry]:
+    """Read a file of parameters, by name in the order of the file.
+
+    Raises ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MOST_BYTES:
+            raise ParameterError(f"{path}: {size:,} bytes: a parameter file has at most {MOST_BYTES:,}")
+        data = path.read_bytes()
+    except OSError as error:
+        raise ParameterError(f"{path}: cannot be read: {error.strerror}") from error
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise ParameterError(f"{path}:{line}: not a text file in UTF-8 (byte {error.start})") from error
+    return parse_parameters(text, str(path))
+
+
+def parse_parameters(text: str, source: str) -> dict[str, Entry]:
+    r"""Read the text of a parameter file, in any of the forms; ``source`` names it in messages.
+
+    Raises ParameterError with file, line, field, value and what is allowed, for a line that is none, a value that is no
+    finite number, a name that comes twice, and a file without a parameter.
+
+    >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
+    >>> found["WP_RADIUS"].value, found["WP_RADIUS"].where
+    (90.0, 'qgc.params:2')
+    >>> list(parse_parameters("WP_RADIUS 90  # m\nTHR_MAX,100\n", "any.parm"))
+    ['WP_RADIUS', 'THR_MAX']
+    """
+    found: dict[str, Entry] = {}
+    for number, whole in enumerate(re.split(r"\r\n|\n|\r", text), 1):
+        line = whole.partition("#")[0].strip()
+        if not line:
+            continue
+        entry = _entry(line, f"{source}:{number}")
+        if entry.name in found:
+            first = found[entry.name].where.rpartition(":")[2]
+            raise ParameterError(f"{entry.where}: {entry.name}: already on line {first}: each name is expected once")
+        found[entry.name] = entry
+    if not found:
+        raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected")
+    return found
+
+
+def _entry(line: str, where: str) -> Entry:
+    fields = line.split("\t")
+    if len(fields) == _QGC_FIELDS and _WHOLE.fullmatch(fields[0].strip()):
+        name, text = fields[2].strip(), fields[3].strip()
+    else:
+        fields = _BETWEEN.split(line)
+        if len(fields) != 2:
+            raise ParameterError(
+                f"{where}: {_shown(line)}: a name and a value are expected, or QGroundControl's five columns"
+            )
+        name, text = fields
+    if not _NAME.fullmatch(name):
+        raise ParameterError(f"{where}: name {_shown(name)}: up to 16 capitals, digits and _ are expected")
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        raise ParameterError(f"{where}: {name}: {_shown(text)}: a finite number is expected")
+    return Entry(name, value, where)
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")

@@ -1,0 +1,237 @@
+"""The places of a mission on the map: east and north of its stops, and their heights above mean sea level."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission
+from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
+from flight.mission.loiter_circles import PlacedStop
+from flight.mission.notes import Notes
+from world.errors import MissionError
+from world.frames import GeoOrigin, to_map
+from world.geometry import leg_courses
+from world.scenario_types import MAP_EXTENT
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+# Positions nearer to each other than this (m) are one.
+SAME_PLACE = 1.0
+# Horizontal length of a vertical leg, m: a metre of height on it is 89.4 degrees.
+VERTICAL_STEP = 0.01
+# Heights (m AMSL) that a flight may be asked to keep.
+LOWEST, HIGHEST = -500.0, 9000.0
+# A home that is further than this (m) from the ground at its place is worth a note.
+_HOME_ERROR = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class PlacedMission:
+    """A mission's places on the map about ``origin``, heights above mean sea level.
+
+    stops: in flying order, those at the position of the one before merged with it.
+    notes: what came up in placing them, after the itinerary's.
+    takeoff_ground: height of the ground at home, m, NaN where it is not known or nothing takes off.
+    landing_ground: height of the place to land at, m, NaN where it is not known or nothing lands.
+    """
+
+    mission: Mission
+    origin: GeoOrigin
+    itinerary: Itinerary
+    stops: tuple[PlacedStop, ...]
+    notes: tuple[str, ...]
+    takeoff_ground: float
+    landing_ground: float
+
+
+def place_stops(
+    mission: Mission,
+    origin: GeoOrigin,
+    terrain: Terrain | None,
+    *,
+    itinerary: Itinerary | None = None,
+    vertical_legs: bool = False,
+) -> PlacedMission:
+    """Places of a mission's itinerary on the map about ``origin``.
+
+    terrain: None where none is known; heights above terrain are then an error.
+    itinerary: the mission's where it has been made already.
+    vertical_legs: whether a position straight above or below the one before it becomes a leg of `VERTICAL_STEP` m,
+        which the verdict's slope rule then refuses; otherwise it is an error.
+
+    Two stops of the result are at least `SAME_PLACE` apart across the ground, or `VERTICAL_STEP` if vertical.  Raises
+    MissionError, naming the item, for what cannot be placed.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5, 8.0, 700.0) for k in (1, 2)]
+    >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
+    >>> len(placed.stops), placed.notes
+    (1, ('item 2: at the place of item 1: merged with it',))
+    """
+    notes = Notes()
+    if itinerary is None:
+        itinerary = make_itinerary(mission)
+    heights = _Heights(mission.source, itinerary, origin, terrain, notes)
+    stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
+    takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
+    landing_ground = heights.touchdown(itinerary)
+    return PlacedMission(mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground)
+
+
+def _placed_stops(
+    source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
+) -> list[PlacedStop]:
+    """Stops on the map, without those at the position of the one before."""
+    notes = heights.notes
+    flat = on_map(source, itinerary.stops, origin)
+    kept: list[PlacedStop] = []
+    for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
+        last = float(kept[-1].position[2]) if kept else math.nan
+        new = PlacedStop(stop, np.array([east, north, heights.amsl(stop, float(east), float(north), last)]))
+        circles = stop.loiter is not None or bool(kept and kept[-1].stop.loiter is not None)
+        if kept and not circles and math.dist(kept[-1].position[:2], new.position[:2]) < SAME_PLACE:
+            if vertical_legs and _is_vertical(kept[-1], new):
+                kept.append(PlacedStop(stop, _step_aside(kept, new.position)))
+                continue
+            kept[-1] = PlacedStop(_merge(source, kept[-1], new, notes), kept[-1].position)
+        else:
+            kept.append(new)
+    return kept
+
+
+def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> Floats:
+    """East and north of each stop, (n, 2) m.  Raises MissionError, naming the item, for one beyond any map."""
+    east, north = to_map(origin, [stop.lat_deg for stop in stops], [stop.lon_deg for stop in stops])
+    points = np.stack([east, north], axis=1)
+    far = ~(np.abs(points) <= MAP_EXTENT).all(axis=1)
+    if far.any():
+        stop = stops[int(np.argmax(far))]
+        raise MissionError(
+            f"{source}: {_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
+            f" {MAP_EXTENT / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
+            " (columns swapped, or a sign lost?)"
+        )
+    return points
+
+
+class _Heights:
+    """Heights above mean sea level of heights in any frame."""
+
+    def __init__(
+        self, source: str, itinerary: Itinerary, origin: GeoOrigin, terrain: Terrain | None, notes: Notes
+    ) -> None:
+        self.source = source
+        self.origin = origin
+        self.terrain = terrain
+        self.notes = notes
+        self.home = itinerary.home
+        self._home_amsl: float | None = None
+
+    def amsl(self, stop: ItineraryStop, east: float, north: float, last: float) -> float:
+        """Height of a stop; ``last``: the one before, NaN at the first."""
+        if math.isnan(stop.alt):
+            if math.isnan(last):
+                raise MissionError(f"{self.source}: {_name(stop)}: no altitude, and none before to keep")
+            return last
+        if stop.frame in AMSL:
+            height = stop.alt
+        elif stop.frame in OVER_HOME:
+            height = self._over_home(stop) + stop.alt
+        else:
+            height = self._ground(stop, east, north) + stop.alt
+        if not LOWEST <= height <= HIGHEST:
+            raise MissionError(
+                f"{self.source}: {_name(stop)}: {height:.1f} m AMSL: allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+            )
+        return height
+
+    def _ground(self, stop: ItineraryStop, east: float, north: float) -> float:
+        asked = f"{self.source}: {_name(stop)}: height above terrain (frame {stop.frame})"
+        if self.terrain is None:
+            raise MissionError(f"{asked}: no terrain is given to count from")
+        under = float(self.terrain.height(east, north))
+        if math.isnan(under):
+            raise MissionError(f"{asked}: {self.terrain.source} has no data there")
+        return under
+
+    def _over_home(self, stop: ItineraryStop) -> float:
+        if self._home_amsl is None:
+            self._home_amsl = self._find_home(stop, self.home)
+        return self._home_amsl
+
+    def touchdown(self, itinerary: Itinerary) -> float:
+        """Height of the place to land at; NaN for none, none stated, and none to compare with the place before it."""
+        stop = itinerary.landing
+        if stop is None or math.isnan(stop.alt):
+            return math.nan
+        known = stop.frame in AMSL or self.terrain is not None
+        if stop.frame in OVER_HOME:
+            before = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
+            known = known or not math.isnan(self.home.alt) or before in OVER_HOME
+        east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
+        return self.amsl(stop, float(east), float(north), math.nan) if known else math.nan
+
+    def ground_at_home(self) -> float:
+        """Height of the ground at home, NaN where it is not known."""
+        home = self.home
+        if self.terrain is not None:
+            east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
+            if abs(float(east)) <= MAP_EXTENT and abs(float(north)) <= MAP_EXTENT:
+                return float(self.terrain.height(east, north))
+        return math.nan
+
+    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
+        under = self.ground_at_home()
+        if not math.isnan(home.alt):
+            if abs(home.alt - under) > _HOME_ERROR:
+                unset = "" if home.alt else "; ground stations write 0 where no home was set"
+                self.notes.add(
+                    f"home is at {home.alt:.1f} m AMSL, and the ground there at {under:.1f} m:"
+                    f" heights over home count from the former{unset}"
+                )
+            return home.alt
+        if math.isnan(under):
+            self.notes.add("no home height, and no terrain to take one from: heights over home count from 0 m AMSL")
+            return 0.0
+        self.notes.add(
+            f"no home height: taken as the ground at {home.lat_deg:.7f}, {home.lon_deg:.7f}, {under:.1f} m AMSL"
+        )
+        return under
+
+
+def _is_vertical(kept: PlacedStop, new: PlacedStop) -> bool:
+    """Whether a stop is straight above or below the one before, and no take-off's."""
+    return abs(float(new.position[2] - kept.position[2])) >= SAME_PLACE and new.stop.command not in TAKEOFFS
+
+
+def _step_aside(kept: list[PlacedStop], point: Floats) -> Floats:
+    """Position `VERTICAL_STEP` m further on the course to the last one, or east of it, at the height of a point."""
+    course = math.pi / 2.0
+    if len(kept) > 1:
+        course = float(leg_courses(np.array([kept[-2].position, kept[-1].position]))[0])
+    east, north, _ = kept[-1].position
+    return np.array([east + VERTICAL_STEP * math.sin(course), north + VERTICAL_STEP * math.cos(course), point[2]])
+
+
+def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> ItineraryStop:
+    """Leave out a stop at the place of the one before it; returns the one before, under its number."""
+    before, after = kept.stop, new.stop
+    climb = float(new.position[2] - kept.position[2])
+    if abs(climb) >= SAME_PLACE:
+        side = "above" if climb > 0.0 else "below"
+        if after.command not in TAKEOFFS:
+            raise MissionError(
+                f"{source}: {_name(after)}: {abs(climb):.1f} m straight {side} {_name(before)}:"
+                " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing"
+            )
+        notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", after.item)
+    else:
+        notes.add(f"at the place of {_name(before)}: merged with it", after.item)
+    return before if before.item >= 0 else after
+
+
+def _name(stop: ItineraryStop) -> str:
+    return f"item {stop.item}" if stop.item >= 0 else "home"

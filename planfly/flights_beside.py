@@ -1,0 +1,42 @@
+"""The flights beside an autopilot's: of the aircraft by planfly's guidance, and with other parameters."""
+
+from dataclasses import replace
+
+from aircraft.catalog import Aircraft
+from flight.ardupilot.parameters import ArduPilotParameters
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.simulate import simulate
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.levels import AirframeAnswer, DecidingParameter
+from planfly.deciding_parameter import deciding_parameter
+
+
+def airframe_answer(setup: FlightSetup, aircraft: Aircraft) -> AirframeAnswer:
+    """Fly a setup by planfly's guidance, which knows exactly where it is, and judge that flight."""
+    ideal = replace(setup, parameters=None, guidance="path", nav="perfect")
+    flown = simulate(ideal, aircraft)
+    verdict = judge_flight(ideal, flown.track, flown.ended)
+    failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
+    return AirframeAnswer(verdict.flyable, verdict.headline, failed)
+
+
+def find_deciding_parameter(setup: FlightSetup, aircraft: Aircraft, verdict: Verdict) -> DecidingParameter | None:
+    """The parameter with another value of which a flight that failed passes; None where there is none.
+
+    verdict: on the flight with the setup's own parameters.  Takes about ten flights.
+    """
+    if setup.parameters is None or verdict.flyable:
+        return None
+    # The corridor is as wide as it was, whatever radius is tried.
+    scenario = setup.scenario
+    limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
+    spec = scenario.spec.model_copy(update={"limits": limits})
+    same = replace(setup, scenario=replace(scenario, spec=spec, limits=limits))
+
+    def passes(parameters: ArduPilotParameters) -> bool:
+        changed = replace(same, parameters=parameters)
+        flown = simulate(changed, aircraft)
+        return judge_flight(changed, flown.track, flown.ended).flyable
+
+    return deciding_parameter(setup.parameters, verdict.findings, passes)
