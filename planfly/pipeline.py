@@ -12,16 +12,17 @@ from flight.mission.routing import lay_route, make_route
 from flight.mission_files.formats import mission_text
 from flight.simulation.airborne import Airborne
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import Flight, fly_to_end
-from flight.simulation.track import Track
+from flight.simulation.simulate import Flight, Progress, fly_to_end
+from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from world.errors import FlightError
+from world.errors import FlightError, StartError
 from world.scenario import Scenario, load_scenario
 
 # Takes how far a stage is: done, whole, a remark.
@@ -29,6 +30,8 @@ Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
 BATCH = 60
+# A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
+MOST_STORES = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +59,7 @@ class JudgedFlight:
     """A flight from its first tick to its verdict.
 
     setup: with the real autopilot that flew, if one did.
-    track: the rows that are recorded, all of them where there is no log.
+    track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
@@ -149,25 +152,25 @@ def fly_and_judge(
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
 
-    Raises FlightError for a flight that cannot start, and for a program that does not fly it to its end; no log is
-    left then.
-    """
-    if autopilot is None:
-        return _record_and_judge(setup, Flight(setup, airframe.aircraft), log, advance, every)
-    # Imported here: nobody else needs MAVLink.
-    from flight.real_autopilot.autopilot_flight import AutopilotFlight
+    A flight that cannot begin, or that needs more than `MOST_STORES` times the energy carried, has no row and no log:
+    its verdict is its route's, and that it did not begin.
 
-    with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
-        flight.prepare()
-        try:
-            judged = _record_and_judge(flight.setup, flight, log, advance, every)
-        except FlightError:
-            if log is not None:
-                log.unlink(missing_ok=True)
-            raise
-        if log is not None:
-            flight.keep_log(autopilot_log(log))
-    return judged
+    Raises FlightError for a program that does not fly to the end, and leaves no log then.
+    """
+
+    def report(done: float, whole: float) -> None:
+        if advance is not None:
+            advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
+
+    needed = needed_energy(setup)
+    if needed > MOST_STORES * setup.battery:
+        return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
+    try:
+        if autopilot is not None:
+            return _fly_autopilot(setup, airframe, autopilot, log, report, every)
+        return _fly(setup, Flight(setup, airframe.aircraft), log, report, every)
+    except StartError as error:
+        return _unflown(setup, f"not started: {error.reason}")
 
 
 def autopilot_log(log: Path) -> Path:
@@ -179,13 +182,26 @@ def autopilot_log(log: Path) -> Path:
     return log.with_suffix(".BIN")
 
 
-def _record_and_judge(
-    setup: FlightSetup, flight: Airborne, log: Path | None, advance: Advance | None, every: int
+def _fly_autopilot(
+    setup: FlightSetup, airframe: Airframe, program: Path, log: Path | None, report: Progress, every: int
 ) -> JudgedFlight:
-    def report(done: float, whole: float) -> None:
-        if advance is not None:
-            advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
+    # Imported here: nobody else needs MAVLink.
+    from flight.real_autopilot.autopilot_flight import AutopilotFlight
 
+    with AutopilotFlight(setup, airframe.aircraft, program) as flight:
+        flight.prepare()
+        try:
+            judged = _fly(flight.setup, flight, log, report, every)
+        except FlightError:
+            if log is not None:
+                log.unlink(missing_ok=True)
+            raise
+        if log is not None:
+            flight.keep_log(autopilot_log(log))
+    return judged
+
+
+def _fly(setup: FlightSetup, flight: Airborne, log: Path | None, report: Progress, every: int) -> JudgedFlight:
     if log is None:
         flown = fly_to_end(flight, progress=report)
         return _judged(setup, flown.track, flown.ended)
@@ -196,6 +212,11 @@ def _record_and_judge(
             recorder.event(event.time, event.text, event.level)
         recorder.finish(judged.ended, judged.verdict)
     return judged
+
+
+def _unflown(setup: FlightSetup, ended: str) -> JudgedFlight:
+    """A flight without a row."""
+    return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
 def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:

@@ -15,7 +15,7 @@ from flight.mission.route import Route
 from flight.simulation.autopilot_program import AutopilotProgram
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)

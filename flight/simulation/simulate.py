@@ -18,7 +18,7 @@ from flight.simulation.loop import make_loop
 from flight.simulation.tick import tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from flight.simulation.workspace import READ_FIELDS
-from world.errors import FlightError
+from world.errors import StartError
 
 Progress = Callable[[float, float], None]
 Sink = Callable[[Rows], None]
@@ -61,7 +61,7 @@ def simulate(
     progress: is called with the distance flown and the whole, m.
     variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
 
-    Raises FlightError for a flight that cannot start.
+    Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
 
     >>> import numpy as np
     >>> from aircraft.catalog import load_aircraft
@@ -127,7 +127,7 @@ class Flight(Airborne):
         start = self._start(setup)
         level = straight(model, reference, start.amsl)
         if level is None:
-            raise FlightError(f"{setup.aircraft}: no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL")
+            raise StartError(setup.aircraft, f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL")
         self._trim(setup.mission.source, start)
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha

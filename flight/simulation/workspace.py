@@ -60,6 +60,7 @@ TIMING = record_dtype(
 )
 SETTINGS = record_dtype(
     "slowest",  # m/s, slower is a departure
+    "battery",  # Wh; a flight that has used as much ends
     "navigation_sigma",  # m
     "navigation_time",  # s
     "middle",  # rad, longitude of the local map's middle

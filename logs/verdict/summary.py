@@ -25,7 +25,7 @@ _NAV = {
     "gnss": "with GNSS's error (1.5 m on each axis)",
 }
 # Rules whose silence the first line tells, by what they judge.
-_UNJUDGED = {"clearance": "terrain", "speed": "airspeed"}
+_UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
 # What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
 _FIRST = ("departure", "completion", "mission", "slope")
 _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
@@ -121,9 +121,13 @@ def summary_lines(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    # Limits of that autopilot's own, which say nothing of the aircraft.
+    lines += [
+        f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
+    ]
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")

@@ -18,11 +18,10 @@ from planfly.terminal.argument_types import (
     speedup,
     threat,
     time_or_stations,
-    wind,
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
-from planfly.terminal.shared_options import (
-    aircraft_options,
+from planfly.terminal.parser_options import (
+    flown_by_options,
     overwrite_option,
     own_link_options,
     pilot_options,
@@ -150,12 +149,10 @@ def _add_export_and_fly(command: _Command) -> None:
     )  # fmt: skip
     fly.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan")
     world_options(fly)
-    aircraft_options(fly)
+    flown_by_options(fly)
     fly.add_argument(
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
-    fly.add_argument("--wind", metavar="SPEED,FROM", type=wind, help="steady wind, m/s and degrees it blows from")
-    fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=seed, help="of the turbulence (default: the plan's, or 1)")
     fly.add_argument(
         "--log-hz", metavar="HZ", type=int, choices=(60, 30, 20, 10), default=60,
@@ -173,7 +170,7 @@ def _add_log_commands(command: _Command) -> None:
     )  # fmt: skip
     check.add_argument("file", metavar="LOG.mcap|MISSION", help="a flight log, or plan.json, .waypoints, .plan")
     world_options(check)
-    aircraft_options(check)
+    flown_by_options(check)
     pilot_options(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
     overwrite_option(check)

@@ -54,6 +54,8 @@ SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
 QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
+# Of the airspeed: in more wind no path is searched for.
+MOST_WIND = 0.8
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
 
@@ -90,7 +92,7 @@ def plan_path(
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
-    _check_options(scenario)
+    _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits)
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     # No path is further from a missile's sphere than its own ends are.
@@ -132,7 +134,12 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
     return best
 
 
-def _check_options(scenario: Scenario) -> None:
+def _check_options(scenario: Scenario, airspeed: float) -> None:
+    if scenario.wind.speed > MOST_WIND * airspeed:
+        raise ScenarioError(
+            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: a path is searched for in at most"
+            f" {MOST_WIND:.0%} of the airspeed {airspeed:g}, to make way on every course"
+        )
     table = scenario.planner
     if table.population * 3 * table.waypoints > MOST_NUMBERS:
         raise ScenarioError(
