@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from logs.verdict.levels import DecidingParameter, LevelAnswer
 from logs.verdict.places import Place, Suggestion
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
@@ -24,6 +25,9 @@ RULES = {
     "waypoint": "waypoints",
     "corridor": "corridor",
     "speed": "airspeed",
+    "stall": "stall margin",
+    "takeoff": "take-off",
+    "landing": "landing",
     "energy": "energy",
     "departure": "departure",
     "completion": "completion",
@@ -98,6 +102,7 @@ class Verdict:
     notes: what is not flown as the mission has it; the lines say it too.
     leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
     it did not get to; empty where too little was recorded to tell.
+    program: of a flown verdict, the real autopilot that flew, None where none did.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -113,6 +118,7 @@ class Verdict:
     deciding: DecidingParameter | None = None
     notes: tuple[str, ...] = ()
     leg_ends: tuple[float, ...] = ()
+    program: AutopilotProgram | None = None
 
     @property
     def headline(self) -> str:
@@ -227,6 +233,7 @@ def verdict_json(verdict: Verdict) -> str:
         "flyable": verdict.flyable,
         "complete": verdict.complete,
         "summary": verdict.summary,
+        "flown_by": None if verdict.program is None else asdict(verdict.program),
         "levels": [_level_data(level) for level in verdict.levels],
         "deciding_parameter": None if verdict.deciding is None else _deciding_data(verdict.deciding),
         "findings": [_finding_data(finding) for finding in verdict.findings],

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only
+from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
 from logs.verdict.levels import AirframeAnswer, FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import lay_track
@@ -23,6 +23,8 @@ from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
+from logs.verdict.rules.stall_rule import stall_findings
+from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
 from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
 from logs.verdict.rules.waypoint_rule import waypoint_findings
@@ -43,7 +45,8 @@ def judge_flight(
 ) -> Verdict:
     """Judge a flown track: level "flown".
 
-    Any track is judged, however short or damaged: what cannot be known makes it incomplete.
+    Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
+    flight that never began: its route is judged, level "geometric".
 
     ended: how the flight ended, "completed" or what stopped it.
     whole: the record has its end.
@@ -69,6 +72,8 @@ def judge_flight(
     'flyable'
     """
     demands = route_demands(setup, envelope=envelope)
+    if not len(track):
+        return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
     findings: tuple[Finding, ...] = (
         *turn_findings(demands, aligned),
@@ -79,6 +84,8 @@ def judge_flight(
         *waypoint_findings(demands, aligned),
         *corridor_findings(demands, aligned),
         *speed_findings(demands, aligned),
+        *(stall_findings(demands, aligned) if envelope else ()),
+        *takeoff_landing_findings(demands),
         *energy_findings(demands, aligned),
         *departure_findings(demands, aligned),
         *completion_findings(demands, aligned, ended, whole),
@@ -92,7 +99,8 @@ def judge_flight(
     deciding = None if beside is None or flyable else beside.deciding
     lines = summary_lines(findings, setup, "flown", (*others, own), deciding)
     ends = () if aligned is None else aligned.leg_ends()
-    return Verdict(findings, flyable, complete, lines, "flown", (*others, own), deciding, setup.route.notes, ends)
+    levels, notes = (*others, own), setup.route.notes
+    return Verdict(findings, flyable, complete, lines, "flown", levels, deciding, notes, ends, setup.program)
 
 
 def _other_levels(

@@ -2,7 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import RULES, Finding
 from logs.verdict.levels import DecidingParameter, LevelAnswer
@@ -10,6 +12,8 @@ from logs.verdict.wording import deciding_text, disagreement_text, place_text, s
 
 # Failed findings that the first line names.
 _NAMED = 4
+# Changed parameters of a real autopilot that its line names.
+_CHANGED = 8
 _UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
 _GUIDANCE = {
     "path": "planfly's guidance on the fly-by path",
@@ -27,7 +31,7 @@ _LEVELS = {
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 # Rules whose silence the first line tells, by what they judge.
-_UNJUDGED = {"clearance": "terrain", "speed": "airspeed"}
+_UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
 # What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
 _FIRST = ("departure", "completion", "mission", "slope")
 _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
@@ -137,9 +141,13 @@ def summary_lines(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    # Limits of that autopilot's own, which say nothing of the aircraft.
+    lines += [
+        f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
+    ]
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
@@ -163,12 +171,24 @@ def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | No
 def flown_by(setup: FlightSetup) -> str:
     """Who steers, in words: planfly's guidance or ArduPlane, with the parameters that decide most of its flight."""
     parameters = setup.parameters
+    if setup.program is not None:
+        return _program_text(setup.program, setup.aircraft)
     if parameters is None:
         return _GUIDANCE[setup.guidance]
     whose = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
     return (
         f"ArduPlane's law with {whose} (WP_RADIUS {parameters.wp_radius:g} m,"
         f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
+    )
+
+
+def _program_text(program: AutopilotProgram, aircraft: str) -> str:
+    """A real autopilot in words; every parameter stands in the verdict's data."""
+    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
+    more = f", +{len(changed) - _CHANGED} more" if len(changed) > _CHANGED else ""
+    return (
+        f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:_CHANGED]) or 'none'}{more}"
     )
 
 

@@ -151,6 +151,11 @@ LONGEST_GAP = 0.5
 GAP_STEPS = 5.0
 # m/s.  By how much position and velocity of one tick may disagree before the record contradicts itself.
 CONTRADICTION = 10.0
+# s.  Airspeed, bank and load factor are means over this long where they are held against the stall.
+STALL_MEAN = 1.0
+# m/s.  By how much a flown airspeed may be below the stall in a bank, and a gust's standard deviation more: guidance
+# lets the speed swing by as much when it rolls into a turn in calm air.
+STALL_TOLERANCE = 0.2
 # Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 

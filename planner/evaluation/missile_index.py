@@ -92,10 +92,13 @@ def kill_density(
     bz: float,
     first: float,
     last: float,
+    below: float,
+    above: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Mean kill density over the segment a-b, radii grown by the margin, and distances to the nearest such sphere, m.
 
     first, last: lengths (m) at a and at b: the distances are from there, and right if they are less than `within`.
+    below, above: how far below and above the segment a flight may be, m: what is nearest to each missile counts.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -126,6 +129,8 @@ def kill_density(
                 missile = missiles[np.uintp(entry)]
                 x, y, z = ax - missile.east, ay - missile.north, az - missile.up
                 grown = missile.radius + margin
+                if below > 0.0 or above > 0.0:
+                    z = _nearer(z, dz * min(1.0, max(0.0, -(dx * x + dy * y + dz * z) * inverse)), below, above)
                 along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
                 closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
                 if closest2 < (grown + within) * (grown + within):
@@ -137,6 +142,17 @@ def kill_density(
                     if closest2 < grown * grown:
                         dose += _dose(along, start2, length2, grown, missile.scale)
     return dose, near_a, near_b
+
+
+@inlined
+def _nearer(z: float, rise: float, below: float, above: float) -> float:  # pragma: no cover - compiled
+    """Height of a segment's beginning over a missile, m, where its nearest place comes as near as the flight may.
+
+    rise: of the segment up to that place.
+    """
+    over = z + rise
+    shift = min(over, below) if over > 0.0 else max(over, -above)
+    return z - shift
 
 
 @inlined

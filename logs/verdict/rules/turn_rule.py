@@ -52,6 +52,7 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
             faults.append(_too_sharp(demands, i, planned, limit, source))
         else:
             facts.append(f"a jog: the way without it passes it at {beside:.1f} m and can be flown")
+    facts += _flown_over(demands, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
@@ -83,6 +84,21 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
         method=method,
         facts=_measured(measure),
     )
+
+
+def _flown_over(demands: RouteDemands, i: int, turn: float) -> list[str]:
+    """That a waypoint is flown over because its arc would miss its acceptance, and what that takes."""
+    radius, acceptance = float(demands.radius[i]), float(demands.setup.route.acceptance[i])
+    if not demands.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
+        return []
+    offset = fly_by_offset(turn, radius)
+    if offset <= acceptance:
+        return []
+    beside = radius * (1.0 - math.cos(turn))
+    return [
+        f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
+        f" that leads up to {beside:.0f} m beside the next leg"
+    ]
 
 
 def _too_sharp(demands: RouteDemands, i: int, planned: float, limit: float, source: str) -> Message:
