@@ -38,7 +38,7 @@ def find_deciding_parameter(setup: FlightSetup, aircraft: Aircraft, verdict: Ver
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
     spec = scenario.spec.model_copy(update={"limits": limits})
-    same = replace(setup, scenario=replace(scenario, spec=spec, limits=limits))
+    same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(parameters: ArduPilotParameters) -> bool:
         changed = replace(same, parameters=parameters)
