@@ -4,7 +4,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from aircraft.catalog import Aircraft
 from flight.mission.end_courses import with_end_courses
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
@@ -169,7 +168,7 @@ def fly_and_judge(
         return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
     try:
         if autopilot is None:
-            return _record_and_judge(setup, airframe.aircraft, Flight(setup, airframe.aircraft), log, advance, every)
+            return _record_and_judge(setup, airframe, Flight(setup, airframe.aircraft), log, advance, every)
         return _fly_program(setup, airframe, log, advance, every, autopilot)
     except StartError as error:
         return _unflown(setup, f"not started: {error.reason}")
@@ -189,7 +188,7 @@ def _fly_program(
     with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, airframe.aircraft, flight, log, advance, every)
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every)
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)
@@ -209,7 +208,7 @@ def autopilot_log(log: Path) -> Path:
 
 
 def _record_and_judge(
-    setup: FlightSetup, aircraft: Aircraft, flight: Airborne, log: Path | None, advance: Advance | None, every: int
+    setup: FlightSetup, airframe: Airframe, flight: Airborne, log: Path | None, advance: Advance | None, every: int
 ) -> JudgedFlight:
     def report(done: float, whole: float) -> None:
         if advance is not None:
@@ -217,10 +216,10 @@ def _record_and_judge(
 
     if log is None:
         flown = fly_to_end(flight, progress=report)
-        return _judged(setup, aircraft, flown.track, flown.ended)
+        return _judged(setup, airframe, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
         flown = fly_to_end(flight, recorder.write_rows, report)
-        judged = _judged(setup, aircraft, thin_track(flown.track, every), flown.ended)
+        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
         recorder.finish(judged.ended, judged.verdict, judged.beside)
@@ -232,12 +231,14 @@ def _unflown(setup: FlightSetup, ended: str) -> JudgedFlight:
     return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
-def _judged(setup: FlightSetup, aircraft: Aircraft, track: Track, ended: str) -> JudgedFlight:
+def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    beside = None if setup.parameters is None else FlownBeside(airframe_answer(setup, aircraft))
+    beside = None
+    if setup.parameters is not None:
+        beside = FlownBeside(airframe_answer(setup, airframe.aircraft))
     verdict = judge_flight(setup, track, ended, beside=beside)
     if beside is not None and beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
-        beside = replace(beside, deciding=find_deciding_parameter(setup, aircraft, verdict))
+        beside = replace(beside, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
         verdict = judge_flight(setup, track, ended, beside=beside)
     return JudgedFlight(setup, track, ended, verdict, (event,), beside)

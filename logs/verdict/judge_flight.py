@@ -12,7 +12,7 @@ from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
 from logs.verdict.levels import AirframeAnswer, FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
 from logs.verdict.places import Disagreement, Place
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
@@ -75,7 +75,34 @@ def judge_flight(
     if not len(track):
         return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
-    findings: tuple[Finding, ...] = (
+    findings = _flown_findings(demands, aligned, ended, whole, envelope)
+    complete = all(item.ok is True for item in findings if item.rule == "completion")
+    flyable = complete and not any(item.ok is False for item in findings)
+    findings = with_suggestions(demands, aligned, findings)
+    others = _other_levels(demands, findings, None if beside is None else beside.airframe) if envelope else ()
+    own = LevelAnswer("airframe" if setup.parameters is None else "autopilot", flyable, headline(findings, flyable))
+    deciding = None if beside is None or flyable else beside.deciding
+    lines = summary_lines(findings, setup, "flown", (*others, own), deciding)
+    ends = () if aligned is None else aligned.leg_ends()
+    return Verdict(
+        findings,
+        flyable,
+        complete,
+        lines,
+        "flown",
+        levels=(*others, own),
+        deciding=deciding,
+        notes=setup.route.notes,
+        leg_ends=ends,
+        program=setup.program,
+    )
+
+
+def _flown_findings(
+    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
+) -> tuple[Finding, ...]:
+    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
+    findings = (
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
@@ -90,17 +117,7 @@ def judge_flight(
         *departure_findings(demands, aligned),
         *completion_findings(demands, aligned, ended, whole),
     )
-    findings = fold_loiters(demands, aligned, findings)
-    complete = all(item.ok is True for item in findings if item.rule == "completion")
-    flyable = complete and not any(item.ok is False for item in findings)
-    findings = with_suggestions(demands, aligned, findings)
-    others = _other_levels(demands, findings, None if beside is None else beside.airframe) if envelope else ()
-    own = LevelAnswer("airframe" if setup.parameters is None else "autopilot", flyable, headline(findings, flyable))
-    deciding = None if beside is None or flyable else beside.deciding
-    lines = summary_lines(findings, setup, "flown", (*others, own), deciding)
-    ends = () if aligned is None else aligned.leg_ends()
-    levels, notes = (*others, own), setup.route.notes
-    return Verdict(findings, flyable, complete, lines, "flown", levels, deciding, notes, ends, setup.program)
+    return fold_loiters(demands, aligned, findings)
 
 
 def _other_levels(

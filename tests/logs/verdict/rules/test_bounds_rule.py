@@ -32,24 +32,3 @@ def test_the_ceiling_counts_at_the_waypoint_above_it() -> None:
 def test_a_mission_without_a_scenario_has_no_area(setup: FlightSetup, track: Track) -> None:
     blind = replace(setup, scenario=replace(setup.scenario, external=True))
     assert of(judge(blind, track), "bounds").ok is None
-
-
-@pytest.mark.parametrize(("beyond", "ok"), [(0.015, True), (0.025, False), (0.1, False)])
-@pytest.mark.parametrize(
-    "side", [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]
-)
-def test_each_side_counts_to_the_centimetre_of_a_mission_file(
-    setup: FlightSetup, track: Track, side: tuple[float, float, float], beyond: float, ok: bool
-) -> None:
-    """The track's farthest row put this far beyond the edge."""
-    (west, east), (south, north) = setup.scenario.bounds
-    room = {
-        (1.0, 0.0, 0.0): east - track.position[:, 0].max(),
-        (-1.0, 0.0, 0.0): track.position[:, 0].min() - west,
-        (0.0, 1.0, 0.0): north - track.position[:, 1].max(),
-        (0.0, -1.0, 0.0): track.position[:, 1].min() - south,
-        (0.0, 0.0, 1.0): setup.scenario.ceiling - track.position[:, 2].max(),
-    }[side]
-    moved = track.position + (float(room) + beyond) * np.array(side)
-    item = of(judge(setup, edited(track, position=moved)), "bounds")
-    assert (item.ok, item.margin) == (ok, pytest.approx(-beyond, abs=1e-6))

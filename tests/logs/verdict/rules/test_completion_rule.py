@@ -4,7 +4,6 @@ import math
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
@@ -14,7 +13,6 @@ from tests.synthetic import (
     copied,
     edited,
     fly_path,
-    waypoint_stations,
 )
 
 
@@ -71,34 +69,3 @@ def test_one_moved_row_is_a_contradiction(setup: FlightSetup, track: Track) -> N
     verdict = judge(setup, edited(track, position=position))
     assert not verdict.complete
     assert "contradict" in of(verdict, "completion").reason
-
-
-@pytest.mark.parametrize(
-    ("step", "missing", "ok"),
-    # Half a second, or five steps where they are longer.
-    [(1, 29, True), (1, 31, False), (30, 4, True), (30, 6, False)],
-)
-def test_a_pause_in_the_record(setup: FlightSetup, track: Track, step: int, missing: int, ok: bool) -> None:
-    """At 60 rows a second 29 rows more than one apart are 0.5 s; at 2 a second, 4 more are 2.5 s."""
-    rows = np.arange(0, len(track), step)
-    kept = np.concatenate([rows[:100], rows[100 + missing :]])
-    thin = Track(**{name: column[kept] for name, column in copied(track).items()})
-    faults = of(judge(setup, thin), "completion").reason
-    assert ("rows are missing" not in faults) is ok
-
-
-@pytest.mark.parametrize(("off", "ok"), [(9.8, True), (10.2, False)])
-def test_position_and_velocity_of_one_tick_may_differ_by_so_much(
-    setup: FlightSetup, track: Track, off: float, ok: bool
-) -> None:
-    velocity = track.velocity.copy()
-    # The mean of two rows counts: both are off, across the track's course, north on its first leg.
-    velocity[3000:3002, 0] += off
-    item = of(judge(setup, edited(track, velocity=velocity)), "completion")
-    assert ("contradict" not in item.reason) is ok
-
-
-@pytest.mark.parametrize(("short", "ok"), [(9.8, True), (10.4, False)])
-def test_a_flight_that_ends_ten_metres_short_has_arrived(setup: FlightSetup, short: float, ok: bool) -> None:
-    whole = float(waypoint_stations(setup)[-1])
-    assert judge(setup, fly_path(setup, stop=whole - short)).complete is ok

@@ -1,6 +1,5 @@
 """A loiter's corners are one finding, its legs the worst of each rule."""
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -54,16 +53,3 @@ def test_legs_of_a_circle_give_the_worst_of_each_rule() -> None:
         ]
         assert len(inside) == 1
         assert inside[0].reason.endswith(f"; the worst of the circle's {circle.last - circle.first} legs")
-
-
-@pytest.mark.parametrize(("short", "ok"), [(0.0, True), (0.5, False)])
-def test_a_circle_is_as_tight_as_the_bank_limit_allows(short: float, ok: bool) -> None:
-    """V^2 / (g tan 30) = 110.35 m at 25 m/s, in calm air."""
-    tightest = 25.0**2 / (9.80665 * math.tan(math.radians(30.0)))
-    item = of(judge_geometry(loiter(round(tightest, 3) + 0.01 - short)), "loiter")
-    assert item.limit == pytest.approx(tightest, abs=0.01)
-    assert item.ok is ok
-
-
-def test_a_corner_of_a_circle_is_no_jog_however_small_it_is() -> None:
-    assert of(judge_geometry(loiter(25.0)), "loiter").ok is False
