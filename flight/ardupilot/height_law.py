@@ -14,6 +14,9 @@ import math
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, compiled
 
+# What ArduPlane reads by what is true: its sensor's noise adds to the pressure's mean.  Measured in the logs of 18 flights
+# of ArduPlane 4.6 in our physics, in still air as in turbulence: 1.0024 to 1.0030.
+AIRSPEED_READING = 1.0027
 # Of the rate of total energy, for the throttle's damping: smoothed over this long, s.
 _RATE_LAG = 0.5
 # Damping of the filter that makes an airspeed of the measured one and the acceleration.
@@ -93,7 +96,7 @@ def _estimate_airspeed(
     own.flown = True
     own.last_velocity_east, own.last_velocity_north = estimated.velocity_east, estimated.velocity_north
     frequency = parameters.tecs_speed_frequency
-    error = state.airspeed - own.airspeed
+    error = AIRSPEED_READING * state.airspeed - own.airspeed
     own.airspeed_drift += error * frequency * frequency * dt
     own.airspeed = max(3.0, own.airspeed + (gained + own.airspeed_drift + error * frequency * _FILTER_DAMPING) * dt)
     own.acceleration_mean += (gained - own.acceleration_mean) * dt / (dt + parameters.tecs_time)
