@@ -188,7 +188,8 @@ def _set_pitch(
     per_angle = own.airspeed * GRAVITY
     wanted = height_weight * (high / parameters.tecs_time + GRAVITY * own.height_rate)
     wanted -= speed_weight * fast / parameters.tecs_time
-    wanted = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, wanted))
+    asked = wanted
+    wanted = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, asked))
     amiss = wanted - (height_weight * climbing - speed_weight * gaining)
     total = wanted + parameters.tecs_pitch_damping * amiss
     own.speed_sum -= speed_weight * fast / parameters.tecs_time * dt
@@ -199,9 +200,9 @@ def _set_pitch(
     lowest = (bottom - _PITCH_SPARE) * per_angle - total - own.speed_sum
     own.balance_sum = min(highest, max(lowest, own.balance_sum))
     pitch = (total + own.balance_sum + own.speed_sum) / per_angle
-    if pitch > top:
+    if pitch > top or asked > wanted:
         own.held = 1
-    elif pitch < bottom:
+    elif pitch < bottom or asked < wanted:
         own.held = -1
     pitch = min(top, max(bottom, pitch))
     step = parameters.tecs_vertical_acceleration / own.airspeed * dt
