@@ -49,8 +49,8 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 def load_airframe(scenario: Scenario) -> Airframe:
     """The scenario's aircraft, its envelope, and the limits that both set.
 
-    Raises ScenarioError for an unknown aircraft, a speed that it cannot fly, or a wind that leaves it no way, and
-    ParameterError for a bad file of ArduPilot's parameters.
+    Raises ScenarioError for an unknown aircraft, or a speed that it cannot fly, and ParameterError for a bad file of
+    ArduPilot's parameters.
 
     >>> from world.scenario import load_scenario
     >>> airframe = load_airframe(load_scenario("tight"))
@@ -70,11 +70,6 @@ def load_airframe(scenario: Scenario) -> Airframe:
         raise ScenarioError(
             f"{scenario.name}: flight.airspeed_mps: {airspeed:g}: {aircraft.name} flies "
             f"{aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
-        )
-    if scenario.wind.speed > 0.8 * airspeed:
-        raise ScenarioError(
-            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: at most 80 % of the airspeed {airspeed:g}, "
-            "to make way on every course"
         )
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh

@@ -11,15 +11,17 @@ from flight.mission.placing import PlacedMission
 from flight.mission.routing import lay_route, make_route
 from flight.mission_files.formats import mission_text
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import simulate
-from flight.simulation.track import Track
+from flight.simulation.simulate import Progress, simulate
+from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
+from world.errors import StartError
 from world.scenario import Scenario, load_scenario
 
 # Takes how far a stage is: done, whole, a remark.
@@ -27,6 +29,8 @@ Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
 BATCH = 60
+# A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
+MOST_STORES = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +57,7 @@ class PlanThenFly:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
-    track: the rows that are recorded, all of them where there is no log.
+    track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
@@ -137,12 +141,27 @@ def fly_and_judge(
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
+
+    A flight that cannot begin, or that needs more than `MOST_STORES` times the energy carried, has no row and no log:
+    its verdict is its route's, and that it did not begin.
     """
 
     def report(done: float, whole: float) -> None:
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
 
+    needed = needed_energy(setup)
+    if needed > MOST_STORES * setup.battery:
+        return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
+    try:
+        return _fly(setup, airframe, log, report, every)
+    except StartError as error:
+        if log is not None:
+            log.unlink(missing_ok=True)
+        return _unflown(setup, f"not started: {error.reason}")
+
+
+def _fly(setup: FlightSetup, airframe: Airframe, log: Path | None, report: Progress, every: int) -> JudgedFlight:
     if log is None:
         flown = simulate(setup, airframe.aircraft, progress=report)
         return _judged(setup, flown.track, flown.ended)
@@ -153,6 +172,11 @@ def fly_and_judge(
             recorder.event(event.time, event.text, event.level)
         recorder.finish(judged.ended, judged.verdict)
     return judged
+
+
+def _unflown(setup: FlightSetup, ended: str) -> JudgedFlight:
+    """A flight without a row."""
+    return JudgedFlight(join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
 def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:

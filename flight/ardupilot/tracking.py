@@ -20,7 +20,7 @@ from flight.ardupilot.pilot import NAVIGATION_TICK, ROLL_LAG
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.kernels import Record, Records, compiled
-from world.scenario_tables import Navigation
+from world.scenario_types import Navigation
 
 Floats = NDArray[np.float64]
 

@@ -46,6 +46,9 @@ RATES = (
     *("velocities/phidot-rad_sec", "velocities/thetadot-rad_sec"),
 )
 RATE_FACTORS = np.array([FOOT] * 3 + [1.0] * 5)
+# All that acts on the aircraft but gravity, in pounds along the body's axes, and its mass in slugs.
+FORCES = tuple(f"forces/fb{axis}-total-lbs" for axis in "xyz")
+MASS = "inertia/mass-slugs"
 TERRAIN = "position/terrain-elevation-asl-ft"
 HEIGHT = "position/h-agl-ft"
 # A sphere so large that it is flat, and does not turn: the book's world, for validation.

@@ -5,6 +5,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aircraft.corridor import corridor_half_width
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.ardupilot.parameters import ArduPilotParameters
@@ -13,7 +14,7 @@ from flight.mission.items import Mission
 from flight.mission.route import Route
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +60,11 @@ class FlightSetup:
     def envelope(self) -> Envelope:
         """Table of the aircraft's climbs, descents, speeds and powers."""
         return self.limits.envelope
+
+    @property
+    def corridor(self) -> float:
+        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        return corridor_half_width(self.scenario.limits.corridor_m, None)
 
     @property
     def airspeed(self) -> float:

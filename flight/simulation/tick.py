@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 STEEPEST_BANK = math.radians(75.0)
 # What `tick` returns, and how the flight ended by then.
-COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED = 1, 2, 3, 4, 5, 6
+COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
 ENDS = {
@@ -35,6 +35,7 @@ ENDS = {
     BANKED: "departure: bank beyond 75 degrees",
     STALLED: "departure: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
+    EMPTY: "nothing is left in the battery or the tank",
 }
 _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
@@ -58,10 +59,36 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
     workspace, path: of a `flight.simulation.workspace.Workspace`.  heights: of the terrain.
     """
     work = workspace[0]
-    state, true, memory, air = work.state, work.true, work.memory, work.air
-    timing, settings = work.timing, work.settings
-    if not _to_si(state, work.state_factors):
+    state, memory, timing, settings = work.state, work.memory, work.timing, work.settings
+    if not sense(work, heights):
         return NOT_A_NUMBER
+    navigate(
+        work.true, work.estimated, work.navigation, work.noise[timing.row].navigation,
+        settings.navigation_sigma, settings.navigation_time, timing.dt,
+    )  # fmt: skip
+    pieces, nodes, waypoints = (
+        path.piece[: settings.pieces], path.node[: settings.nodes], path.waypoint[: settings.waypoints],
+    )  # fmt: skip
+    if memory.law == ARDUPILOT:
+        fly_as_ardupilot(
+            state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.parameters, work.ardupilot,
+            work.commands, timing.dt,
+        )  # fmt: skip
+    else:
+        guide(state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.commands, timing.dt)
+    finish_tick(work)
+    return flight_status(work)
+
+
+@compiled_views
+def sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
+    """Take the state to SI and to the map, and look up the ground; False where the state is no number.
+
+    Fills the state, the true motion and the place, of a record of `flight.simulation.workspace.WORKSPACE`.
+    """
+    state, true, air, settings, place = work.state, work.true, work.air, work.settings, work.place
+    if not _to_si(state, work.state_factors):
+        return False
     state.wind_north, state.wind_east = air.wind_north + air.gust_north, air.wind_east + air.gust_east
     state.wind_down = air.gust_down
     # About the local map's middle, so that a flight may cross the 180th meridian.
@@ -76,32 +103,35 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
     true.velocity_north = state.velocity_north * cos - state.velocity_east * sin
     true.velocity_up = -state.velocity_down
     column, row = polymap(work.pixel_map, true.east, true.north)
-    ground = pixel_height(heights, column, row)
-    clearance = true.up - ground
-    noise = work.noise[timing.row]
-    navigate(
-        true, work.estimated, work.navigation, noise.navigation,
-        settings.navigation_sigma, settings.navigation_time, timing.dt,
-    )  # fmt: skip
-    pieces, nodes, waypoints = (
-        path.piece[: settings.pieces], path.node[: settings.nodes], path.waypoint[: settings.waypoints],
-    )  # fmt: skip
-    if memory.law == ARDUPILOT:
-        fly_as_ardupilot(
-            state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.parameters, work.ardupilot,
-            work.commands, timing.dt,
-        )  # fmt: skip
-    else:
-        guide(state, work.estimated, pieces, nodes, waypoints, work.gains, memory, work.commands, timing.dt)
-    _blow(state, work.wind, work.gusts, noise.turbulence, clearance, true.up, cos, sin, air, timing.dt)
-    air.ground = ground if not math.isnan(ground) else air.ground
+    place.north_cos, place.north_sin = cos, sin
+    place.ground = pixel_height(heights, column, row)
+    place.clearance = true.up - place.ground
+    return True
+
+
+@compiled_views
+def finish_tick(work: Record) -> None:  # pragma: no cover - compiled
+    """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim."""
+    state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
+    cos, sin = place.north_cos, place.north_sin
+    row = work.rows[timing.row]
+    turbulence = work.noise[timing.row].turbulence
+    _blow(state, work.wind, work.gusts, turbulence, place.clearance, true.up, cos, sin, air, timing.dt)
+    air.ground = place.ground if not math.isnan(place.ground) else air.ground
     air.energy += state.power * timing.dt / 3600.0
-    _fill(work.rows[timing.row], state, true, work.commands, memory, timing.tick * timing.dt, air.energy, clearance)
-    _fill_wind(work.rows[timing.row], state, cos, sin)
+    _fill(row, state, true, work.commands, work.memory, timing.tick * timing.dt, air.energy, place.clearance)
+    _fill_wind(row, state, cos, sin)
     timing.tick += 1
     timing.row += 1
     _output(work.output, work.commands, air, work.scale_above, work.scale_below)
-    return _status(state, memory, clearance, settings.slowest)
+
+
+@compiled_views
+def flight_status(work: Record) -> int:  # pragma: no cover - compiled
+    """How the flight stands after a tick: a key of `ENDS`, or 0 to fly on."""
+    return _status(
+        work.state, work.memory, work.place.clearance, work.settings.slowest, work.air.energy >= work.settings.battery
+    )
 
 
 @compiled
@@ -116,7 +146,9 @@ def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compil
 
 
 @compiled
-def _status(state: Record, memory: Record, clearance: float, slowest: float) -> int:  # pragma: no cover
+def _status(
+    state: Record, memory: Record, clearance: float, slowest: float, empty: bool
+) -> int:  # pragma: no cover - compiled
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
@@ -126,7 +158,7 @@ def _status(state: Record, memory: Record, clearance: float, slowest: float) -> 
     if memory.done:
         near = abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR
         return COMPLETED if near else MISSED
-    return 0
+    return EMPTY if empty else 0
 
 
 @compiled

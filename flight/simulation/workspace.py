@@ -38,6 +38,13 @@ AIR = record_dtype(
     "ground",  # m, the last that was known
     "energy",  # Wh used
 )
+# What a tick finds where the aircraft is.
+PLACE = record_dtype(
+    "north_cos",  # of the map course of true north
+    "north_sin",
+    "ground",  # m AMSL, NaN where it is unknown
+    "clearance",  # m above it
+)
 MEAN_WIND = record_dtype(
     "speed",  # m/s at the reference height
     "cos",  # of the map course that it blows to
@@ -53,12 +60,14 @@ TIMING = record_dtype(
 )
 SETTINGS = record_dtype(
     "slowest",  # m/s, slower is a departure
+    "battery",  # Wh; a flight that has used as much ends
     "navigation_sigma",  # m
     "navigation_time",  # s
     "middle",  # rad, longitude of the local map's middle
     ("pieces", np.int64),  # rows of the path's table that have one
     ("nodes", np.int64),
     ("waypoints", np.int64),
+    ("on_last_leg", np.bool_),  # of a flight that another program steers, by its own account
 )
 # The i-th piece, node and waypoint of a path beside each other.
 PATH_ROW = record_dtype(("piece", PIECE), ("node", NODE), ("waypoint", WAYPOINT))
@@ -73,6 +82,7 @@ WORKSPACE = record_dtype(
     ("estimated", MOTION),
     ("commands", COMMANDS),
     ("air", AIR),
+    ("place", PLACE),
     ("wind", MEAN_WIND),
     ("gusts", GUST_FILTERS),
     ("navigation", NAVIGATION_LAGS),
@@ -104,6 +114,8 @@ class Workspace:
     path: of `PATH_ROW`, as many as there are pieces, nodes or waypoints.
     readings: (n,) the state's `READ_FIELDS`.
     output: (n,) the fields of `OUTPUT`.
+    commands: (4,) the fields of `flight.dynamics.state.COMMANDS`.
+    on_last_leg: (1,) of the workspace's settings.
     ticks_flown, rows_filled: (1,) of the workspace's timing.
     turbulence, navigation: (BLOCK_TICKS, 3) the noise of each.
     rows: (BLOCK_TICKS,) of the track.
@@ -122,9 +134,11 @@ class Workspace:
             setattr(self.record.settings, f"{name}s", len(rows))
         self.readings = self._numbers("state", len(READ_FIELDS))
         self.output = self._numbers("output", len(field_names(OUTPUT)))
+        self.commands = self._numbers("commands", len(field_names(COMMANDS)))
         # Made once: numpy takes microseconds for each field of a record that Python asks for.
         self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
         self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
+        self.on_last_leg: NDArray[np.bool_] = self.array["settings"]["on_last_leg"]
         self.turbulence: Floats = self.array["noise"]["turbulence"][0]
         self.navigation: Floats = self.array["noise"]["navigation"][0]
         self.rows: Records = self.array["rows"][0]

@@ -38,7 +38,7 @@ from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
 from world.scenario import Scenario, from_spec
 from world.scenario_file import first_error
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 from world.terrain import Terrain
 
 LOG_SCHEMA = "planfly.log/1"

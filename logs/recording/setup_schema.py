@@ -3,6 +3,7 @@
 Names carry their units.  Numbers are written as Python's repr, which reads back to the same float.
 """
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -71,6 +72,9 @@ class RouteFile(SetupModel):
     started: str
     notes: list[str]
     arcs_m: Column = []
+    endless_jump: int = -1
+    takeoff_ground_m: Finite | None = None
+    landing_ground_m: Finite | None = None
 
 
 class EnvelopeFile(SetupModel):
@@ -159,6 +163,9 @@ def route_file(route: Route) -> RouteFile:
         started=route.started,
         notes=list(route.notes),
         arcs_m=route.arcs.tolist(),
+        endless_jump=route.endless,
+        takeoff_ground_m=None if math.isnan(route.takeoff_ground) else route.takeoff_ground,
+        landing_ground_m=None if math.isnan(route.landing_ground) else route.landing_ground,
     )
 
 
@@ -183,6 +190,9 @@ def read_route(file: RouteFile, source: str) -> Route:
         started=file.started,
         notes=tuple(file.notes),
         arcs=np.array(file.arcs_m, dtype=np.float64),
+        endless=file.endless_jump,
+        takeoff_ground=math.nan if file.takeoff_ground_m is None else file.takeoff_ground_m,
+        landing_ground=math.nan if file.landing_ground_m is None else file.landing_ground_m,
     )
 
 

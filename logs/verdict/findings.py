@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from logs.verdict.places import Disagreement, Place, Suggestion
@@ -21,11 +21,29 @@ RULES = {
     "threat": "threats",
     "bounds": "bounds",
     "waypoint": "waypoints",
+    "corridor": "corridor",
     "speed": "airspeed",
+    "stall": "stall margin",
+    "takeoff": "take-off",
+    "landing": "landing",
     "energy": "energy",
     "departure": "departure",
     "completion": "completion",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A number that a rule measured and does not judge.
+
+    what: "overshoot", "settled", "bank", "radius", "height error", "slope error", "throttle at full", "throttle at
+    idle", "too slow", "too fast", "speed error", "nearest".
+    value: in ``unit``.
+    """
+
+    what: str
+    value: float
+    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +62,7 @@ class Finding:
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
     check: where a rule has several checks, which one; "" otherwise.
+    facts: what was measured beside it and is no fault.
     """
 
     rule: str
@@ -62,6 +81,7 @@ class Finding:
     brief: str = ""
     placed: bool = False
     check: str = ""
+    facts: tuple[Fact, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,10 +173,12 @@ def make_finding(
     unit: str = "",
     method: str = "",
     check: str = "",
+    facts: Sequence[Fact] = (),
 ) -> Finding:
     """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite.
 
     faults: what the reason begins with, where it begins with faults.
+    facts: measured beside it; one that is not a number is left out.
     A finding that fails by other evidence than its number has no margin: the reason says what failed.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
@@ -180,6 +202,7 @@ def make_finding(
         brief=faults[0].brief if faults else reason,
         placed=bool(faults) and faults[0].placed,
         check=check,
+        facts=tuple(replace(fact, value=round(fact.value, 6) + 0.0) for fact in facts if math.isfinite(fact.value)),
     )
 
 

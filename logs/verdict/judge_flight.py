@@ -7,18 +7,21 @@ not read.
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Prediction, Verdict
-from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only
+from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.places import Disagreement
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
 from logs.verdict.rules.completion_rule import completion_findings
+from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
+from logs.verdict.rules.stall_rule import stall_findings
+from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
 from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
 from logs.verdict.rules.waypoint_rule import waypoint_findings
@@ -31,7 +34,8 @@ __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = True, envelope: bool = True) -> Verdict:
     """Judge a flown track: level "flown".
 
-    Any track is judged, however short or damaged: what cannot be known makes it incomplete.
+    Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
+    flight that never began: its route is judged, level "geometric".
 
     ended: how the flight ended, "completed" or what stopped it.
     whole: the record has its end.
@@ -56,6 +60,8 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     'flyable'
     """
     demands = route_demands(setup, envelope=envelope)
+    if not len(track):
+        return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
     findings: tuple[Finding, ...] = (
         *turn_findings(demands, aligned),
@@ -64,7 +70,10 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
         *threat_findings(demands, aligned),
         *bounds_findings(demands, aligned),
         *waypoint_findings(demands, aligned),
+        *corridor_findings(demands, aligned),
         *speed_findings(demands, aligned),
+        *(stall_findings(demands, aligned) if envelope else ()),
+        *takeoff_landing_findings(demands),
         *energy_findings(demands, aligned),
         *departure_findings(demands, aligned),
         *completion_findings(demands, aligned, ended, whole),

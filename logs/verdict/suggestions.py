@@ -52,6 +52,8 @@ def _suggest(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding)
             return _inside(item)
         case "energy", _:
             return _less_energy(demands, item)
+        case "stall", _ if item.limit is not None:
+            return _faster(demands, item.place, item.limit)
         case "speed", Place("leg", int(leg)) if item.limit is not None and item.margin is not None:
             return _level_speeds(demands, item.place, leg)
     return ()
@@ -246,6 +248,12 @@ def _less_energy(demands: RouteDemands, item: Finding) -> tuple[Suggestion, ...]
     shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / more))), "%")
     larger = Change(store, FLIGHT, None, math.ceil(100.0 * more) / 100.0, "1")
     return (shorter,), (larger,)
+
+
+def _faster(demands: RouteDemands, place: Place, stall: float) -> tuple[Suggestion, ...]:
+    now = float(demands.setup.route.airspeed.min())
+    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED)) / 10.0
+    return ((Change("airspeed", place, now, wanted, "m/s"),),) if wanted > now else ()
 
 
 def _level_speeds(demands: RouteDemands, place: Place, leg: int) -> tuple[Suggestion, ...]:

@@ -1,5 +1,6 @@
 """The verdict in a line, and what a reader should know beside it."""
 
+import math
 from collections.abc import Sequence
 
 from flight.simulation.flight_setup import FlightSetup
@@ -19,23 +20,41 @@ _NAV = {
     "rtk": "with RTK's error (0.05 m on each axis)",
     "gnss": "with GNSS's error (1.5 m on each axis)",
 }
+# Rules whose silence the first line tells, by what they judge.
+_UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
 # What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
 _FIRST = ("departure", "completion", "mission", "slope")
 _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
 
 
 def headline(findings: Sequence[Finding], flyable: bool) -> str:
-    """First line: the answer, and what failed or was not judged."""
+    """First line: the answer, and what failed, or was not judged or only just passed."""
     if flyable:
-        terrain = [item for item in findings if item.rule == "clearance" and item.ok is None]
-        if not terrain:
-            return "flyable"
-        whole = len(terrain) == sum(item.rule == "clearance" for item in findings)
-        return "flyable; terrain not judged" if whole else f"flyable; terrain not judged on {len(terrain)} legs"
+        silent = [_not_judged(findings, rule) for rule in _UNJUDGED]
+        return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings)])
     failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
     named = _spread(failed)
     more = len(failed) - len(named)
     return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+
+
+def _not_judged(findings: Sequence[Finding], rule: str) -> str:
+    """What of a rule was not judged, in words; "" for nothing."""
+    mine = [item for item in findings if item.rule == rule]
+    silent = sum(item.ok is None for item in mine)
+    if not silent:
+        return ""
+    return f"{_UNJUDGED[rule]} not judged" + ("" if silent == len(mine) else f" on {silent} legs")
+
+
+def _by_luck(findings: Sequence[Finding]) -> list[str]:
+    """Threats that the aircraft missed by less than it may have been off, in words."""
+    out = []
+    for item in findings:
+        facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
+        if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
+            out.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
+    return out
 
 
 def _spread(failed: list[Finding]) -> list[Finding]:
@@ -98,9 +117,13 @@ def summary_lines(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    # Limits of that autopilot's own, which say nothing of the aircraft.
+    lines += [
+        f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
+    ]
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")

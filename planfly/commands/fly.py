@@ -23,5 +23,5 @@ def fly(args: argparse.Namespace) -> int:
     with progress("flying") as advance:
         flown = fly_and_judge(opened.setup, opened.airframe, target, advance, every=60 // args.log_hz)
     print_verdict(flown.verdict, opened.setup.route.notes)
-    print(f"log       {target}")
+    print(f"log       {target}" if len(flown.track) else "log       none: nothing was flown")
     return FLYABLE if flown.verdict.flyable else NOT_FLYABLE

@@ -93,7 +93,8 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
     with progress("drawing"):
         write_pictures(folder, setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)
     print_verdict(flown.verdict, setup.route.notes)
-    print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
+    flight = "flight.mcap" if len(flown.track) else "no flight"
+    print(f"results   {folder}/ (report.html, map.png, profile.png, {flight}, verdict.json, plan.json, missions)")
     return flown.verdict, True
 
 

@@ -1,7 +1,6 @@
 """An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import Algorithm, find_algorithm
+from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
@@ -55,6 +54,8 @@ SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
 QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
+# Of the airspeed: in more wind no path is searched for.
+MOST_WIND = 0.8
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
 
@@ -91,7 +92,7 @@ def plan_path(
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
-    _check_options(scenario)
+    _check_options(scenario, limits.airspeed)
     problem = make_problem(scenario, limits_for(chosen, limits))
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     # No path is further from a missile's sphere than its own ends are.
@@ -114,11 +115,6 @@ def plan_path(
     )
 
 
-def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
-    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
-    return limits if algorithm.graded else replace(limits, tracking=None)
-
-
 def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:
     """Search, and search again with finer grids and more samples while the certificate says no."""
     attempts = ATTEMPTS if search.algorithm.seeded else ATTEMPTS[:1]
@@ -138,7 +134,12 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
     return best
 
 
-def _check_options(scenario: Scenario) -> None:
+def _check_options(scenario: Scenario, airspeed: float) -> None:
+    if scenario.wind.speed > MOST_WIND * airspeed:
+        raise ScenarioError(
+            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: a path is searched for in at most"
+            f" {MOST_WIND:.0%} of the airspeed {airspeed:g}, to make way on every course"
+        )
     table = scenario.planner
     if table.population * 3 * table.waypoints > MOST_NUMBERS:
         raise ScenarioError(

@@ -17,8 +17,9 @@ import numpy as np
 
 from flight.dynamics.fdm import Fdm
 from flight.mission.from_plan import plan_mission
+from flight.simulation.airborne import FDM_HZ
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import FDM_HZ, simulate
+from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight

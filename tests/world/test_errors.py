@@ -7,9 +7,9 @@ import pytest
 import world.errors
 from planfly.cli import main
 from planfly.commands import scenarios
-from world.errors import FlightError, LogError, MissionError, PlanflyError, ScenarioError, TerrainError
+from world.errors import FlightError, LogError, MissionError, ParameterError, PlanflyError, ScenarioError, TerrainError
 
-KINDS = (ScenarioError, TerrainError, MissionError, FlightError, LogError)
+KINDS = (ScenarioError, TerrainError, MissionError, FlightError, ParameterError, LogError)
 
 
 def test_every_error_is_a_planfly_error() -> None:

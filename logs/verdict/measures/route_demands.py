@@ -43,11 +43,11 @@ class RouteDemands:
     courses, slopes: (w - 1,) rad.
     turns, tightest, radius, before, after, reversal: as of `TurnDemands`.
     blend: (w,) m of leg beyond each turn on which the slope still changes.
-    blend_deviation: (w,) m by which such a blend may pass above or below its corner.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
     turn_limit: (w,) rad, as `TurnDemands.limit`; inf where the envelope is left out.
     climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
     ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
+    envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
     """
 
     setup: FlightSetup
@@ -62,13 +62,13 @@ class RouteDemands:
     after: Floats
     reversal: Floats
     blend: Floats
-    blend_deviation: Floats
     fly_by_offset: Floats
     turn_limit: Floats
     climb: Floats
     dive: Floats
     ground_speed: Floats
     path: PlannedPath
+    envelope: bool
 
     @property
     def limits(self) -> Limits:
@@ -115,7 +115,6 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
-    blend, deviation = _blends(setup, points, runs, turning)
     return RouteDemands(
         setup=setup,
         points=points,
@@ -128,14 +127,14 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         before=turning.before,
         after=turning.after,
         reversal=turning.reversal,
-        blend=blend,
-        blend_deviation=deviation,
+        blend=_blends(setup, points, runs, turning),
         fly_by_offset=_fly_by_offsets(route, turning),
         turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
         dive=dive,
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
+        envelope=envelope,
     )
 
 
@@ -171,13 +170,13 @@ def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
     return out
 
 
-def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDemands) -> tuple[Floats, Floats]:
-    """Length of leg beside each turn on which the slope still changes, and its distance from the corner, (w,) m.
+def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDemands) -> Floats:
+    """Length of leg beside each turn on which the slope still changes, (w,) m.
 
     A parabola about each end of the arc, or about the waypoint where there is none.
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
-    blend, deviation = np.zeros(len(points)), np.zeros(len(points))
+    blend = np.zeros(len(points))
     speed = float(setup.route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
         steps = [abs(rise[i] - rise[i - 1])]
@@ -187,5 +186,4 @@ def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDeman
             on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc
             steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
         blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
-        deviation[i] = 0.25 * max(steps) * blend[i]
-    return blend, deviation
+    return blend

@@ -80,7 +80,7 @@ def fold_loiters(
         if at:
             found[found.index(at[0])] = _loiter(demands, aligned, circle, at)
             found = [item for item in found if not any(item is other for other in at[1:])]
-        for rule in ("slope", "speed", "clearance"):
+        for rule in ("slope", "speed", "clearance", "corridor"):
             mine = [item for item in found if item.rule == rule and item.place in legs]
             if len(mine) > 1:
                 worst = min(mine, key=_badness)

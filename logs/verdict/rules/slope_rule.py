@@ -2,7 +2,8 @@
 
 import math
 
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.jogs import step
 from logs.verdict.measures.leg_fits import LegFit
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
@@ -45,14 +46,24 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
     if abs(planned) <= LEVEL and not _in_envelope(demands, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL)
-    faults = [_too_steep(demands, leg, limit, source)] if abs(planned) > limit + PLAN_TOLERANCE else []
+    faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
+    if abs(planned) > limit + PLAN_TOLERANCE:
+        rise = step(demands, leg)
+        if rise is None:
+            faults.append(_too_steep(demands, leg, limit, source))
+        else:
+            facts.append(f"a step of {rise:.1f} m, beyond {math.degrees(limit):.1f}°, flown within its own height")
     faults += _steep_arc(demands, leg)
-    facts = [f"slope {math.degrees(planned):+.2f}°"]
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
         facts += _flown_facts(measure)
-        faults += _flown_faults(demands, leg, measure, limit)
+        weak = _too_weak(demands, leg, measure)
+        shown = _shown(demands, leg, measure, limit, weak)
+        # Where the aircraft's limits count they judge, and what it showed that it cannot; how closely it kept to the
+        # leg is told beside.
+        facts += [one.brief for one in shown] if demands.envelope else []
+        faults += weak if demands.envelope else [*shown, *weak]
         fit = measure.slope
         method = "not flown"
         if fit is not None:
@@ -77,6 +88,7 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
         margin=math.degrees(limit - sign * judged),
         unit="deg",
         method=method,
+        facts=_measured(demands, leg, measure),
     )
 
 
@@ -157,8 +169,21 @@ def _flown_facts(measure: SlopeMeasure) -> list[str]:
     return facts
 
 
-def _flown_faults(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit: float) -> list[Message]:
-    """What of the leg as flown is not good enough."""
+def _measured(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
+    """How the leg was flown, in numbers."""
+    if measure is None:
+        return []
+    facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
+    if measure.slope is not None:
+        off = math.degrees(measure.slope.value - float(demands.slopes[leg]))
+        facts.append(Fact("slope error", off, "deg"))
+    for name, held, off, way in _throttle_times(measure):
+        facts += [Fact(f"throttle at {name}", held, "s"), Fact(f"too {way}", off, "m/s")] if held > 0.0 else []
+    return facts
+
+
+def _shown(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]) -> list[Message]:
+    """How the leg as flown differs from the leg as planned.  weak: what it shows that the aircraft cannot."""
     faults = []
     planned = float(demands.slopes[leg])
     sign = 1.0 if planned >= 0.0 else -1.0
@@ -174,8 +199,6 @@ def _flown_faults(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit:
         if off > (OFF_HEIGHT_SHORT if measure.short else OFF_HEIGHT):
             side = "above" if measure.height_error > 0.0 else "below"
             faults.append(message(f"{off:.0f} m {side} the leg"))
-    weak = _too_weak(demands, leg, measure)
-    faults += weak
     covered = not weak and measure.ability is not None and measure.ability.covers(planned)
     most = OFF_SPEED + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
     for name, held, off, way in _throttle_times(measure):

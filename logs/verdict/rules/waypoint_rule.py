@@ -1,39 +1,76 @@
-"""The waypoint rule: how close the track came to each waypoint."""
+"""The waypoint rule: was each waypoint reached, by the radius that mission or autopilot has for it.
+
+Height has no part in it: what a height off the plan can harm is judged where it harms.
+"""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
+from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, approaches
-from logs.verdict.tolerances import EQUALLY_CLOSE, PASS, PASS_HEIGHT
+from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
 
 Floats = NDArray[np.float64]
 
 
-def waypoint_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> list[Finding]:
-    """Judge how close the track came to each waypoint."""
+def waypoint_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge how close the track came to each waypoint; ``geometric``: how close the planned path passes."""
+    if geometric:
+        return [_planned(demands, i) for i in range(len(demands.points))]
     apexes = demands.apexes()
-    return [_waypoint(demands, aligned, i, apexes) for i in range(len(demands.points))]
+    return [_flown(demands, aligned, i, apexes) for i in range(len(demands.points))]
 
 
-def _waypoint(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    offset = float(demands.fly_by_offset[i])
-    limit = offset + PASS
-    away, off, reason = math.nan, math.nan, "missed: nothing was flown"
+def _planned(demands: RouteDemands, i: int) -> Finding:
+    """Whether the fly-by arc at a waypoint passes it within what counts as reached."""
+    near, offset = reach(demands, i), float(demands.fly_by_offset[i])
+    faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
+    if demands.setup.route.fly_over[i]:
+        fact = "flown over"
+    elif offset > near.radius + ROUNDING:
+        turn, radius = math.degrees(abs(float(demands.turns[i]))), float(demands.radius[i])
+        faults.append(
+            message(
+                f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
+                f" (radius {radius:.0f} m), and {near.radius:.0f} m count as reached",
+            )
+        )
+    return make_finding(
+        "waypoint",
+        demands.waypoint(i),
+        ok=not faults,
+        reason=reason_of(faults) if faults else fact,
+        faults=faults,
+        planned=offset,
+        limit=near.radius,
+        source=near.source,
+        tolerance=ROUNDING,
+        margin=near.radius - offset,
+        unit="m",
+        method="the fly-by arc",
+    )
+
+
+def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
+    near = reach(demands, i)
+    offset, most = float(demands.fly_by_offset[i]), near.radius + near.tolerance
+    away, ok, reason = math.nan, False, "missed: nothing was flown"
+    facts: tuple[Fact, ...] = ()
     if aligned is not None:
         away, off = _closest(demands, aligned, i, float(apexes[i, 2]))
+        facts = (Fact("height error", off, "m"),)
+        ok = away <= most
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
-    height = PASS_HEIGHT + float(demands.blend_deviation[i])
-    ok = aligned is not None and away <= limit and abs(off) <= height
-    if aligned is not None and not ok:
-        reason = f"missed: {reason}; at most {limit:.0f} m and {height:.0f} m of height count as passed"
         if i > 0 and not aligned.passed[i]:
-            reason = f"missed: the flight ended {math.hypot(away, off):.0f} m away"
+            ok, reason = False, f"missed: the flight ended {math.hypot(away, off):.0f} m away"
+        elif not ok:
+            reason = f"missed: {reason}; {_counts(near)}"
     return make_finding(
         "waypoint",
         demands.waypoint(i),
@@ -41,13 +78,21 @@ def _waypoint(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexe
         reason=reason,
         planned=offset,
         flown=away,
-        limit=limit,
-        source="fly-over" if demands.setup.route.fly_over[i] else "fly-by path",
-        tolerance=0.0,
-        margin=limit - away,
+        limit=near.radius,
+        source=near.source,
+        tolerance=near.tolerance,
+        margin=near.radius - away,
         unit="m",
         method="closest approach, horizontal",
+        facts=facts,
     )
+
+
+def _counts(near: Reach) -> str:
+    """What counts as reached, in words."""
+    whose = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
+    error = f", and {near.tolerance:.1f} m for navigation and gusts," if near.tolerance else ""
+    return f"{near.radius:.0f} m{error} count as reached ({whose})"
 
 
 def _closest(demands: RouteDemands, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:

@@ -90,8 +90,8 @@ def test_both_legs_of_a_steep_arc_are_one_suggestion() -> None:
 
 
 def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
-    slow = fly_path(setup, airspeed=lambda s: 0.0 * s - 4.0, stop=6000.0)
-    verdict = judge_flight(setup, slow, "ground contact")
+    wide = fly_path(setup, across=lambda s: 0.0 * s + 35.0, stop=6000.0)
+    verdict = judge_flight(setup, wide, "ground contact")
     written = json.loads(verdict_json(verdict))
     assert written["schema"] == SCHEMA == "planfly.verdict/2"
     assert written["summary"].splitlines() == list(verdict.lines)
@@ -102,9 +102,9 @@ def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
         assert found["suggestion"] == suggestions_text(item.suggestions)
         assert found["reason"] == item.reason
     assert verdict.prediction is not None
-    differences = [Disagreement("speed", leg(k), geometric=True, flown=False) for k in range(3)]
-    assert [one for one in verdict.prediction.disagreements if one.rule == "speed"] == differences
-    texts = [f"speed at leg {k} passes by geometry and fails in flight" for k in range(3)]
+    differences = [Disagreement("corridor", leg(k), geometric=True, flown=False) for k in range(3)]
+    assert [one for one in verdict.prediction.disagreements if one.rule == "corridor"] == differences
+    texts = [f"corridor at leg {k} passes by geometry and fails in flight" for k in range(3)]
     assert [text for text in written["geometric"]["disagreements"] if text in texts] == texts
     assert len(written["geometric"]["differences"]) == len(written["geometric"]["disagreements"])
 

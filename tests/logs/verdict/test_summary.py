@@ -12,8 +12,10 @@ def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
 
 def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
     found = [failed(rule, FLIGHT, -1.0) for rule in RULES]
-    assert headline(found[-4:], False) == ("not flyable: departure (why), completion (why), speed (why), energy (why)")
-    assert headline(found, False).endswith(", +8 more")
+    assert headline(found[-4:], False) == (
+        "not flyable: departure (why), completion (why), landing (why), energy (why)"
+    )
+    assert headline(found, False).endswith(", +12 more")
     assert headline(found, False).startswith("not flyable: departure (why), completion (why), mission (why), slope (")
 
 
@@ -49,3 +51,11 @@ def test_terrain_that_was_not_judged_is_named_where_all_else_passes() -> None:
     assert headline([known], True) == "flyable"
     assert headline([known, unknown], True) == "flyable; terrain not judged on 1 legs"
     assert headline([unknown], True) == "flyable; terrain not judged"
+
+
+def test_a_take_off_or_a_landing_that_was_not_judged_is_named_too() -> None:
+    terrain = make_finding("clearance", leg(0), ok=None, reason="")
+    ends = [make_finding(rule, waypoint(0), ok=None, reason="") for rule in ("takeoff", "landing")]
+    assert headline([ends[0]], True) == "flyable; take-off not judged"
+    assert headline([terrain, *ends], True) == "flyable; terrain not judged; take-off not judged; landing not judged"
+    assert headline([make_finding("takeoff", waypoint(1), ok=True, reason="")], True) == "flyable"

@@ -1,0 +1,1 @@
+"""A real autopilot as a program of its own, flying our aircraft in our physics, wind and terrain."""

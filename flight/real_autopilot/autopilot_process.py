@@ -1,0 +1,179 @@
+"""An autopilot's program: started in a folder of its own on free ports of this machine, ended with the flight."""
+
+import contextlib
+import ctypes
+import hashlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from flight.real_autopilot.physics_port import LOOPBACK
+from world.errors import FlightError
+
+_DEFAULTS, _OUTPUT = "defaults.parm", "output.txt"
+# How fast the program may run against the clock: as fast as the physics answers.
+_SPEEDUP = 1000
+# Given to end by itself (s), so that its log is whole, before it is killed.
+_GRACE = 2.0
+_PANIC = "PANIC:"
+_PR_SET_PDEATHSIG = 1
+
+
+def check_binary(binary: Path) -> str:
+    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run."""
+    if not binary.exists():
+        raise FlightError(f"{binary}: no such file; the program of an ArduPlane for software in the loop is expected")
+    if not binary.is_file():
+        raise FlightError(f"{binary}: not a file; the program of an ArduPlane is expected")
+    if not os.access(binary, os.X_OK):
+        raise FlightError(f"{binary}: not executable (chmod +x)")
+    try:
+        return hashlib.sha256(binary.read_bytes()).hexdigest()
+    except OSError as error:
+        raise FlightError(f"{binary}: cannot be read: {error.strerror}") from error
+
+
+class AutopilotProcess:
+    """The running program; a context manager, after which neither it nor its folder is left.
+
+    binary: its file, checked by `check_binary`.
+    home: latitude and longitude (degrees), height (m AMSL) and heading (degrees) that it starts at.
+    parameters: by name, its defaults for this flight.
+    physics_port, link_port: on this machine, where it finds the physics (UDP) and us (TCP).
+
+    Raises FlightError where it cannot be started.
+    """
+
+    def __init__(
+        self,
+        binary: Path,
+        home: tuple[float, float, float, float],
+        parameters: dict[str, float],
+        physics_port: int,
+        link_port: int,
+    ) -> None:
+        self.binary = binary
+        self._folder = Path(tempfile.mkdtemp(prefix="planfly-autopilot-"))
+        try:
+            text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
+            (self._folder / _DEFAULTS).write_text(text, encoding="ascii")
+            self._process = self._spawn(home, physics_port, link_port)
+        except BaseException:
+            shutil.rmtree(self._folder, ignore_errors=True)
+            raise
+
+    def _spawn(
+        self, home: tuple[float, float, float, float], physics_port: int, link_port: int
+    ) -> "subprocess.Popen[bytes]":
+        lat, lon, amsl, heading = home
+        free = _free_ports(3)
+        command = [
+            str(self.binary.resolve()),
+            *("--model", f"JSON:{LOOPBACK}"),
+            *("--speedup", str(_SPEEDUP)),
+            *("--home", f"{lat:.9f},{lon:.9f},{amsl:.3f},{heading:.2f}"),
+            *("--base-port", str(free[0]), "-I", "0"),
+            *("--sim-port-out", str(physics_port), "--sim-port-in", str(free[1]), "--rc-in-port", str(free[2])),
+            *("--serial0", f"tcpclient:{LOOPBACK}:{link_port}"),
+            *("--wipe", "--defaults", str(self._folder / _DEFAULTS)),
+        ]
+        # By default the program stays after a panic, and turns in a loop.
+        environment = os.environ | {"SITL_PANIC_EXIT": "1"}
+        with (self._folder / _OUTPUT).open("wb") as output:
+            try:
+                return subprocess.Popen(
+                    command,
+                    cwd=self._folder,
+                    stdin=subprocess.DEVNULL,
+                    stdout=output,
+                    stderr=subprocess.STDOUT,
+                    env=environment,
+                    # Ctrl-C is ours: we end it in order.
+                    start_new_session=True,
+                    preexec_fn=_die_with_parent if sys.platform == "linux" else None,
+                )
+            except OSError as error:
+                raise FlightError(f"{self.binary}: not an executable program: {error.strerror}") from error
+
+    def __enter__(self) -> "AutopilotProcess":
+        """Return the process itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Kill the program and remove its folder."""
+        self._kill()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+    def watch(self) -> None:
+        """Raise FlightError where the program has panicked or ended, with its last words."""
+        panic = self._panic()
+        if panic:
+            raise FlightError(f"panicked: {panic}")
+        code = self._process.poll()
+        if code is None:
+            return
+        how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
+        words = self._lines()
+        raise FlightError(how + (f": {words[-1]}" if words else ""))
+
+    def end(self, answer: Callable[[], bool]) -> None:
+        """Ask the program to end, so that it closes its log; kill it where it does not.
+
+        answer: serves it a frame of physics meanwhile; false where none was asked for.
+        """
+        if self._process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.send_signal(signal.SIGTERM)
+            until = time.monotonic() + _GRACE
+            while self._process.poll() is None and time.monotonic() < until:
+                if not answer():
+                    time.sleep(0.001)
+        self._kill()
+
+    def keep_log(self, target: Path) -> bool:
+        """Move the program's own log (.BIN) to a file; whether there was one."""
+        logs = sorted((self._folder / "logs").glob("*.BIN"))
+        if not logs:
+            return False
+        shutil.move(logs[-1], target)
+        return True
+
+    def _kill(self) -> None:
+        if self._process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                self._process.kill()
+        self._process.wait()
+
+    def _lines(self) -> list[str]:
+        try:
+            text = (self._folder / _OUTPUT).read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return []
+        return [" ".join(line.split()) for line in text.splitlines() if line.strip()]
+
+    def _panic(self) -> str:
+        return next((line.partition(_PANIC)[2].strip() for line in self._lines() if _PANIC in line), "")
+
+
+def _free_ports(count: int) -> list[int]:
+    """Ports that nobody has now, for what the program opens and nobody uses."""
+    sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(count)]
+    try:
+        for opened in sockets:
+            opened.bind((LOOPBACK, 0))
+        return [int(opened.getsockname()[1]) for opened in sockets]
+    finally:
+        for opened in sockets:
+            opened.close()
+
+
+def _die_with_parent() -> None:
+    """Have the kernel kill the program when we are killed."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

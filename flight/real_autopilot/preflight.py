@@ -1,0 +1,214 @@
+"""What an autopilot is told before it flies, in order, while the physics holds the aircraft on its rail.
+
+A conversation is a generator: each time it is resumed a little more of the autopilot's time has passed, and it takes
+what has been told meanwhile.
+"""
+
+from collections.abc import Callable, Generator, Iterable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.mavlink_items import MissionType, to_message
+from flight.mission.items import Command, Frame, Home, MissionItem, command_name
+from flight.real_autopilot.autopilot_link import AutopilotLink
+from flight.real_autopilot.uploaded_mission import UploadedMission
+from world.errors import FlightError
+
+Talk = Generator[None, None, None]
+
+SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
+# ArduPlane's numbers of its modes.
+AUTO = 10
+# How long (s of its own time) an autopilot may take: to speak, to know where it is, to answer, to take a mission.
+SPEAKS, KNOWS, ANSWERS, TAKES = 30.0, 60.0, 5.0, 30.0
+# Asked for again after so long, s.
+_AGAIN = 1.0
+# Parameters that are asked for at a time: ArduPilot keeps no more than some twenty questions.
+_AT_ONCE = 10
+_EKF_NEEDED = (
+    mavlink.ESTIMATOR_ATTITUDE
+    | mavlink.ESTIMATOR_VELOCITY_HORIZ
+    | mavlink.ESTIMATOR_VELOCITY_VERT
+    | mavlink.ESTIMATOR_POS_HORIZ_ABS
+    | mavlink.ESTIMATOR_POS_VERT_ABS
+)
+_EKF_LOST = mavlink.ESTIMATOR_CONST_POS_MODE
+# Messages that are wanted, and how often, microseconds.
+_WANTED = {mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 200_000, mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 100_000}
+_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_RESULT"].items()}
+_MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_MISSION_RESULT"].items()}
+# Forces arming: what is checked before a take-off does not hold in the air.
+_FORCE = 21196
+
+
+class Preflight:
+    """The conversation with one autopilot.
+
+    link: to it.  now: its own time, s.
+    """
+
+    def __init__(self, link: AutopilotLink, now: Callable[[], float]) -> None:
+        self._link, self._now = link, now
+        self._news = link.news
+
+    def meet(self, parameters: Iterable[str]) -> Talk:
+        """Learn who it is and which of these parameters it has; raises FlightError for what is no ArduPlane."""
+        news = self._news
+        yield from self._until(lambda: news.vehicle is not None, SPEAKS, "said nothing over MAVLink", self._say_hello)
+        if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
+            raise FlightError(
+                f"is no ArduPlane: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies"
+            )
+        for message, interval in _WANTED.items():
+            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
+        self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+        self._command(mavlink.MAV_CMD_DO_SEND_BANNER)
+        names = list(parameters)
+        for k in range(0, len(names), _AT_ONCE):
+            yield from self._ask_for(names[k : k + _AT_ONCE])
+
+    def prepare(self, mission: UploadedMission) -> Talk:
+        """Wait until it knows where it is, hand over the mission, and set it on its way in AUTO.
+
+        Raises FlightError where it does not come to know, or refuses.
+        """
+        news = self._news
+        yield from self._until(
+            lambda: news.ekf & _EKF_NEEDED == _EKF_NEEDED and not news.ekf & _EKF_LOST,
+            KNOWS,
+            "did not come to know where it is (EKF)",
+            lambda: self._command(
+                mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
+                mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
+                _WANTED[mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT],
+            ),
+        )
+        yield from self._upload(mission)
+        yield from self._obeys(Command.DO_SET_HOME, lambda: self._set_home(mission.home), "home")
+        yield from self._obeys(
+            mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+            lambda: self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1, _FORCE),
+            "arming",
+        )
+        yield from self._obeys(
+            Command.DO_SET_MODE,
+            lambda: self._command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
+            "AUTO",
+        )
+        yield from self._until(lambda: news.mode == AUTO and news.armed, ANSWERS, "is not in AUTO, armed")
+
+    def _until(
+        self, done: Callable[[], bool], seconds: float, failed: str, again: Callable[[], None] | None = None
+    ) -> Talk:
+        """Wait until something holds, asking for it each second; raise FlightError where it does not come to."""
+        started = self._now()
+        asked = -_AGAIN
+        while not done():
+            waited = self._now() - started
+            if waited > seconds:
+                raise FlightError(f"{failed} within {seconds:.0f} s{self._last_text()}")
+            if again is not None and waited - asked >= _AGAIN:
+                asked = waited
+                again()
+            yield
+
+    def _last_text(self) -> str:
+        return f"; it last said: {self._news.texts[-1]}" if self._news.texts else ""
+
+    def _say_hello(self) -> None:
+        self._link.send(
+            mavlink.MAVLink_heartbeat_message(
+                mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+            )
+        )
+
+    def _command(self, command: int, *params: float) -> None:
+        numbers = [float(value) for value in (*params, *(0.0,) * (7 - len(params)))]
+        self._link.send(mavlink.MAVLink_command_long_message(SYSTEM, COMPONENT, int(command), 0, *numbers))
+
+    def _set_home(self, home: Home) -> None:
+        place = MissionItem(0, int(Command.DO_SET_HOME), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, 0.0)
+        self._link.send(
+            mavlink.MAVLink_command_int_message(
+                SYSTEM, COMPONENT, int(Frame.GLOBAL), int(Command.DO_SET_HOME), 0, 0,
+                0.0, 0.0, 0.0, 0.0, place.x, place.y, home.alt,
+            )
+        )  # fmt: skip
+
+    def _obeys(self, command: int, ask: Callable[[], None], what: str) -> Talk:
+        acknowledged = self._news.acknowledged
+        acknowledged.pop(int(command), None)
+        yield from self._until(
+            lambda: acknowledged.get(int(command)) == mavlink.MAV_RESULT_ACCEPTED,
+            ANSWERS,
+            f"refused {what} ({command_name(int(command))})",
+            ask,
+        )
+
+    def _ask_for(self, names: list[str]) -> Talk:
+        """Read parameters; those that it does not have are not answered."""
+        for name in names:
+            self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
+        started, known = self._now(), self._news.parameters
+        while not known.keys() >= set(names) and self._now() - started < _AGAIN:
+            yield
+
+    def _upload(self, mission: UploadedMission) -> Talk:
+        """Hand over the mission (MAVLink mission protocol), again while there is no space for it yet."""
+        started = self._now()
+        items = [_home_item(mission.home), *mission.items]
+        while True:
+            yield from self._offer(items)
+            result = self._news.mission_result
+            if result == mavlink.MAV_MISSION_ACCEPTED:
+                return
+            if result != mavlink.MAV_MISSION_NO_SPACE or self._now() - started > TAKES:
+                asked = self._news.requested
+                item = (
+                    ""
+                    if asked is None or asked >= len(items)
+                    else (f" at item {asked} ({command_name(items[asked].command)})")
+                )
+                name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
+                raise FlightError(f"refused the mission{item}: {name}{self._last_text()}")
+            yield from self._wait(_AGAIN)
+
+    def _offer(self, items: list[MissionItem]) -> Talk:
+        """Count, then each item that is asked for, until the upload is acknowledged or nothing more comes."""
+        news, link = self._news, self._link
+        news.requested = news.mission_result = None
+        link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), MissionType.MISSION))
+        last, answered = None, self._now()
+        while news.mission_result is None and self._now() - answered < ANSWERS:
+            if news.requested is not None and (news.requested != last or self._now() - answered > _AGAIN):
+                last, answered = news.requested, self._now()
+                if last < len(items):
+                    link.send(to_message(items[last], target_component=COMPONENT, seq=last))
+            yield
+
+    def _wait(self, seconds: float) -> Talk:
+        until = self._now() + seconds
+        while self._now() < until:
+            yield
+
+
+def _home_item(home: Home) -> MissionItem:
+    return MissionItem(
+        0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, home.lat_deg, home.lon_deg, home.alt
+    )
+
+
+def version_text(texts: list[str], number: int | None) -> str:
+    """What an autopilot calls itself: of its messages the one with its name, else of its version's number.
+
+    >>> version_text(["Initialising", "ArduPlane V4.6.0-dev (0123abcd)"], None)
+    'ArduPlane V4.6.0-dev (0123abcd)'
+    >>> version_text([], 0x040503FF)
+    'ArduPlane 4.5.3'
+    """
+    named = [text for text in texts if text.startswith("ArduPlane")]
+    if named:
+        return named[0]
+    if number is None:
+        return "ArduPlane, version unknown"
+    return f"ArduPlane {number >> 24 & 255}.{number >> 16 & 255}.{number >> 8 & 255}"

@@ -1,0 +1,194 @@
+"""An aircraft in the air, whoever steers it: its start, its ground and wind, and how long it may fly.
+
+`flight.simulation.simulate.Flight` steers it by our guidance, `flight.real_autopilot.autopilot_flight.AutopilotFlight`
+by another program.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+
+from aircraft.catalog import Aircraft
+from aircraft.path_limits import Limits, ground_speed_on
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import Trim
+from flight.guidance.fly_by_path import waypoint_records
+from flight.guidance.gains import Gains
+from flight.guidance.navigation_error import ERRORS, start_navigation
+from flight.simulation.dryden import start_gusts
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.local_map import Ground, LocalMap
+from flight.simulation.tick import ENDS
+from flight.simulation.track import Rows, join_rows, quantised
+from flight.simulation.workspace import BLOCK_TICKS, Workspace
+from world.errors import FlightError, StartError
+from world.frames import to_geo
+from world.geometry import leg_courses
+from world.random_streams import NAVIGATION, TURBULENCE, stream
+from world.wind import W20
+
+FDM_HZ = 120.0
+# A flight may take this much longer than its length over its slowest ground speed, s on top.
+PATIENCE = 1.5
+PATIENCE_SECONDS = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Where and how a route begins.
+
+    lat_deg, lon_deg: geodetic.  amsl, ground: m.
+    course: true, of the first leg, rad.  slope: of the first leg, rad.
+    airspeed: m/s, true.
+    wind: (3,) m/s, north, east, down, the way the air moves.
+    """
+
+    lat_deg: float
+    lon_deg: float
+    amsl: float
+    course: float
+    slope: float
+    airspeed: float
+    wind: tuple[float, float, float]
+    ground: float
+
+
+class Airborne(ABC):
+    """One flight in progress, advanced by `block`.
+
+    dt: of a tick, s.
+    path: that it is to follow.
+    map: from JSBSim's positions, around area and route.
+    memory: guidance's, a record of `flight.guidance.guidance_memory.GUIDANCE_MEMORY`.
+    fdm: the aircraft that flies.
+    most_ticks: after so many its time is up.
+    """
+
+    def __init__(
+        self,
+        setup: FlightSetup,
+        aircraft: Aircraft,
+        gains: Gains,
+        variation: Variation | None = None,
+        local_map: LocalMap | None = None,
+    ) -> None:
+        """Load it: local_map is the setup's where another flight of it has fitted one already."""
+        self.path = setup.path
+        self._ground = Ground(setup.scenario.terrain)
+        self.map = local_map or LocalMap.around(setup)
+        self._steps = round(FDM_HZ / setup.guidance_hz)
+        self.dt = self._steps / FDM_HZ
+        self._workspace = Workspace(gains, self.path, waypoint_records(setup.route))
+        self._work = self._workspace.record
+        self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
+        self._work.pixel_map = self._ground.to_pixel.record
+        self.memory = self._work.memory
+        self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking, variation=variation)
+        self._work.timing.dt = self.dt
+        self._work.settings.slowest = 0.94 * aircraft.stall_speed
+        self._work.settings.middle = self.map.middle
+        self._work.settings.battery = setup.battery
+        self.most_ticks = int((PATIENCE * self.path.length / _slowest_leg(setup) + PATIENCE_SECONDS) / self.dt)
+
+    @abstractmethod
+    def _fly(self, count: int) -> int:
+        """Fly up to a number of ticks into the workspace's rows; return the last one's status, 0 to fly on."""
+
+    def _disturb(self, setup: FlightSetup) -> None:
+        """Set the wind, and start turbulence and navigation's error."""
+        wind, work = setup.scenario.wind, self._work
+        to = wind.to_course
+        w20 = W20[wind.turbulence]
+        work.wind = (wind.speed, math.cos(to), math.sin(to), wind.gradient, wind.reference_amsl, w20)
+        self._windy = bool(wind.speed or wind.gradient or w20)
+        self._random = stream(wind.seed if wind.seed is not None else setup.seed, TURBULENCE)
+        start_gusts(self._random.standard_normal(5), work.gusts)
+        sigma, time_constant = ERRORS[setup.nav]
+        work.settings.navigation_sigma, work.settings.navigation_time = sigma, time_constant
+        self._navigation_random = stream(setup.seed, NAVIGATION) if sigma else None
+        if self._navigation_random is not None:
+            start_navigation(self._navigation_random.standard_normal(6), work.navigation)
+
+    def _start(self, setup: FlightSetup) -> Start:
+        """Where the route begins.  Raises StartError for a place that is not above the terrain."""
+        points = setup.route.waypoints
+        east, north, up = (float(value) for value in points[0])
+        under = self._ground.height(east, north)
+        if not math.isnan(under) and up <= under:
+            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+            raise StartError(setup.mission.source, reason)
+        lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
+        step = points[1] - points[0]
+        # A map course is the true course and this.
+        turn = self.map.convergence(lat, lon)
+        # A speed or a first slope that the aircraft cannot hold is the verdict's business, not the start's: it starts
+        # at the nearest speed it can, and level.
+        aircraft = self.fdm.aircraft
+        east_wind, north_wind = setup.scenario.wind.at(up)
+        cos, sin = math.cos(turn), math.sin(turn)
+        return Start(
+            lat_deg=lat,
+            lon_deg=lon,
+            amsl=up,
+            course=math.atan2(step[0], step[1]) - turn,
+            slope=math.atan2(step[2], math.hypot(step[0], step[1])),
+            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(setup.route.airspeed[0]))),
+            wind=(north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0),
+            ground=min(0.0, up - 1000.0) if math.isnan(under) else under,
+        )
+
+    def _trim(self, source: str, start: Start) -> Trim:
+        """Begin trimmed on the start's slope if the aircraft can hold it, else level.  Raises StartError."""
+        begin = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
+        try:
+            trimmed = self.fdm.start(*begin, start.slope, start.wind, start.ground)
+        except FlightError:
+            try:
+                trimmed = self.fdm.start(*begin, 0.0, start.wind, start.ground)
+            except FlightError as error:
+                raise StartError(source, str(error)) from error
+        self._work.commands = tuple(trimmed.commands())
+        self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
+        # All that blows is set as a gust.
+        self.fdm.set_wind(0.0, 0.0, 0.0)
+        self.fdm.set_gust(*start.wind)
+        return trimmed
+
+    def block(self, count: int) -> tuple[Rows, str]:
+        """Fly up to ``count`` ticks: their rows, and how the flight ended ("" while it goes on)."""
+        parts: list[Rows] = []
+        ended = ""
+        while count > 0 and not ended:
+            rows, ended = self._fill_workspace(min(count, BLOCK_TICKS))
+            parts.append(rows)
+            count -= BLOCK_TICKS
+        return (parts[0] if len(parts) == 1 else join_rows(parts)), ended
+
+    def _fill_workspace(self, count: int) -> tuple[Rows, str]:
+        """Fly up to ``count`` ticks, as many as the workspace has rows at most: as `block`."""
+        space = self._workspace
+        space.turbulence[:count] = self._random.standard_normal((count, 3))
+        if self._navigation_random is not None:
+            space.navigation[:count] = self._navigation_random.standard_normal((count, 3))
+        left = self.most_ticks - int(space.ticks_flown[0])
+        space.rows_filled[0] = 0
+        status = self._fly(min(count, left))
+        rows = quantised(space.rows[: space.rows_filled[0]])
+        if status:
+            return rows, ENDS[status]
+        if left <= count:
+            return rows, f"time limit: not finished after {self.most_ticks * self.dt:.0f} s"
+        return rows, ""
+
+
+def _slowest_leg(setup: FlightSetup) -> float:
+    """Least ground speed on any leg in the mean wind at its heights, m/s, at least 3."""
+    limits: Limits = setup.limits
+    points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
+    speeds = []
+    for leg, airspeed in enumerate(setup.route.airspeed):
+        table = limits.performance(float(airspeed))
+        speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
+    return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0

@@ -1,0 +1,62 @@
+"""An aircraft in the air: where its route has it start, and how long it may take."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.guidance.gains import load_gains
+from flight.simulation.airborne import PATIENCE, PATIENCE_SECONDS, Airborne
+from tests.setups import setup_maker
+from world.errors import FlightError
+
+AEROSONDE = load_aircraft("aerosonde")
+MAKE = setup_maker(AEROSONDE)
+
+
+class Gliding(Airborne):
+    """Nobody steers it."""
+
+    def _fly(self, count: int) -> int:
+        return 0
+
+
+def airborne(points: object, **keywords: object) -> Gliding:
+    setup = MAKE(points, **keywords)
+    return Gliding(setup, AEROSONDE, load_gains(AEROSONDE))
+
+
+def test_a_route_starts_at_its_first_waypoint_on_its_first_leg() -> None:
+    points = [[0.0, 0.0, 500.0], [1000.0, 1000.0, 600.0]]
+    setup = MAKE(points, wind=(6.0, 270.0))
+    start = Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._start(setup)
+    assert (start.amsl, start.ground, start.airspeed) == (500.0, 100.0, 25.0)
+    assert start.course == pytest.approx(math.pi / 4.0, abs=1e-6)
+    assert start.slope == pytest.approx(math.atan2(100.0, math.hypot(1000.0, 1000.0)))
+    # From the west: the air moves east.
+    assert start.wind == pytest.approx((0.0, 6.0, 0.0), abs=1e-6)
+
+
+def test_a_start_in_the_ground_is_refused() -> None:
+    setup = MAKE([[0.0, 0.0, 150.0], [1000.0, 0.0, 200.0]])
+    low = setup.route.waypoints - [0.0, 0.0, 51.0]
+    setup = replace(setup, route=replace(setup.route, waypoints=low))
+    with pytest.raises(FlightError, match="start at 99 m AMSL: not above the terrain, which is at 100 m"):
+        Gliding(setup, AEROSONDE, load_gains(AEROSONDE))._start(setup)
+
+
+def test_a_flight_may_take_its_length_at_its_slowest_ground_speed_and_more() -> None:
+    flight = airborne([[0.0, 0.0, 500.0], [0.0, 3000.0, 500.0]], wind=(5.0, 0.0))
+    seconds = PATIENCE * 3000.0 / 20.0 + PATIENCE_SECONDS
+    assert flight.most_ticks == pytest.approx(seconds / flight.dt, abs=60)
+
+
+def test_a_block_ends_with_the_time() -> None:
+    flight = airborne([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])
+    flight._disturb(MAKE(np.array([[0.0, 0.0, 500.0], [0.0, 300.0, 500.0]])))
+    flight.most_ticks = 0
+    rows, ended = flight.block(10)
+    assert len(rows) == 0
+    assert ended == "time limit: not finished after 0 s"
