@@ -10,8 +10,9 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
 from flight.mission.routing import lay_route, make_route
 from flight.mission_files.formats import mission_text
+from flight.simulation.airborne import Airborne
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import Progress, simulate
+from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
@@ -21,7 +22,7 @@ from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
-from world.errors import StartError
+from world.errors import FlightError, StartError
 from world.scenario import Scenario, load_scenario
 
 # Takes how far a stage is: done, whole, a remark.
@@ -57,12 +58,14 @@ class PlanThenFly:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
+    setup: with the real autopilot that flew, if one did.
     track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
     """
 
+    setup: FlightSetup
     track: Track
     ended: str
     verdict: Verdict
@@ -136,37 +139,79 @@ def make_setup(
 
 
 def fly_and_judge(
-    setup: FlightSetup, airframe: Airframe, log: Path | None, advance: Advance | None = None, *, every: int = 1
+    setup: FlightSetup,
+    airframe: Airframe,
+    log: Path | None,
+    advance: Advance | None = None,
+    *,
+    every: int = 1,
+    autopilot: Path | None = None,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
+    autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
 
     A flight that cannot begin, or that needs more than `MOST_STORES` times the energy carried, has no row and no log:
-    its verdict is its route's, and that it did not begin.
+    its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it to its
+    end; no log is left then.
     """
-
-    def report(done: float, whole: float) -> None:
-        if advance is not None:
-            advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
-
     needed = needed_energy(setup)
     if needed > MOST_STORES * setup.battery:
         return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
     try:
-        return _fly(setup, airframe, log, report, every)
+        if autopilot is None:
+            return _record_and_judge(setup, Flight(setup, airframe.aircraft), log, advance, every)
+        return _fly_program(setup, airframe, log, advance, every, autopilot)
     except StartError as error:
-        if log is not None:
-            log.unlink(missing_ok=True)
         return _unflown(setup, f"not started: {error.reason}")
 
 
-def _fly(setup: FlightSetup, airframe: Airframe, log: Path | None, report: Progress, every: int) -> JudgedFlight:
+def _fly_program(
+    setup: FlightSetup,
+    airframe: Airframe,
+    log: Path | None,
+    advance: Advance | None,
+    every: int,
+    autopilot: Path,
+) -> JudgedFlight:
+    # Imported here: nobody else needs MAVLink.
+    from flight.real_autopilot.autopilot_flight import AutopilotFlight
+
+    with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
+        flight.prepare()
+        try:
+            judged = _record_and_judge(flight.setup, flight, log, advance, every)
+        except FlightError:
+            if log is not None:
+                log.unlink(missing_ok=True)
+            raise
+        if log is not None:
+            flight.keep_log(autopilot_log(log))
+    return judged
+
+
+def autopilot_log(log: Path) -> Path:
+    """Where a real autopilot's own log is kept, beside ours.
+
+    >>> autopilot_log(Path("runs/flight.mcap")).name
+    'flight.BIN'
+    """
+    return log.with_suffix(".BIN")
+
+
+def _record_and_judge(
+    setup: FlightSetup, flight: Airborne, log: Path | None, advance: Advance | None, every: int
+) -> JudgedFlight:
+    def report(done: float, whole: float) -> None:
+        if advance is not None:
+            advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
+
     if log is None:
-        flown = simulate(setup, airframe.aircraft, progress=report)
+        flown = fly_to_end(flight, progress=report)
         return _judged(setup, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=report)
+        flown = fly_to_end(flight, recorder.write_rows, report)
         judged = _judged(setup, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
@@ -176,10 +221,10 @@ def _fly(setup: FlightSetup, airframe: Airframe, log: Path | None, report: Progr
 
 def _unflown(setup: FlightSetup, ended: str) -> JudgedFlight:
     """A flight without a row."""
-    return JudgedFlight(join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
+    return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
 def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    return JudgedFlight(track, ended, judge_flight(setup, track, ended), (event,))
+    return JudgedFlight(setup, track, ended, judge_flight(setup, track, ended), (event,))

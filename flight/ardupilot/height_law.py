@@ -39,16 +39,22 @@ def demand_height(
     parameters, own: as `flight.ardupilot.lateral_law.navigate_legs` takes them.
     """
     target = _leg_height(estimated, b, parameters, own)
+    share = dt / (dt + parameters.tecs_height_demand_time)
+    # What the aircraft cannot follow is not asked of it: the demand waits, and its rate is brought down meanwhile.
+    cannot_climb, cannot_sink = own.held > 0 and own.height_rate > 0.0, own.held < 0 and own.height_rate < 0.0
+    own.climb_share += share * ((0.0 if cannot_climb else 1.0) - own.climb_share)
+    own.sink_share += share * ((0.0 if cannot_sink else 1.0) - own.sink_share)
+    if cannot_climb:
+        target = min(target, own.height_asked)
+    if cannot_sink:
+        target = max(target, own.height_asked)
+    own.height_asked = target
     climb = parameters.tecs_climb_max * own.climb_share * dt
     sink = parameters.tecs_sink_max * own.sink_share * dt
     own.height_limited += min(climb, max(-sink, target - own.height_limited))
-    share = dt / (dt + parameters.tecs_height_demand_time)
     change = share * (own.height_limited - own.height_demand)
     own.height_demand += change
     own.height_rate = change / dt
-    # What the aircraft cannot follow is not asked of it.
-    own.climb_share += share * ((0.0 if own.held > 0 and change > 0.0 else 1.0) - own.climb_share)
-    own.sink_share += share * ((0.0 if own.held < 0 and change < 0.0 else 1.0) - own.sink_share)
 
 
 @compiled

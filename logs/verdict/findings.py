@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from logs.verdict.places import Disagreement, Place, Suggestion
 from logs.verdict.wording import disagreement_text, place_text, suggestions_text
 
@@ -110,6 +111,7 @@ class Verdict:
     notes: what is not flown as the mission has it; the lines say it too.
     leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
     it did not get to; empty where too little was recorded to tell.
+    program: of a flown verdict, the real autopilot that flew, None where none did.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -124,6 +126,7 @@ class Verdict:
     prediction: Prediction | None = None
     notes: tuple[str, ...] = ()
     leg_ends: tuple[float, ...] = ()
+    program: AutopilotProgram | None = None
 
     @property
     def headline(self) -> str:
@@ -238,6 +241,7 @@ def verdict_json(verdict: Verdict) -> str:
         "flyable": verdict.flyable,
         "complete": verdict.complete,
         "summary": verdict.summary,
+        "flown_by": None if verdict.program is None else asdict(verdict.program),
         "geometric": None if verdict.prediction is None else _prediction_data(verdict.prediction),
         "findings": [_finding_data(finding) for finding in verdict.findings],
     }

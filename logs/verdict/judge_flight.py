@@ -85,7 +85,7 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     prediction = _predict(demands, findings) if envelope else None
     lines = summary_lines(findings, flyable, setup, "flown", prediction)
     ends = () if aligned is None else aligned.leg_ends()
-    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes, ends)
+    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes, ends, setup.program)
 
 
 def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:

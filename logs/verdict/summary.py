@@ -2,13 +2,17 @@
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import RULES, Finding, Prediction
 from logs.verdict.wording import disagreement_text, place_text, shortened
 
 # Failed findings that the first line names.
 _NAMED = 4
+# Changed parameters of a real autopilot that its line names.
+_CHANGED = 8
 _UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
 _GUIDANCE = {
     "path": "planfly's guidance on the fly-by path",
@@ -139,12 +143,24 @@ def summary_lines(
 def flown_by(setup: FlightSetup) -> str:
     """Who steers, in words: planfly's guidance or ArduPlane, with the parameters that decide most of its flight."""
     parameters = setup.parameters
+    if setup.program is not None:
+        return _program_text(setup.program, setup.aircraft)
     if parameters is None:
         return _GUIDANCE[setup.guidance]
     whose = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
     return (
         f"ArduPlane's law with {whose} (WP_RADIUS {parameters.wp_radius:g} m,"
         f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
+    )
+
+
+def _program_text(program: AutopilotProgram, aircraft: str) -> str:
+    """A real autopilot in words; every parameter stands in the verdict's data."""
+    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
+    more = f", +{len(changed) - _CHANGED} more" if len(changed) > _CHANGED else ""
+    return (
+        f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:_CHANGED]) or 'none'}{more}"
     )
 
 

@@ -20,11 +20,12 @@ from planfly.terminal.argument_types import (
     time_or_stations,
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
-from planfly.terminal.parser_options import (
+from planfly.terminal.shared_options import (
     flown_by_options,
     overwrite_option,
     own_link_options,
     pilot_options,
+    program_option,
     steering_options,
     world_options,
 )
@@ -89,6 +90,7 @@ def _add_run_and_plan(command: _Command) -> None:
         help="where it does not fly, tighten and try again, up to N times",
     )
     steering_options(run)
+    program_option(run)
     overwrite_option(run)
     # Names and summaries only: what they stand for is imported with the command.
     from planner.search.algorithms import algorithm_lines
@@ -157,6 +159,7 @@ def _add_export_and_fly(command: _Command) -> None:
         help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is that of these rows",
     )  # fmt: skip
     steering_options(fly)
+    program_option(fly)
     overwrite_option(fly)
 
 
