@@ -55,9 +55,9 @@ def demand_height(
     climb = parameters.tecs_climb_max * own.climb_share * dt
     sink = parameters.tecs_sink_max * own.sink_share * dt
     own.height_limited += min(climb, max(-sink, target - own.height_limited))
-    change = share * (own.height_limited - own.height_demand)
-    own.height_demand += change
-    own.height_rate = change / dt
+    behind = own.height_limited - own.height_demand
+    own.height_demand += share * behind
+    own.height_rate = behind / max(dt, parameters.tecs_height_demand_time)
 
 
 @compiled
