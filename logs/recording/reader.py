@@ -18,7 +18,6 @@ from mcap.records import Channel, Schema
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.attachment_names import BESIDE_FILE, RECOVERY_FILE, RESULT_FILE, SETUP_FILE, VERDICT_FILE
-from logs.recording.beside_attachment import unpack_beside
 from logs.recording.chunk_layout import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.foxglove_scene import LEVELS
 from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream
@@ -38,6 +37,7 @@ from logs.recording.state_channel import (
     parse_row,
     state_class,
 )
+from logs.verdict.beside_file import parse_beside
 from logs.verdict.levels import FlownBeside
 from world.errors import LogError
 
@@ -268,7 +268,7 @@ def _beside(attachments: dict[str, bytes]) -> tuple[FlownBeside | None, str]:
     if BESIDE_FILE not in attachments:
         return None, ""
     try:
-        return unpack_beside(attachments[BESIDE_FILE], BESIDE_FILE), ""
+        return parse_beside(attachments[BESIDE_FILE], BESIDE_FILE), ""
     except LogError as error:
         return None, str(error)
 

@@ -22,7 +22,6 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
 from logs.recording.attachment_names import BESIDE_FILE, RESULT_FILE, VERDICT_FILE, media_type
-from logs.recording.beside_attachment import pack_beside
 from logs.recording.chunk_layout import (
     CHUNK,
     NOT_INCREASING,
@@ -48,6 +47,7 @@ from logs.recording.state_channel import (
     state_schema,
     times_ns,
 )
+from logs.verdict.beside_file import beside_json
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.levels import FlownBeside
 
@@ -198,7 +198,7 @@ class Recorder:
         end = max(self._last_ns, EPOCH_NS)
         self._write([self._poses.whole(end)])
         if beside is not None:
-            self._attach(BESIDE_FILE, pack_beside(beside), end)
+            self._attach(BESIDE_FILE, beside_json(beside).encode(), end)
         if verdict is not None:
             self._attach(VERDICT_FILE, verdict_json(verdict).encode(), end)
         result = {

@@ -12,7 +12,7 @@ from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
 from logs.verdict.levels import AirframeAnswer, FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
 from logs.verdict.places import Disagreement, Place
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
@@ -75,22 +75,7 @@ def judge_flight(
     if not len(track):
         return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
-    findings: tuple[Finding, ...] = (
-        *turn_findings(demands, aligned),
-        *slope_findings(demands, aligned),
-        *clearance_findings(demands, aligned),
-        *threat_findings(demands, aligned),
-        *bounds_findings(demands, aligned),
-        *waypoint_findings(demands, aligned),
-        *corridor_findings(demands, aligned),
-        *speed_findings(demands, aligned),
-        *(stall_findings(demands, aligned) if envelope else ()),
-        *takeoff_landing_findings(demands),
-        *energy_findings(demands, aligned),
-        *departure_findings(demands, aligned),
-        *completion_findings(demands, aligned, ended, whole),
-    )
-    findings = fold_loiters(demands, aligned, findings)
+    findings = _flown_findings(demands, aligned, ended, whole, envelope)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
     findings = with_suggestions(demands, aligned, findings)
@@ -111,6 +96,28 @@ def judge_flight(
         leg_ends=ends,
         program=setup.program,
     )
+
+
+def _flown_findings(
+    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
+) -> tuple[Finding, ...]:
+    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
+    findings = (
+        *turn_findings(demands, aligned),
+        *slope_findings(demands, aligned),
+        *clearance_findings(demands, aligned),
+        *threat_findings(demands, aligned),
+        *bounds_findings(demands, aligned),
+        *waypoint_findings(demands, aligned),
+        *corridor_findings(demands, aligned),
+        *speed_findings(demands, aligned),
+        *(stall_findings(demands, aligned) if envelope else ()),
+        *takeoff_landing_findings(demands),
+        *energy_findings(demands, aligned),
+        *departure_findings(demands, aligned),
+        *completion_findings(demands, aligned, ended, whole),
+    )
+    return fold_loiters(demands, aligned, findings)
 
 
 def _other_levels(

@@ -49,7 +49,15 @@ def headline(findings: Sequence[Finding], flyable: bool) -> str:
 
 
 def first_failed(findings: Sequence[Finding]) -> Finding | None:
-    """The failed finding that the first line names first; None where nothing failed."""
+    """The failed finding that the first line names first; None where nothing failed.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import FLIGHT
+    >>> findings = [make_finding(rule, FLIGHT, ok=False, reason="") for rule in ("energy", "completion")]
+    >>> first = first_failed(findings)
+    >>> first.rule
+    'completion'
+    """
     failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
     return _spread(failed)[0] if failed else None
 
@@ -137,7 +145,7 @@ def summary_lines(
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
-    lines = [own.headline, *_whose_fault(levels, deciding)]
+    lines = [own.headline, *_whose_fault(levels, deciding, tried=setup.program is None)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
@@ -159,13 +167,18 @@ def summary_lines(
     return tuple(lines)
 
 
-def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None) -> list[str]:
-    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides."""
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, tried: bool) -> list[str]:
+    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides.
+
+    tried: whether other parameters were flown.
+    """
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe"):
         return []
-    why = "no single parameter that was tried would pass" if deciding is None else deciding_text(deciding)
-    return [f"The aircraft can, ArduPlane with these parameters cannot: {why}"]
+    why = ": no single parameter that was tried would pass" if tried else ""
+    if deciding is not None:
+        why = f": {deciding_text(deciding)}"
+    return [f"The aircraft can, ArduPlane with these parameters cannot{why}"]
 
 
 def flown_by(setup: FlightSetup) -> str:

@@ -1,7 +1,6 @@
 """An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import Algorithm, find_algorithm
+from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
@@ -114,11 +113,6 @@ def plan_path(
         history=np.array(search.history).reshape(-1, 3),
         ended=search.ended,
     )
-
-
-def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
-    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
-    return limits if algorithm.graded else replace(limits, tracking=None)
 
 
 def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:

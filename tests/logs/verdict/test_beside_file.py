@@ -8,9 +8,9 @@ import pytest
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.beside_attachment import pack_beside, unpack_beside
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
+from logs.verdict.beside_file import beside_json, parse_beside
 from logs.verdict.levels import AirframeAnswer, DecidingParameter, FlownBeside
 from logs.verdict.places import Place
 from world.errors import LogError
@@ -27,7 +27,7 @@ BESIDE = [
 
 @pytest.mark.parametrize("beside", BESIDE)
 def test_it_reads_back(beside: FlownBeside) -> None:
-    assert unpack_beside(pack_beside(beside), "a.mcap") == beside
+    assert parse_beside(beside_json(beside), "a.mcap") == beside
 
 
 @pytest.mark.parametrize("beside", [None, *BESIDE])
@@ -41,7 +41,7 @@ def test_a_log_carries_it(tmp_path: Path, setup: FlightSetup, track: Track, besi
 
 
 def changed(**fields: Any) -> bytes:
-    return json.dumps(json.loads(pack_beside(BESIDE[3])) | fields).encode()
+    return json.dumps(json.loads(beside_json(BESIDE[3])) | fields).encode()
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def changed(**fields: Any) -> bytes:
 )
 def test_what_does_not_fit_is_refused_in_a_line(data: bytes, said: str) -> None:
     with pytest.raises(LogError) as refused:
-        unpack_beside(data, "a.mcap")
+        parse_beside(data, "a.mcap")
     assert str(refused.value).startswith(said)
     assert "\n" not in str(refused.value)
 
@@ -66,4 +66,4 @@ def test_a_rule_that_there_is_not_is_refused() -> None:
     place = {"kind": "leg", "index": 1, "item": None, "name": ""}
     airframe = {"flyable": False, "headline": "", "failed": [["juggling", place]]}
     with pytest.raises(LogError, match="'juggling' is no rule"):
-        unpack_beside(changed(airframe=airframe), "a.mcap")
+        parse_beside(changed(airframe=airframe), "a.mcap")

@@ -1,4 +1,4 @@
-"""What other flights had to say of a recorded one, as an attachment of its log: its bytes, and back.
+"""What other flights had to say of a recorded one, as the text of an attachment of its log, and back.
 
 A log's verdict is worked out anew from its rows; the flights beside it are not in it, and their answers are kept.
 """
@@ -7,9 +7,8 @@ import json
 from dataclasses import asdict
 from typing import Annotated
 
-from pydantic import Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from logs.recording.setup_schema import Finite, SetupModel
 from logs.verdict.findings import RULES
 from logs.verdict.levels import AirframeAnswer, DecidingParameter, FlownBeside
 from logs.verdict.places import Place, PlaceKind
@@ -18,8 +17,14 @@ from world.scenario_file import first_error
 
 BESIDE_SCHEMA = "planfly.beside/1"
 
+_Number = Annotated[float, Field(allow_inf_nan=False)]
 
-class _Place(SetupModel):
+
+class _Table(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+
+
+class _Place(_Table):
     kind: PlaceKind
     index: int | None
     item: int | None
@@ -29,7 +34,7 @@ class _Place(SetupModel):
         return Place(self.kind, self.index, self.item, self.name)
 
 
-class _Airframe(SetupModel):
+class _Airframe(_Table):
     flyable: bool
     headline: str
     failed: list[tuple[str, _Place]]
@@ -39,40 +44,44 @@ class _Airframe(SetupModel):
         return AirframeAnswer(self.flyable, self.headline, failed)
 
 
-class _Deciding(SetupModel):
+class _Deciding(_Table):
     name: str
-    current: Finite
-    passing: Finite
+    current: _Number
+    passing: _Number
     unit: str
     rule: str
     place: _Place
-    off: Finite | None
+    off: _Number | None
 
     def parameter(self) -> DecidingParameter:
         place = self.place.place()
         return DecidingParameter(self.name, self.current, self.passing, self.unit, self.rule, place, self.off)
 
 
-class _Beside(SetupModel):
+class _Beside(_Table):
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{BESIDE_SCHEMA}$")] = BESIDE_SCHEMA
     airframe: _Airframe | None
     deciding: _Deciding | None
 
 
-def pack_beside(beside: FlownBeside) -> bytes:
-    """Write the answers as the bytes of an attachment.
+def beside_json(beside: FlownBeside) -> str:
+    """Write the answers as text.
 
     >>> beside = FlownBeside(AirframeAnswer(True, "flyable"))
-    >>> unpack_beside(pack_beside(beside), "a.mcap") == beside
+    >>> parse_beside(beside_json(beside), "a.mcap") == beside
     True
     """
-    return (json.dumps({"schema": BESIDE_SCHEMA, **asdict(beside)}, indent=1, allow_nan=False) + "\n").encode()
+    return json.dumps({"schema": BESIDE_SCHEMA, **asdict(beside)}, indent=1, allow_nan=False) + "\n"
 
 
-def unpack_beside(data: bytes, source: str) -> FlownBeside:
-    """Read the answers of an attachment.  Raises LogError, in one line, for what does not fit; source names the log."""
+def parse_beside(text: str | bytes, source: str) -> FlownBeside:
+    """Read the answers of a text.  Raises LogError, in one line, for what does not fit; source names it.
+
+    >>> parse_beside('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
+    FlownBeside(airframe=None, deciding=None)
+    """
     try:
-        file = _Beside.model_validate_json(data)
+        file = _Beside.model_validate_json(text)
     except ValidationError as error:
         raise LogError(f"{source}: {first_error(error)}") from error
     airframe, deciding = file.airframe, file.deciding
