@@ -1,18 +1,21 @@
 """Plans as missions: waypoints come back from either file form, and corners have their acceptance radius."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import item_problem
 from flight.mission.routing import make_route
 from flight.mission_files.formats import mission_text, parse_mission
 from tests.mission_lines import a_plan
 from world.scenario import load_scenario
+from world.scenario_variants import with_wind
 
 
 @settings(max_examples=40, deadline=None)
@@ -49,3 +52,18 @@ def test_a_corner_has_its_fly_by_offset_as_acceptance() -> None:
     terrain = load_scenario("jacksboro").terrain
     assert terrain is not None
     assert exported.home.alt == pytest.approx(float(terrain.height(0.0, 0.0)), abs=0.001)
+
+
+def test_a_corner_has_the_acceptance_that_its_autopilot_strays_least_with() -> None:
+    """Of a table that is 100 m a radian and 2 m for each m/s over 25: at 60 degrees, 25.8 m/s at 700 m, 106.4 m."""
+    turns, speeds = np.meshgrid(TURNS, SPEED_SHARES * 25.0, indexing="ij")
+    acceptance = 15.0 + 100.0 * turns + 2.0 * (speeds - 25.0)
+    nothing = np.zeros(turns.shape)
+    error = TrackingError(25.0, acceptance, nothing, nothing, nothing, across=0.0, up=0.0, lag=3.0, step=15.0)
+    corner = [(0.0, 0.0, 700.0), (0.0, 1000.0, 700.0), (866.0, 1500.0, 700.0)]
+    exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0), tracking=error)
+    assert [item.params[1] for item in exported.items] == [25.0, 15.0, 121.0, 15.0]
+    windy = replace(a_plan(corner), scenario=with_wind(load_scenario("jacksboro"), 8.0, math.radians(240.0), None))
+    # On the second leg, at 60 degrees, the wind is from behind: 33.8 m/s.
+    blown = plan_mission(windy, 25.0, math.radians(30.0), tracking=error)
+    assert blown.items[2].params[1] == pytest.approx(15.0 + 104.7 + 2.0 * 8.85, abs=1.0)
