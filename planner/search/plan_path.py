@@ -16,7 +16,8 @@ from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.algorithms import find_algorithm
+from planner.search.limits_for import limits_for
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
