@@ -261,7 +261,18 @@ def _parameters(
                 return Parameter(definition.name, values[definition.name], origin)
         return Parameter(definition.name, definition.default, "default")
 
-    return ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
+    made = ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
+    if stated:
+        _check_order(made, source or AIRCRAFT_FILE)
+    return made
+
+
+def _check_order(made: ArduPilotParameters, source: str) -> None:
+    """Refuse a least that is not below its most."""
+    values = {name: value for name, value, _ in made.values}
+    for least, most in (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX")):
+        if values[least] >= values[most]:
+            raise ParameterError(f"{source}: {least} {values[least]:g}: must be below {most} {values[most]:g}")
 
 
 # Definition and factor to its unit, by each name that a file may have.

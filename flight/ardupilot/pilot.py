@@ -78,6 +78,7 @@ def _begin(
     """Take over in steady flight at the first waypoint."""
     own.begun = True
     own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
+    own.height_asked = estimated.up
     own.height_limited = estimated.up
     own.height_demand = estimated.up
     own.climb_share, own.sink_share = 1.0, 1.0

@@ -20,14 +20,14 @@ from flight.ardupilot.pilot import NAVIGATION_TICK, ROLL_LAG
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import ERRORS, MOTION
 from world.kernels import Record, Records, compiled
-from world.scenario_tables import Navigation
+from world.scenario_types import Navigation
 
 Floats = NDArray[np.float64]
 
 # A corner counts as left where the aircraft stays this near to the next leg (m) for so long (s).
 _SETTLED, _STAYS = 2.0, 8.0
-# From a corner the legs reach this far, m, and flights begin and end so much nearer.
-_LEG, _SHORTER = 4000.0, 1000.0
+# From a corner the legs reach this far, m; flights end there at the latest, and begin so far before they may turn.
+_LEG, _BEFORE = 4000.0, 200.0
 # Acceptances that are tried: so many, and again about the best.
 _TRIED, _ROUNDS = 9, 2
 # Least acceptance, m: that of a straight leg, which navigation and gusts leave it far inside.
@@ -80,6 +80,8 @@ def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -
     _fill(record, airspeed, TURNS, speeds, fly_over, tables, np.zeros(3, WAYPOINT))
     share, more = WIND_SPREAD
     tables[1] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    # Plans are the same on every machine, and a library's sines are not.
+    tables = tables.round(2)
     tables.setflags(write=False)
     return tables[0], tables[1], tables[2], tables[3]
 
@@ -135,16 +137,22 @@ def _fly_corner(
     waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn, acceptance, fly_over
     waypoints[2].east, waypoints[2].north = _LEG * east, _LEG * north
     own.from_north = -_LEG
-    estimated.north = _SHORTER - _LEG if acceptance > 600.0 else -acceptance - 200.0
-    course, bank, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < _LEG - _SHORTER and clock < 120.0:
+    # Between two of its looks the waypoint comes within the acceptance: in the middle, which is what they come to.
+    tick = speed * NAVIGATION_TICK
+    estimated.north = -acceptance - (math.floor(_BEFORE / tick) + 0.5) * tick
+    lag = ROLL_LAG * parameters.roll_time
+    left = math.exp(-NAVIGATION_TICK / lag)
+    course, side, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG and clock < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate_legs(estimated, waypoints, parameters, own, 1.0, NAVIGATION_TICK)
-        wanted = roll_demand(own.side_acceleration, 0.0, airspeed, parameters)
-        bank += (wanted - bank) * min(1.0, NAVIGATION_TICK / (ROLL_LAG * parameters.roll_time))
-        course += GRAVITY * math.tan(bank) / speed * NAVIGATION_TICK
-        estimated.east += estimated.velocity_east * NAVIGATION_TICK
-        estimated.north += estimated.velocity_north * NAVIGATION_TICK
+        wanted = GRAVITY * math.tan(roll_demand(own.side_acceleration, 0.0, airspeed, parameters))
+        # The lag to the letter, and the way on the mean course.
+        turned = (wanted * NAVIGATION_TICK + (side - wanted) * lag * (1.0 - left)) / speed
+        side = wanted + (side - wanted) * left
+        estimated.east += tick * math.sin(course + 0.5 * turned)
+        estimated.north += tick * math.cos(course + 0.5 * turned)
+        course += turned
         clock += NAVIGATION_TICK
         along = estimated.east * east + estimated.north * north
         away = math.hypot(estimated.east, estimated.north)

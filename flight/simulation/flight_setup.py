@@ -12,9 +12,10 @@ from flight.ardupilot.parameters import ArduPilotParameters
 from flight.guidance.fly_by_path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
+from flight.simulation.autopilot_program import AutopilotProgram
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +35,7 @@ class FlightSetup:
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
     parameters: of the ArduPlane that flies; None where planfly's guidance does.
+    program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
     path: that is to be followed, of route and limits.
     """
 
@@ -50,6 +52,7 @@ class FlightSetup:
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
     parameters: ArduPilotParameters | None = None
+    program: AutopilotProgram | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

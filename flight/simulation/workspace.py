@@ -135,6 +135,7 @@ class Workspace:
         self.readings = self._numbers("state", len(READ_FIELDS))
         self.output = self._numbers("output", len(field_names(OUTPUT)))
         self.commands = self._numbers("commands", len(field_names(COMMANDS)))
+        self._true, self._estimated = (self._numbers(name, len(field_names(MOTION))) for name in ("true", "estimated"))
         # Made once: numpy takes microseconds for each field of a record that Python asks for.
         self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
         self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
@@ -142,6 +143,11 @@ class Workspace:
         self.turbulence: Floats = self.array["noise"]["turbulence"][0]
         self.navigation: Floats = self.array["noise"]["navigation"][0]
         self.rows: Records = self.array["rows"][0]
+
+    def navigation_error(self) -> list[float]:
+        """The estimated motion less the true one: the fields of `flight.guidance.navigation_error.MOTION`."""
+        error: list[float] = (self._estimated - self._true).tolist()
+        return error
 
     def _numbers(self, field: str, count: int) -> Floats:
         """The first numbers of a field, as an array that shares its memory."""

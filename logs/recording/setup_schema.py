@@ -14,6 +14,7 @@ from aircraft.envelope import Envelope
 from flight.ardupilot.parameters import ArduPilotParameters, Origin, stored_parameters
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
+from flight.simulation.autopilot_program import AutopilotProgram
 from world.errors import LogError, ParameterError
 from world.geometry import leg_runs
 
@@ -103,6 +104,16 @@ class ParametersFile(SetupModel):
     origins: dict[str, Origin]
     unused: list[str]
     source: str
+
+
+class ProgramFile(SetupModel):
+    """An `AutopilotProgram` as a table."""
+
+    version: str
+    sha256: str
+    parameters: dict[str, Finite]
+    changed: dict[str, Finite]
+    unused: list[str]
 
 
 def _item_file(item: MissionItem) -> _Item:
@@ -269,3 +280,19 @@ def read_parameters(file: ParametersFile, source: str) -> ArduPilotParameters:
         return stored_parameters(values, tuple(file.unused), file.source)
     except ParameterError as error:
         raise LogError(f"{source}: parameters.values: {error}") from error
+
+
+def program_file(program: AutopilotProgram) -> ProgramFile:
+    """Write which autopilot flew as a table."""
+    return ProgramFile(
+        version=program.version,
+        sha256=program.sha256,
+        parameters=dict(program.parameters),
+        changed=dict(program.changed),
+        unused=list(program.unused),
+    )
+
+
+def read_program(file: ProgramFile) -> AutopilotProgram:
+    """Read which autopilot flew."""
+    return AutopilotProgram(file.version, file.sha256, file.parameters, file.changed, tuple(file.unused))

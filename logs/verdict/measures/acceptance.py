@@ -76,7 +76,9 @@ def corridor_limit(demands: RouteDemands, leg: int) -> tuple[float, str]:
     if demands.setup.scenario.limits.corridor_m is not None:
         return half, "scenario"
     turning = float(corner_depths(demands)[leg : leg + 2].max()) + PASS
-    return (turning, "fly-by path") if turning > half else (half, "default")
+    if turning > half:
+        return turning, "fly-by path"
+    return half, "default" if demands.setup.parameters is None else "autopilot"
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:

@@ -61,7 +61,7 @@ def _never_ends(demands: RouteDemands, usable: float) -> Message:
     while begin > 0 and route.items[begin] != route.items[last]:
         begin -= 1
     one = sum(leg_energies(demands)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
-    lasts = f": the energy that may be used lasts for {usable / one:.0f} of its rounds" if one > 0.0 else ""
+    lasts = f": the energy lasts for {usable / one:.0f} rounds" if one > 0.0 else ""
     return message(f"the jump of item {route.endless} has no end{lasts}")
 
 
