@@ -71,7 +71,7 @@ def limits_at(mutant: Mutant) -> list[str]:
 def _users(names: list[str]) -> list[str]:
     """Modules that read one of some limits."""
     pattern = re.compile(rf"\b({'|'.join(names)})\b")
-    return [file for file, text in _sources().items() if file.startswith("logs/") and pattern.search(text)]
+    return [file for file, text in _sources().items() if file.startswith("logs/verdict/") and pattern.search(text)]
 
 
 @cache
