@@ -25,6 +25,7 @@ def test_every_default() -> None:
             "max_climb_deg": "aircraft",
             "max_dive_deg": "aircraft",
             "min_clearance_m": 30.0,
+            "corridor_m": None,
         },
         "planner": {
             "algorithm": None,
