@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
 from aircraft.path_limits import Limits
 from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
+from flight.ardupilot.tracking import tracking_error
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.flight_setup import make_limits
 from world.errors import ScenarioError
@@ -73,6 +74,9 @@ def load_airframe(scenario: Scenario) -> Airframe:
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
     limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
+    if parameters is not None:
+        tracking = tracking_error(parameters, airspeed, table.steering.nav, fly_over=table.fly_over)
+        limits = replace(limits, tracking=tracking)
     return Airframe(aircraft, limits, battery, parameters)
 
 
@@ -80,4 +84,4 @@ def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     """An airframe within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
-    return replace(airframe, limits=limits)
+    return replace(airframe, limits=replace(limits, tracking=old.tracking))

@@ -17,7 +17,8 @@ ARDUPILOT_MEMORY = record_dtype(
     "side_acceleration",  # m/s^2 to the right, as last demanded
     "roll_demand",  # rad
     # Height.
-    "height_limited",  # m, the height asked for within its rate limits
+    "height_asked",  # m, of the leg, or as it was when the aircraft could follow it no longer
+    "height_limited",  # m, the same within its rate limits
     "height_demand",  # m, and after its lag
     "height_rate",  # m/s, of the height demand
     "climb_share",  # 0..1, of the greatest rates that are demanded

@@ -89,7 +89,7 @@ DEFINITIONS = {
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
-class Parameter(NamedTuple):
+class ParameterValue(NamedTuple):
     """A parameter's value in ArduPlane's unit, and who states it."""
 
     name: str
@@ -121,7 +121,7 @@ class ArduPilotParameters:
     rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
     """
 
-    values: tuple[Parameter, ...]
+    values: tuple[ParameterValue, ...]
     unused: tuple[str, ...] = ()
     source: str = ""
     navl1_period: float = field(init=False)
@@ -255,13 +255,24 @@ def _parameters(
 ) -> ArduPilotParameters:
     """Parameters of the first source that states each, and ArduPlane's default where none does."""
 
-    def found(definition: Definition) -> Parameter:
+    def found(definition: Definition) -> ParameterValue:
         for origin, values in stated:
             if definition.name in values:
-                return Parameter(definition.name, values[definition.name], origin)
-        return Parameter(definition.name, definition.default, "default")
+                return ParameterValue(definition.name, values[definition.name], origin)
+        return ParameterValue(definition.name, definition.default, "default")
 
-    return ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
+    made = ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
+    if stated:
+        _check_order(made, source or AIRCRAFT_FILE)
+    return made
+
+
+def _check_order(made: ArduPilotParameters, source: str) -> None:
+    """Refuse a least that is not below its most."""
+    values = {name: value for name, value, _ in made.values}
+    for least, most in (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX")):
+        if values[least] >= values[most]:
+            raise ParameterError(f"{source}: {least} {values[least]:g}: must be below {most} {values[most]:g}")
 
 
 # Definition and factor to its unit, by each name that a file may have.

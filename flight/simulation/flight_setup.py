@@ -67,7 +67,8 @@ class FlightSetup:
     @property
     def corridor(self) -> float:
         """Half width of the corridor about the legs that the flight has to stay in, m."""
-        return corridor_half_width(self.scenario.limits.corridor_m, None)
+        radius = None if self.parameters is None else self.parameters.wp_radius
+        return corridor_half_width(self.scenario.limits.corridor_m, radius)
 
     @property
     def airspeed(self) -> float:

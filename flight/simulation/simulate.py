@@ -2,10 +2,11 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 from aircraft.catalog import Aircraft
+from flight.ardupilot.pilot import true_by_equivalent
 from flight.dynamics.fdm import Fdm, LoopAccess, Variation
 from flight.dynamics.trim import straight
 from flight.guidance.fly_by_path import FlyByPath
@@ -135,6 +136,10 @@ class Flight(Airborne):
         reference: airspeed at which the gains hold, m/s.
         """
         start = self._start(setup)
+        if setup.parameters is not None:
+            # ArduPlane takes over in level flight, and knows equivalent airspeeds alone.
+            true = start.airspeed * true_by_equivalent(start.amsl)
+            start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true))
         level = straight(model, reference, start.amsl)
         if level is None:
             raise StartError(setup.aircraft, f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL")

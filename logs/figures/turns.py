@@ -33,6 +33,7 @@ _PANELS = (
     ("slope", "leg", "slope\n(°)"),
     ("clearance", "leg", "least height above\nground (m)"),
     ("waypoint", "waypoint", "passed at\n(m)"),
+    ("corridor", "leg", "farthest from\nthe legs (m)"),
 )
 
 
@@ -50,8 +51,9 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
 
 
 def draw_turns(name: str, verdict: Verdict) -> Figure:
-    """Panels of turns, slopes, clearances and waypoints: bars for the plan, dots for the flight, dashes for limits.
+    """Panels of turns, slopes, clearances, waypoints and corridor.
 
+    Bars stand for the plan, dots for the flight, dashes for limits.
     What fails is ringed and its number is written in the same colour.
     """
     shown = [(*panel, values) for panel in _PANELS if (values := place_values(verdict.findings, panel[0]))]

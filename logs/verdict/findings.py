@@ -7,10 +7,11 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from flight.simulation.autopilot_program import AutopilotProgram
-from logs.verdict.places import Disagreement, Place, Suggestion
-from logs.verdict.wording import disagreement_text, place_text, suggestions_text
+from logs.verdict.levels import DecidingParameter, LevelAnswer
+from logs.verdict.places import Place, Suggestion
+from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
 
-SCHEMA = "planfly.verdict/2"
+SCHEMA = "planfly.verdict/3"
 
 # Each rule and its title, in the order in which a verdict lists them.
 RULES = {
@@ -24,7 +25,7 @@ RULES = {
     "waypoint": "waypoints",
     "corridor": "corridor",
     "speed": "airspeed",
-    "stall": "stall margin",
+    "stall": "stall",
     "takeoff": "take-off",
     "landing": "landing",
     "energy": "energy",
@@ -86,18 +87,6 @@ class Finding:
 
 
 @dataclass(frozen=True, slots=True)
-class Prediction:
-    """What the geometric level says of a mission that was flown.
-
-    headline: its answer in a line.  disagreements: the findings that the two levels judge differently.
-    """
-
-    flyable: bool
-    headline: str
-    disagreements: tuple[Disagreement, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Verdict:
     """Whether a plan really flies.
 
@@ -107,7 +96,9 @@ class Verdict:
     lines: the summary for a person, of which the first, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
-    prediction: of a flown verdict, what the geometric level says beside it.
+    levels: what each level says that was asked, geometry first, the verdict's own last; none of a plan that was not
+    flown.
+    deciding: the autopilot's parameter that decides, where the flight fails by one and the aircraft passes.
     notes: what is not flown as the mission has it; the lines say it too.
     leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
     it did not get to; empty where too little was recorded to tell.
@@ -123,7 +114,8 @@ class Verdict:
     complete: bool
     lines: tuple[str, ...]
     level: str
-    prediction: Prediction | None = None
+    levels: tuple[LevelAnswer, ...] = ()
+    deciding: DecidingParameter | None = None
     notes: tuple[str, ...] = ()
     leg_ends: tuple[float, ...] = ()
     program: AutopilotProgram | None = None
@@ -233,7 +225,7 @@ def verdict_json(verdict: Verdict) -> str:
     >>> finding = make_finding("turn", Place("waypoint", 1, item=2), ok=True, reason="turns 30.0°", planned=30.0)
     >>> written = json.loads(verdict_json(Verdict((finding,), True, True, ("flyable",), "flown")))
     >>> written["schema"], written["summary"], written["findings"][0]["where"], written["findings"][0]["place"]["index"]
-    ('planfly.verdict/2', 'flyable', 'waypoint 1 (item 2)', 1)
+    ('planfly.verdict/3', 'flyable', 'waypoint 1 (item 2)', 1)
     """
     data: dict[str, Any] = {
         "schema": SCHEMA,
@@ -242,20 +234,26 @@ def verdict_json(verdict: Verdict) -> str:
         "complete": verdict.complete,
         "summary": verdict.summary,
         "flown_by": None if verdict.program is None else asdict(verdict.program),
-        "geometric": None if verdict.prediction is None else _prediction_data(verdict.prediction),
+        "levels": [_level_data(level) for level in verdict.levels],
+        "deciding_parameter": None if verdict.deciding is None else _deciding_data(verdict.deciding),
         "findings": [_finding_data(finding) for finding in verdict.findings],
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def _prediction_data(prediction: Prediction) -> dict[str, Any]:
-    differing = prediction.disagreements
+def _level_data(level: LevelAnswer) -> dict[str, Any]:
+    differing = level.disagreements
     return {
-        "flyable": prediction.flyable,
-        "headline": prediction.headline,
+        "name": level.name,
+        "flyable": level.flyable,
+        "headline": level.headline,
         "disagreements": [disagreement_text(one) for one in differing],
         "differences": [asdict(one) for one in differing],
     }
+
+
+def _deciding_data(deciding: DecidingParameter) -> dict[str, Any]:
+    return {**asdict(deciding), "text": deciding_text(deciding)}
 
 
 def _finding_data(finding: Finding) -> dict[str, Any]:

@@ -4,13 +4,16 @@ What guidance noted about itself (leg, cross-track, height error, clearance) and
 not read.
 """
 
+from collections.abc import Mapping
+
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Prediction, Verdict
+from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
+from logs.verdict.levels import AirframeAnswer, FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import lay_track
-from logs.verdict.places import Disagreement
+from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from logs.verdict.places import Disagreement, Place
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
 from logs.verdict.rules.completion_rule import completion_findings
@@ -31,7 +34,15 @@ from logs.verdict.summary import headline, summary_lines
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 
 
-def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = True, envelope: bool = True) -> Verdict:
+def judge_flight(
+    setup: FlightSetup,
+    track: Track,
+    ended: str,
+    *,
+    whole: bool = True,
+    envelope: bool = True,
+    beside: FlownBeside | None = None,
+) -> Verdict:
     """Judge a flown track: level "flown".
 
     Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
@@ -41,6 +52,7 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     whole: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and
     the scenario's numbers alone.
+    beside: what other flights have to say of this one.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -63,7 +75,34 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     if not len(track):
         return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
-    findings: tuple[Finding, ...] = (
+    findings = _flown_findings(demands, aligned, ended, whole, envelope)
+    complete = all(item.ok is True for item in findings if item.rule == "completion")
+    flyable = complete and not any(item.ok is False for item in findings)
+    findings = with_suggestions(demands, aligned, findings)
+    others = _other_levels(demands, findings, None if beside is None else beside.airframe) if envelope else ()
+    own = LevelAnswer("airframe" if setup.parameters is None else "autopilot", flyable, headline(findings, flyable))
+    deciding = None if beside is None or flyable else beside.deciding
+    lines = summary_lines(findings, setup, "flown", (*others, own), deciding)
+    ends = () if aligned is None else aligned.leg_ends()
+    return Verdict(
+        findings,
+        flyable,
+        complete,
+        lines,
+        "flown",
+        levels=(*others, own),
+        deciding=deciding,
+        notes=setup.route.notes,
+        leg_ends=ends,
+        program=setup.program,
+    )
+
+
+def _flown_findings(
+    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
+) -> tuple[Finding, ...]:
+    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
+    findings = (
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
@@ -78,24 +117,32 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
         *departure_findings(demands, aligned),
         *completion_findings(demands, aligned, ended, whole),
     )
-    findings = fold_loiters(demands, aligned, findings)
-    complete = all(item.ok is True for item in findings if item.rule == "completion")
-    flyable = complete and not any(item.ok is False for item in findings)
-    findings = with_suggestions(demands, aligned, findings)
-    prediction = _predict(demands, findings) if envelope else None
-    lines = summary_lines(findings, flyable, setup, "flown", prediction)
-    ends = () if aligned is None else aligned.leg_ends()
-    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes, ends, setup.program)
+    return fold_loiters(demands, aligned, findings)
 
 
-def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:
-    """What the geometric level says, and where it and the flight differ."""
+def _other_levels(
+    demands: RouteDemands, flown: tuple[Finding, ...], airframe: AirframeAnswer | None
+) -> tuple[LevelAnswer, ...]:
+    """What geometry says, and the airframe where it was flown beside, and where each differs from the flight."""
     predicted = geometric_findings(demands)
-    judged = {(item.rule, item.place): item.ok for item in flown}
-    disagreements = []
-    for item in predicted:
-        other = judged.get((item.rule, item.place))
-        if item.ok is not None and other is not None and item.ok != other:
-            disagreements.append(Disagreement(item.rule, item.place, item.ok, other))
     flyable = not any(item.ok is False for item in predicted)
-    return Prediction(flyable, headline(predicted, flyable), tuple(disagreements))
+    outcomes = {(item.rule, item.place): item.ok for item in predicted}
+    levels = [LevelAnswer("geometry", flyable, headline(predicted, flyable), _differing("geometry", outcomes, flown))]
+    if airframe is not None:
+        outcomes = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
+        differing = _differing("airframe", outcomes, flown)
+        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
+    return tuple(levels)
+
+
+def _differing(
+    level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
+) -> tuple[Disagreement, ...]:
+    """Where a level and the flight judge differently, in the level's order."""
+    judged = {(item.rule, item.place): item.ok for item in flown}
+    out = []
+    for (rule, place), there in outcomes.items():
+        here = judged.get((rule, place))
+        if there is not None and here is not None and there != here:
+            out.append(Disagreement(rule, place, level, there, here))
+    return tuple(out)

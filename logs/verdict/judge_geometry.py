@@ -4,6 +4,7 @@ import math
 
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
+from logs.verdict.levels import LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.places import FLIGHT, PLAN
 from logs.verdict.rules.bounds_rule import bounds_findings
@@ -69,8 +70,9 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     )
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
-    lines = summary_lines(findings, flyable, setup, "geometric")
-    return Verdict(findings, flyable, complete, lines, "geometric", notes=setup.route.notes)
+    levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
 
 
 def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> Verdict:
@@ -89,8 +91,9 @@ def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> V
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )
     findings = (*with_suggestions(demands, None, geometric_findings(demands)), stopped)
-    lines = summary_lines(findings, False, setup, "geometric")
-    return Verdict(findings, False, False, lines, "geometric", notes=setup.route.notes)
+    levels = (LevelAnswer("geometry", False, headline(findings, False)),)
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes)
 
 
 def judge_plan_only(plan: Plan) -> Verdict:

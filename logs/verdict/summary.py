@@ -6,8 +6,9 @@ from pathlib import Path
 
 from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import RULES, Finding, Prediction
-from logs.verdict.wording import disagreement_text, place_text, shortened
+from logs.verdict.findings import RULES, Finding
+from logs.verdict.levels import DecidingParameter, LevelAnswer
+from logs.verdict.wording import deciding_text, disagreement_text, place_text, shortened
 
 # Failed findings that the first line names.
 _NAMED = 4
@@ -23,6 +24,11 @@ _NAV = {
     "perfect": "exact",
     "rtk": "with RTK's error (0.05 m on each axis)",
     "gnss": "with GNSS's error (1.5 m on each axis)",
+}
+# How the other levels are introduced.
+_LEVELS = {
+    "geometry": "By geometry alone",
+    "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 # Rules whose silence the first line tells, by what they judge.
 _UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
@@ -40,6 +46,20 @@ def headline(findings: Sequence[Finding], flyable: bool) -> str:
     named = _spread(failed)
     more = len(failed) - len(named)
     return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+
+
+def first_failed(findings: Sequence[Finding]) -> Finding | None:
+    """The failed finding that the first line names first; None where nothing failed.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import FLIGHT
+    >>> findings = [make_finding(rule, FLIGHT, ok=False, reason="") for rule in ("energy", "completion")]
+    >>> first = first_failed(findings)
+    >>> first.rule
+    'completion'
+    """
+    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
+    return _spread(failed)[0] if failed else None
 
 
 def _not_judged(findings: Sequence[Finding], rule: str) -> str:
@@ -114,10 +134,18 @@ def _numbers(item: Finding) -> str:
 
 
 def summary_lines(
-    findings: Sequence[Finding], flyable: bool, setup: FlightSetup, level: str, prediction: Prediction | None = None
+    findings: Sequence[Finding],
+    setup: FlightSetup,
+    level: str,
+    levels: Sequence[LevelAnswer],
+    deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Lines of the summary: the answer; how the flight started; what was not judged; what is not flown as written."""
-    lines = [headline(findings, flyable)]
+    """Lines of the summary: the answer; whose fault it is; the start; what was not judged; what the levels say.
+
+    levels: the verdict's own last, with the headline.
+    """
+    *others, own = levels
+    lines = [own.headline, *_whose_fault(levels, deciding, tried=setup.program is None)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
@@ -135,9 +163,22 @@ def summary_lines(
         lines.append(f"Flown by: {flown_by(setup)}; navigation {_NAV[setup.nav]}")
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
-    if prediction is not None:
-        lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
+    lines += [f"{_LEVELS[other.name]}: {other.headline}; {_agreement(other)}" for other in others]
     return tuple(lines)
+
+
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, tried: bool) -> list[str]:
+    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides.
+
+    tried: whether other parameters were flown.
+    """
+    answers = {level.name: level.flyable for level in levels}
+    if answers.get("autopilot") is not False or not answers.get("airframe"):
+        return []
+    why = ": no single parameter that was tried would pass" if tried else ""
+    if deciding is not None:
+        why = f": {deciding_text(deciding)}"
+    return [f"The aircraft can, ArduPlane with these parameters cannot{why}"]
 
 
 def flown_by(setup: FlightSetup) -> str:
@@ -181,9 +222,10 @@ def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
     ]
 
 
-def _agreement(prediction: Prediction) -> str:
-    differing = prediction.disagreements
+def _agreement(other: LevelAnswer) -> str:
+    """Where the verdict and another level differ, in words."""
+    differing = other.disagreements
     if not differing:
-        return "flight and geometry agree on every finding"
+        return "flight and geometry agree on every finding" if other.name == "geometry" else "both flights agree"
     more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
     return "; ".join(map(disagreement_text, differing[:_NAMED])) + more

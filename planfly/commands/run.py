@@ -85,7 +85,8 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
     """Write a plan and its mission, and fly it if it is feasible: the verdict, and whether it was flown."""
     folder, airframe = task.folder, task.airframe
     write_whole(folder / "plan.json", plan_json(plan))
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints")
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints", tracking=tracking)
     write_missions(mission, [folder / "mission.waypoints", folder / "mission.plan"])
     if not plan.feasible:
         verdict = judge_plan_only(plan)

@@ -134,19 +134,16 @@ def score_path(
         if drop + aside < 0.01 or not (low or close):
             continue
         if strays:
-            # Within the excursion of the legs, on either side, and as low as the lower of the legs is flown.
             vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
-            below = below_at(lags[i], 0.0), below_at(lags[i], min(1.0, corners[i].after / max(legs[i].run, 1e-6)))
-            more = max(0.0, below[0], below[1]) + bounds.steepest * aside
-            least = max(0.0, -below[0], -below[1])
+            below, above = _lag_about(lags[i], legs[i], corners[i])
+            more, spare = below + bounds.steepest * aside, margin + aside
         else:
             vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
-            below, more, least = (0.0, 0.0), 0.0, 0.0
+            below, above, more, spare = 0.0, 0.0, 0.0, margin
         if low:
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
-            spare = margin + aside if strays else margin
-            kill += _corner_kill(missiles, spare, vertices, max(0.0, below[0], below[1]), least)
+            kill += _corner_kill(missiles, spare, vertices, below, above)
     objectives.length_ratio = length / limits.straight_distance
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
 
@@ -224,6 +221,13 @@ def _measure_flown(
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = radius, drop, aside
         flown[i].missile_distance = aside + drop if aside + drop <= CORNER_TOLERANCE else 0.0
         extents[i] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * blend
+
+
+@compiled_views
+def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+    """How far below and above the legs a flight may be about a corner, m; lag, leg: of the leg after it."""
+    here, settled = below_at(lag, 0.0), below_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
+    return max(0.0, here, settled), max(0.0, -here, -settled)
 
 
 @compiled_views

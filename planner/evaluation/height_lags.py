@@ -38,8 +38,8 @@ def lag_length(
     along = ground_speed(aircraft.airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
     # Where the wind leaves no way there is no plan either.
     along = aircraft.airspeed if math.isnan(along) else along
-    length: float = max(1e-6, tracking.lag * (along + faster_by(tracking, amsl)))
-    return length
+    length: float = tracking.lag * (along + faster_by(tracking, amsl))
+    return max(1e-6, length)
 
 
 @compiled_views

@@ -45,13 +45,12 @@ def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
     measure_legs(waypoints, legs)
     measure_corners(data, wind, waypoints, legs, corners)
     measure_lags(data.tracking, data.aircraft, wind, waypoints, legs, lags)
-    out = np.zeros((count - 1) * (len(_CUTS) + 1) + 2 * count, dtype=STRAYED_PIECE)
+    out = np.zeros((count - 1) * (len(_CUTS) + 3) + 2 * count, dtype=STRAYED_PIECE)
     made = 0
     for i in range(count - 1):
-        share = 0.0
-        for k in range(len(_CUTS) + 1):
-            after = min(1.0, _CUTS[k] / lags[i].decay) if k < len(_CUTS) else 1.0
-            if after <= share and k > 0:
+        cuts, share = _cuts(lags[i].decay, legs[i].run), 0.0
+        for after in cuts:
+            if after <= share:
                 continue
             piece = out[made]
             _cut(waypoints[i], waypoints[i + 1], share, after, piece)
@@ -78,6 +77,17 @@ def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
                 _set_below(lags[i], 0.0, min(1.0, corners[i].after / max(1e-6, legs[i].run)), piece)
             made += 1
     return out[:made]
+
+
+@compiled
+def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
+    """Shares of a leg at which its pieces end, increasing; the last is 1."""
+    cuts = np.ones(len(_CUTS) + 3)
+    for k in range(len(_CUTS)):
+        cuts[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
+    end = min(1.0, _ENDS / max(1e-9, run))
+    cuts[len(_CUTS)], cuts[len(_CUTS) + 1] = end, 1.0 - end
+    return np.sort(cuts)
 
 
 @compiled

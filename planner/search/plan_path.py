@@ -17,6 +17,7 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
+from planner.search.limits_for import limits_for
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
@@ -83,8 +84,7 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
     progress: called with generations done, generations in all, and a short text.
-    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
-    the plan.
+    stop: asked between generations; a text ("interrupted") ends the search with the best path yet, and stands in it.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path of the same ends and number of waypoints to start from.
@@ -93,7 +93,7 @@ def plan_path(
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
     _check_options(scenario, limits.airspeed)
-    problem = make_problem(scenario, limits)
+    problem = make_problem(scenario, limits_for(chosen, limits))
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     # No path is further from a missile's sphere than its own ends are.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))

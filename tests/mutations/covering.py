@@ -10,8 +10,8 @@ from tests.mutations.mutant import ROOT, Mutant
 
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 # Beside the tests of its own name: where what a room's modules do shows.
-ROOM_TESTS = {
-    "limits": ("tests/logs/verdict",),
+ROOM_TESTS: dict[str, tuple[str, ...]] = {
+    "limits": (),
     "rules": ("tests/logs/verdict",),
     "measures": ("tests/logs/verdict",),
     "physics": ("tests/flight/simulation/test_tick.py", "tests/flight/dynamics/test_fdm.py"),
@@ -21,7 +21,12 @@ ROOM_TESTS = {
 def covering_tests(mutant: Mutant) -> list[str]:
     """Test files and folders, those of the module's own name first: the first failure ends the run."""
     if mutant.room == "limits":
-        own = [test for module in _users(limits_at(mutant)) for test in _own_tests(module)]
+        # A limit's pair of cases stands with a module that reads it, or with a rule that uses that module.
+        users = _users(limits_at(mutant))
+        rules = [
+            rule for user in users for rule in sorted(_importers()[user]) if rule.startswith("logs/verdict/rules/")
+        ]
+        own = [test for module in (*users, *rules) for test in _own_tests(module)]
     else:
         own = _own_tests(mutant.file)
     rest = [place for place in ROOM_TESTS[mutant.room] if (ROOT / place).exists()]
@@ -48,7 +53,8 @@ def kernels_on(mutant: Mutant) -> list[str]:
 def _own_tests(file: str) -> list[str]:
     """Tests of a module's name: tests/logs/verdict/rules/test_slope_rule.py, and test_slope_rule_limits.py."""
     path = Path(file)
-    folder = ROOT / "tests" / path.parent
+    # An aircraft's model stands in a folder of its own, its tests in that of all aircraft.
+    folder = ROOT / "tests" / (path.parent if path.suffix == ".py" else path.parent.parent)
     return [str(found.relative_to(ROOT)) for found in sorted(folder.glob(f"test_{path.stem}*.py"))]
 
 
@@ -65,7 +71,7 @@ def limits_at(mutant: Mutant) -> list[str]:
 def _users(names: list[str]) -> list[str]:
     """Modules that read one of some limits."""
     pattern = re.compile(rf"\b({'|'.join(names)})\b")
-    return [file for file, text in _sources().items() if file.startswith("logs/") and pattern.search(text)]
+    return [file for file, text in _sources().items() if file.startswith("logs/verdict/") and pattern.search(text)]
 
 
 @cache

@@ -7,11 +7,14 @@ from itertools import accumulate
 from tests.mutations.mutant import ROOT, Mutant
 
 LIMITS = "logs/verdict/tolerances.py"
-# A limit times this, and divided by it: what a pair of cases some per cent inside and outside must notice.
+# A limit times this, and divided by it: what a pair of cases some per cent inside and outside must notice.  A count is
+# one more, and one less.
 STEP = 1.3
 # Of bounds on garbage, condition numbers and rounding only the order of magnitude matters.
 ORDERS = 1000.0
-BY_ORDERS = ("FARTHEST", "FASTEST", "MOST_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CELLS")
+BY_ORDERS = ("FARTHEST", "FASTEST", "MOST_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CHORD_TIME", "FAR")
+# Where a number decides how much is computed: one way nothing changes but time.  The other way is tried.
+ONE_WAY = {"CHORD_TIME": "*", "FAR": "/", "TRIES": "-"}
 
 _COMPARISONS = {ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "=="}
 _SIGNS: dict[type[ast.operator], tuple[str, str]] = {
@@ -35,10 +38,16 @@ def limit_mutants() -> list[Mutant]:
             continue
         names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
         factor = ORDERS if any(name in BY_ORDERS for name in names) else STEP
+        ways = {ONE_WAY[name] for name in names if name in ONE_WAY}
         for number in ast.walk(node.value):
             # A name or a key is no number, nor is what calm air adds to one.
-            if isinstance(number, ast.Constant) and isinstance(number.value, int | float) and number.value:
-                found += [source.mutant(number, f"({number.value!r} {sign} {factor})") for sign in "*/"]
+            if not isinstance(number, ast.Constant) or not isinstance(number.value, int | float) or not number.value:
+                continue
+            whole = isinstance(number.value, int)
+            signs = ways or set("+-" if whole else "*/")
+            found += [
+                source.mutant(number, f"({number.value!r} {sign} {1 if whole else factor})") for sign in sorted(signs)
+            ]
     return found
 
 

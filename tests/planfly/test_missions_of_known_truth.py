@@ -57,7 +57,6 @@ CASES = {
         (SPEED.format(17), *(wp(*place, 700) for place in ((0, 0), (0, 1500), (1500, 1500), (1500, 0)))),
         False,
         ("stall",),
-        ("slope", "stall", "turn"),
     ),
     "18.5 m/s with right angles": Case(
         (SPEED.format(18.5), *(wp(*place, 700) for place in ((0, 0), (0, 1500), (1500, 1500), (1500, 0)))), True

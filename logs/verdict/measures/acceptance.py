@@ -6,6 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.ardupilot.lateral_law import turn_distance
+from flight.ardupilot.pilot import true_by_equivalent
 from flight.guidance.navigation_error import ERRORS
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.route_demands import RouteDemands
@@ -30,11 +32,22 @@ class Reach:
 
 
 def reach(demands: RouteDemands, i: int) -> Reach:
-    """What counts as having reached waypoint i: the mission's own radius, else that of whoever flies."""
+    """What counts as having reached waypoint i: the mission's own radius, else that of whoever flies.
+
+    ArduPlane turns to the next leg at WP_RADIUS from a right angle or a sharper corner and at a share of it from a
+    gentler one, and at the mission's end at all of it.
+    """
     setup, own = demands.setup, float(demands.fly_by_offset[i]) + PASS
     stated = float(setup.route.acceptance[i])
+    tolerance = position_error(setup) + CLOSER[setup.scenario.wind.turbulence]
     if stated > 0.0:
-        return Reach(stated, "mission", position_error(setup) + CLOSER[setup.scenario.wind.turbulence])
+        return Reach(stated, "mission", tolerance)
+    if setup.parameters is not None:
+        factor = float(true_by_equivalent(float(demands.points[i, 2])))
+        turn = abs(float(demands.turns[i])) if 0 < i < demands.legs else math.pi
+        return Reach(
+            float(turn_distance(0.0, turn, setup.parameters.wp_radius, math.inf, factor)), "autopilot", tolerance
+        )
     return Reach(own, "fly-over" if setup.route.fly_over[i] else "fly-by path", 0.0)
 
 
@@ -63,7 +76,9 @@ def corridor_limit(demands: RouteDemands, leg: int) -> tuple[float, str]:
     if demands.setup.scenario.limits.corridor_m is not None:
         return half, "scenario"
     turning = float(corner_depths(demands)[leg : leg + 2].max()) + PASS
-    return (turning, "fly-by path") if turning > half else (half, "default")
+    if turning > half:
+        return turning, "fly-by path"
+    return half, "default" if demands.setup.parameters is None else "autopilot"
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:

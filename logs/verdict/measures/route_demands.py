@@ -1,12 +1,13 @@
 """What a route asks of the aircraft and what the aircraft's limits are: the planned side of every finding."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits, PerformanceTable, aircraft_slopes, ground_speed_on
+from flight.ardupilot.pilot import true_by_equivalent
 from flight.guidance.fly_by_path import FlyByPath, path_polyline
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
@@ -36,6 +37,8 @@ class PlannedPath:
 class RouteDemands:
     """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
 
+    route: the setup's, with true airspeeds where an autopilot takes those that are commanded for equivalent ones.
+
     For w waypoints:
 
     points: (w, 3) m.
@@ -51,6 +54,7 @@ class RouteDemands:
     """
 
     setup: FlightSetup
+    route: Route
     points: Floats
     runs: Floats
     courses: Floats
@@ -107,7 +111,7 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
 
     envelope: False leaves the aircraft's limits out, for flown evidence alone.
     """
-    route, limits = setup.route, setup.limits
+    route, limits = true_route(setup), setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     tables = performance_tables(route, limits)
     turning = turn_demands(route, tables)
@@ -117,6 +121,7 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
     return RouteDemands(
         setup=setup,
+        route=route,
         points=points,
         runs=runs,
         courses=courses,
@@ -127,7 +132,7 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         before=turning.before,
         after=turning.after,
         reversal=turning.reversal,
-        blend=_blends(setup, points, runs, turning),
+        blend=_blends(setup, route, points, runs, turning),
         fly_by_offset=_fly_by_offsets(route, turning),
         turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
@@ -136,6 +141,15 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,
     )
+
+
+def true_route(setup: FlightSetup) -> Route:
+    """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height."""
+    route = setup.route
+    if setup.parameters is None:
+        return route
+    middle = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
+    return replace(route, airspeed=route.airspeed * [float(true_by_equivalent(up)) for up in middle])
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
@@ -170,14 +184,14 @@ def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
     return out
 
 
-def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDemands) -> Floats:
+def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnDemands) -> Floats:
     """Length of leg beside each turn on which the slope still changes, (w,) m.
 
     A parabola about each end of the arc, or about the waypoint where there is none.
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
     blend = np.zeros(len(points))
-    speed = float(setup.route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
+    speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
         steps = [abs(rise[i] - rise[i - 1])]
         arc = turning.radius[i] * abs(turning.turns[i])

@@ -114,7 +114,7 @@ def _steep_arc(demands: RouteDemands, leg: int) -> list[Message]:
 
 def _in_envelope(demands: RouteDemands, leg: int) -> bool:
     low, high = demands.setup.envelope.level_speeds(float(demands.points[leg, 2]))
-    return low <= float(demands.setup.route.airspeed[leg]) <= high
+    return low <= float(demands.route.airspeed[leg]) <= high
 
 
 def _too_steep(demands: RouteDemands, leg: int, limit: float, source: str) -> Message:
@@ -132,7 +132,7 @@ def _allowed(demands: RouteDemands, leg: int, limit: float, source: str) -> str:
     """The limit on a leg's slope, in words, and what the wind has to do with it."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
-    speed = float(demands.setup.route.airspeed[leg])
+    speed = float(demands.route.airspeed[leg])
     up = float(max(demands.points[leg, 2], demands.points[leg + 1, 2]))
     at = f"at {speed:.0f} m/s and {up:.0f} m"
     if limit <= 0.0:
@@ -221,7 +221,7 @@ def _too_weak(demands: RouteDemands, leg: int, measure: SlopeMeasure) -> list[Me
     if ability.slope - abs(planned) >= -SHOWN_TOLERANCE - SURE * ability.error:
         return []
     verb = "climb" if planned >= 0.0 else "sink"
-    speed = float(demands.setup.route.airspeed[leg])
+    speed = float(demands.route.airspeed[leg])
     return [
         message(
             f"in {ability.seconds:.0f} s at {_throttle(planned)} throttle the aircraft showed that it can {verb}"

@@ -33,9 +33,11 @@ def speed_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geome
 
 
 def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    commanded = float(demands.setup.route.airspeed[leg])
+    commanded = float(demands.route.airspeed[leg])
     slowest, fastest, faults = _commanded(demands, leg, commanded)
-    said = [f"{commanded:.1f} m/s commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
+    asked = float(demands.setup.route.airspeed[leg])
+    true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+    said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
     said += _no_room(demands, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
@@ -78,7 +80,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
 
 def _no_room(demands: RouteDemands, leg: int, commanded: float) -> list[str]:
     """What a leg has no room for: to take up its speed at `ACCELERATION` from that of the leg before."""
-    before = float(demands.setup.route.airspeed[leg - 1]) if leg else commanded
+    before = float(demands.route.airspeed[leg - 1]) if leg else commanded
     change, run = commanded - before, float(demands.runs[leg])
     seconds = abs(change) / ACCELERATION
     # Along the ground at the mean of both speeds, in the wind along the leg.

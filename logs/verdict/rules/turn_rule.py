@@ -105,7 +105,7 @@ def _too_sharp(demands: RouteDemands, i: int, planned: float, limit: float, sour
     sharp = f"turns {math.degrees(planned):.1f}°"
     if source == "scenario":
         return message(f"{sharp}, beyond the scenario's {math.degrees(limit):.1f}°")
-    speed, bank = float(max(demands.setup.route.airspeed[i - 1 : i + 1])), math.degrees(demands.limits.max_bank)
+    speed, bank = float(max(demands.route.airspeed[i - 1 : i + 1])), math.degrees(demands.limits.max_bank)
     radius = float(demands.radius[i])
     if not math.isfinite(radius):
         return message(f"{sharp} where the wind leaves no way along a leg at {speed:.0f} m/s")

@@ -1,6 +1,8 @@
 """The waypoint rule: was each waypoint reached, by the radius that mission or autopilot has for it.
 
-Height has no part in it: what a height off the plan can harm is judged where it harms.
+ArduPlane also takes a waypoint as reached, and turns to the next leg, when it is past the line across the leg at its
+end, however far to the side; flown by its law, that counts where it is within the corridor.  Height has no part in the
+rule: what a height off the plan can harm is judged where it harms.
 """
 
 import math
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.measures.track_alignment import AlignedTrack, approaches
+from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
 
 Floats = NDArray[np.float64]
@@ -31,6 +33,8 @@ def _planned(demands: RouteDemands, i: int) -> Finding:
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
     if demands.setup.route.fly_over[i]:
         fact = "flown over"
+    elif demands.setup.parameters is not None:
+        fact = f"ArduPlane turns to the next leg {near.radius:.0f} m before it, or where it is past it"
     elif offset > near.radius + ROUNDING:
         turn, radius = math.degrees(abs(float(demands.turns[i]))), float(demands.radius[i])
         faults.append(
@@ -49,14 +53,14 @@ def _planned(demands: RouteDemands, i: int) -> Finding:
         limit=near.radius,
         source=near.source,
         tolerance=ROUNDING,
-        margin=near.radius - offset,
+        margin=near.radius - offset if demands.setup.parameters is None else None,
         unit="m",
         method="the fly-by arc",
     )
 
 
 def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    near = reach(demands, i)
+    near, setup = reach(demands, i), demands.setup
     offset, most = float(demands.fly_by_offset[i]), near.radius + near.tolerance
     away, ok, reason = math.nan, False, "missed: nothing was flown"
     facts: tuple[Fact, ...] = ()
@@ -64,9 +68,14 @@ def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: 
         away, off = _closest(demands, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
         ok = away <= most
+        beside = math.inf if ok or setup.parameters is None else _beside(demands, aligned, i)
+        if beside <= setup.corridor:
+            ok = True
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
+        if math.isfinite(beside):
+            reason += f"; the line across the leg there crossed {beside:.0f} m beside it"
         if i > 0 and not aligned.passed[i]:
             ok, reason = False, f"missed: the flight ended {math.hypot(away, off):.0f} m away"
         elif not ok:
@@ -81,11 +90,22 @@ def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: 
         limit=near.radius,
         source=near.source,
         tolerance=near.tolerance,
-        margin=near.radius - away,
+        # Past the line beside it counts as reached whatever its distance.
+        margin=near.radius - away if ok is (away <= most) else None,
         unit="m",
         method="closest approach, horizontal",
         facts=facts,
     )
+
+
+def _beside(demands: RouteDemands, aligned: AlignedTrack, i: int) -> float:
+    """How far (m) beside a waypoint the track crossed the line across the leg before it; inf where it did not."""
+    if i == 0:
+        return math.inf
+    last = int(aligned.rows[i + 1]) if i + 1 < len(demands.points) else len(aligned.track) - 1
+    along, across = along_across(demands, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1])
+    past = np.flatnonzero(along >= demands.runs[i - 1])
+    return abs(float(across[past[0]])) if past.size else math.inf
 
 
 def _counts(near: Reach) -> str:

@@ -105,7 +105,7 @@ def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
     wide = fly_path(setup, across=lambda s: 0.0 * s + 35.0, stop=6000.0)
     verdict = judge_flight(setup, wide, "ground contact")
     written = json.loads(verdict_json(verdict))
-    assert written["schema"] == SCHEMA == "planfly.verdict/2"
+    assert written["schema"] == SCHEMA == "planfly.verdict/3"
     assert written["summary"].splitlines() == list(verdict.lines)
     for item, found in zip(verdict.findings, written["findings"], strict=True):
         assert found["place"] == asdict(item.place)
@@ -113,12 +113,16 @@ def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
         assert found["suggestions"] == [[asdict(change) for change in one] for one in item.suggestions]
         assert found["suggestion"] == suggestions_text(item.suggestions)
         assert found["reason"] == item.reason
-    assert verdict.prediction is not None
-    differences = [Disagreement("corridor", leg(k), geometric=True, flown=False) for k in range(3)]
-    assert [one for one in verdict.prediction.disagreements if one.rule == "corridor"] == differences
+    geometry, own = verdict.levels
+    assert (geometry.name, own.name, own.flyable, own.headline) == ("geometry", "airframe", False, verdict.headline)
+    differences = [Disagreement("corridor", leg(k), "geometry", there=True, here=False) for k in range(3)]
+    assert [one for one in geometry.disagreements if one.rule == "corridor"] == differences
     texts = [f"corridor at leg {k} passes by geometry and fails in flight" for k in range(3)]
-    assert [text for text in written["geometric"]["disagreements"] if text in texts] == texts
-    assert len(written["geometric"]["differences"]) == len(written["geometric"]["disagreements"])
+    levels = written["levels"]
+    assert [level["name"] for level in levels] == ["geometry", "airframe"]
+    assert [text for text in levels[0]["disagreements"] if text in texts] == texts
+    assert len(levels[0]["differences"]) == len(levels[0]["disagreements"])
+    assert written["deciding_parameter"] is None
 
 
 def test_a_margin_that_says_the_opposite_is_left_out() -> None:

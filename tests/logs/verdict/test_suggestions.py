@@ -64,9 +64,7 @@ def test_what_passes_has_no_suggestion() -> None:
     verdict = judge(setup, fly_path(setup))
     assert verdict.flyable
     assert {item.suggestions for item in verdict.findings} == {()}
-    assert verdict.prediction is not None
-    assert verdict.prediction.flyable
-    assert verdict.prediction.disagreements == ()
+    assert [(level.flyable, level.disagreements) for level in verdict.levels] == [(True, ()), (True, ())]
     assert "flight and geometry agree" in verdict.summary
 
 
@@ -75,7 +73,6 @@ def test_where_the_levels_disagree_both_are_named() -> None:
     setup = make_setup([[0, 0, 300], [0, 4000, 300]])
     verdict = judge(setup, fly_path(setup, across=bump(2000.0, 40.0, 200.0)))
     assert not verdict.flyable
-    assert verdict.prediction is not None
-    assert verdict.prediction.flyable
-    assert Disagreement("corridor", leg(0), geometric=True, flown=False) in verdict.prediction.disagreements
+    assert [level.flyable for level in verdict.levels] == [True, False]
+    assert Disagreement("corridor", leg(0), "geometry", there=True, here=False) in verdict.levels[0].disagreements
     assert "By geometry alone: flyable" in verdict.summary

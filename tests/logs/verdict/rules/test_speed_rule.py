@@ -1,7 +1,11 @@
 """Airspeed: commanded within the envelope; what was flown, and what a leg has no room for, is told."""
 
+import math
+from dataclasses import replace
+
 import pytest
 
+from flight.ardupilot.parameters import default_parameters
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
@@ -36,6 +40,19 @@ def test_a_speed_off_its_command_is_told_and_no_fault(off: float, shown: bool) -
     assert ("off the commanded 25.0 m/s" in item.reason) is shown
     # It shows a limit only where the aircraft's are left out.
     assert (("speed", leg(0)) in failing(judge(setup, track, envelope=False))) is shown
+
+
+def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:
+    """At 1,000 m, 1.225 by 1.112 kg/m^3 (US Standard Atmosphere, 1976): 31 m/s are 32.5, above the fastest 32."""
+    for up, ok in ((0.0, True), (1000.0, False)):
+        points = [[e, n, up] for e, n, _ in STRAIGHT]
+        made = make_setup(points, airspeed=31.0, terrain={"kind": "flat", "amsl_m": -400.0})
+        setup = replace(made, parameters=default_parameters())
+        item = of(judge_geometry(setup), "speed", leg(0))
+        true = 31.0 * math.sqrt(1.225 / (1.225 if up == 0.0 else 1.112))
+        assert (item.ok, item.planned) == (ok, pytest.approx(true, rel=1e-3))
+        assert of(judge_geometry(made), "speed", leg(0)).ok
+        assert (f"31.0 m/s of equivalent airspeed, {true:.1f} m/s of true airspeed," in item.reason) is not ok
 
 
 def test_each_leg_has_its_own() -> None:

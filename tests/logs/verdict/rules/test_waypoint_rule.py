@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flight.ardupilot.parameters import default_parameters
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_geometry
@@ -77,6 +78,35 @@ def test_an_arc_that_passes_too_far_is_known_before_the_flight(turn: float, offs
     assert reached.ok
     over = accepting(make_setup(corner(turn), fly_over=(1,)), 10.0)
     assert of(judge_geometry(over), "waypoint", waypoint(1)).reason == "flown over"
+
+
+def test_arduplane_turns_at_its_own_radius() -> None:
+    """90 m at sea level from a right angle on, half of it at 45 degrees, none straight on; all of it at the end."""
+    turns = {0.0: 0.0, 45.0: 45.0, 90.0: 90.0, 120.0: 90.0}
+    for turn, radius in turns.items():
+        points = [[e, n, 0.0] for e, n, _ in corner(turn)]
+        setup = replace(make_setup(points, terrain={"kind": "flat", "amsl_m": -400.0}), parameters=default_parameters())
+        verdict = judge_geometry(setup)
+        assert of(verdict, "waypoint", waypoint(1)).limit == pytest.approx(radius)
+        assert of(verdict, "waypoint", waypoint(2)).limit == pytest.approx(90.0)
+        assert {item.limit_source for item in verdict.findings if item.rule == "waypoint"} == {"autopilot"}
+        assert all(item.ok for item in verdict.findings if item.rule == "waypoint")
+    # True by equivalent airspeed squared is the ratio of densities: 1.225 by 1.112 kg/m^3 at 1,000 m (US Standard
+    # Atmosphere, 1976).
+    high = replace(make_setup([[e, n, 1000.0] for e, n, _ in corner(90.0)]), parameters=default_parameters())
+    assert of(judge_geometry(high), "waypoint", waypoint(1)).limit == pytest.approx(90.0 * 1.225 / 1.112, rel=1e-3)
+
+
+@pytest.mark.parametrize(("aside", "ok"), [(59.0, True), (-59.0, True), (61.0, False), (-61.0, False)])
+def test_past_the_line_beside_it_counts_for_arduplane_within_the_corridor(aside: float, ok: bool) -> None:
+    stated = make_setup(STRAIGHT, limits={"corridor_m": 60.0})
+    setup = replace(accepting(stated, 10.0), parameters=default_parameters())
+    track = fly_path(setup, across=bump(3000.0, aside, 150.0))
+    item = of(judge(setup, track), "waypoint", waypoint(1))
+    assert item.ok is ok
+    assert f"the line across the leg there crossed {abs(aside):.0f} m beside it" in item.reason
+    # Planfly's own guidance has to come near.
+    assert not of(judge(accepting(stated, 10.0), track), "waypoint", waypoint(1)).ok
 
 
 def test_fly_over_waypoints_are_flown_over(setup: FlightSetup, track: Track) -> None:
