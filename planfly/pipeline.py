@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 from flight.mission.end_courses import with_end_courses
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
@@ -163,15 +165,22 @@ def fly_and_judge(
     its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it to its
     end; no log is left then.
     """
-    needed = needed_energy(setup)
-    if needed > MOST_STORES * setup.battery:
-        return _unflown(setup, f"not started: it takes {needed / setup.battery:.0f} times the energy carried")
+    stores = _stores_needed(setup)
+    if stores > MOST_STORES:
+        return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
         if autopilot is None:
             return _record_and_judge(setup, airframe, Flight(setup, airframe.aircraft), log, advance, every)
         return _fly_program(setup, airframe, log, advance, every, autopilot)
     except StartError as error:
-        return _unflown(setup, f"not started: {error.reason}")
+        return _unflown(setup, log, f"not started: {error.reason}")
+
+
+def _stores_needed(setup: FlightSetup) -> float:
+    """How many times the energy carried a route takes by prediction; 0 where not even full power all the way would."""
+    seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
+    most = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
+    return needed_energy(setup) / setup.battery if most > MOST_STORES * setup.battery else 0.0
 
 
 def _fly_program(
@@ -226,8 +235,10 @@ def _record_and_judge(
     return judged
 
 
-def _unflown(setup: FlightSetup, ended: str) -> JudgedFlight:
-    """A flight without a row."""
+def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
+    """A flight without a row, and without a log: none of a flight before it stays there."""
+    if log is not None:
+        log.unlink(missing_ok=True)
     return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 

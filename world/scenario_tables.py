@@ -200,7 +200,7 @@ def names_folder(aircraft: str) -> bool:
 
 
 # Who flies where a scenario names neither an autopilot nor what belongs to one.
-DEFAULT_AUTOPILOT: Autopilot = "ideal"
+DEFAULT_AUTOPILOT: Autopilot = "ardupilot"
 # How well an autopilot knows where it is, where a scenario does not say.
 _USUAL_NAVIGATION: dict[Autopilot, Navigation] = {"ardupilot": "gnss", "ideal": "perfect"}
 

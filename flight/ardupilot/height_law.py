@@ -14,6 +14,9 @@ import math
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, compiled
 
+# What ArduPlane reads by what is true: its sensor's noise adds to the pressure's mean.  Measured in the logs of 18
+# flights of ArduPlane 4.6 in our physics, in still air as in turbulence: 1.0024 to 1.0030.
+AIRSPEED_READING = 1.0027
 # Of the rate of total energy, for the throttle's damping: smoothed over this long, s.
 _RATE_LAG = 0.5
 # Damping of the filter that makes an airspeed of the measured one and the acceleration.
@@ -52,9 +55,9 @@ def demand_height(
     climb = parameters.tecs_climb_max * own.climb_share * dt
     sink = parameters.tecs_sink_max * own.sink_share * dt
     own.height_limited += min(climb, max(-sink, target - own.height_limited))
-    change = share * (own.height_limited - own.height_demand)
-    own.height_demand += change
-    own.height_rate = change / dt
+    behind = own.height_limited - own.height_demand
+    own.height_demand += share * behind
+    own.height_rate = behind / max(dt, parameters.tecs_height_demand_time)
 
 
 @compiled
@@ -93,7 +96,7 @@ def _estimate_airspeed(
     own.flown = True
     own.last_velocity_east, own.last_velocity_north = estimated.velocity_east, estimated.velocity_north
     frequency = parameters.tecs_speed_frequency
-    error = state.airspeed - own.airspeed
+    error = AIRSPEED_READING * state.airspeed - own.airspeed
     own.airspeed_drift += error * frequency * frequency * dt
     own.airspeed = max(3.0, own.airspeed + (gained + own.airspeed_drift + error * frequency * _FILTER_DAMPING) * dt)
     own.acceleration_mean += (gained - own.acceleration_mean) * dt / (dt + parameters.tecs_time)
@@ -185,7 +188,8 @@ def _set_pitch(
     per_angle = own.airspeed * GRAVITY
     wanted = height_weight * (high / parameters.tecs_time + GRAVITY * own.height_rate)
     wanted -= speed_weight * fast / parameters.tecs_time
-    wanted = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, wanted))
+    asked = wanted
+    wanted = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, asked))
     amiss = wanted - (height_weight * climbing - speed_weight * gaining)
     total = wanted + parameters.tecs_pitch_damping * amiss
     own.speed_sum -= speed_weight * fast / parameters.tecs_time * dt
@@ -196,9 +200,9 @@ def _set_pitch(
     lowest = (bottom - _PITCH_SPARE) * per_angle - total - own.speed_sum
     own.balance_sum = min(highest, max(lowest, own.balance_sum))
     pitch = (total + own.balance_sum + own.speed_sum) / per_angle
-    if pitch > top:
+    if pitch > top or asked > wanted:
         own.held = 1
-    elif pitch < bottom:
+    elif pitch < bottom or asked < wanted:
         own.held = -1
     pitch = min(top, max(bottom, pitch))
     step = parameters.tecs_vertical_acceleration / own.airspeed * dt

@@ -19,15 +19,15 @@ from flight.ardupilot.parameters import ArduPilotParameters
 from flight.ardupilot.pilot import NAVIGATION_TICK, ROLL_LAG
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import ERRORS, MOTION
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, field_names, record_dtype
 from world.scenario_types import Navigation
 
 Floats = NDArray[np.float64]
 
 # A corner counts as left where the aircraft stays this near to the next leg (m) for so long (s).
 _SETTLED, _STAYS = 2.0, 8.0
-# From a corner the legs reach this far, m, and flights begin and end so much nearer.
-_LEG, _SHORTER = 4000.0, 1000.0
+# From a corner the legs reach this far, m; flights end there at the latest, and begin so far before they may turn.
+_LEG, _BEFORE = 4000.0, 200.0
 # Acceptances that are tried: so many, and again about the best.
 _TRIED, _ROUNDS = 9, 2
 # Least acceptance, m: that of a straight leg, which navigation and gusts leave it far inside.
@@ -72,16 +72,23 @@ def tracking_error(
     )
 
 
+# How a corner is tracked, m: by which acceptance, how far from its legs, along how much of each.
+CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
+
+
 @lru_cache(maxsize=8)
 def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -> tuple[Floats, Floats, Floats, Floats]:
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
-    tables = np.zeros((4, TURNS.size, SPEED_SHARES.size))
+    corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill(record, airspeed, TURNS, speeds, fly_over, tables, np.zeros(3, WAYPOINT))
+    _fill(record, airspeed, TURNS, speeds, fly_over, corners, np.zeros(3, WAYPOINT))
     share, more = WIND_SPREAD
-    tables[1] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
-    tables.setflags(write=False)
-    return tables[0], tables[1], tables[2], tables[3]
+    corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    # Plans are the same on every machine, and a library's sines are not.
+    acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
+    for table in (acceptance, excursion, before, after):
+        table.setflags(write=False)
+    return acceptance, excursion, before, after
 
 
 @compiled
@@ -91,14 +98,15 @@ def _fill(
     turns: Floats,
     speeds: Floats,
     fly_over: bool,
-    tables: Floats,
+    corners: Records,
     waypoints: Records,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the tables by flights along three waypoints."""
+    """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
     for i in range(turns.size):
         for j in range(speeds.size):
+            corner = corners[i, j]
             if turns[i] == 0.0:
-                tables[0, i, j] = LEAST_ACCEPTANCE
+                corner.acceptance = LEAST_ACCEPTANCE
                 continue
             low, high = LEAST_ACCEPTANCE, MOST_ACCEPTANCE
             best, least = low, math.inf
@@ -109,10 +117,10 @@ def _fill(
                     flown = _fly_corner(parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints)
                     if flown[0] < least:
                         best, least = acceptance, flown[0]
-                        tables[1, i, j], tables[3, i, j] = flown
+                        corner.excursion, corner.after = flown
                 low, high = max(LEAST_ACCEPTANCE, best - step), min(MOST_ACCEPTANCE, best + step)
-            tables[0, i, j] = best
-            tables[2, i, j] = 0.0 if fly_over else best
+            corner.acceptance = best
+            corner.before = 0.0 if fly_over else best
 
 
 @compiled
@@ -135,16 +143,22 @@ def _fly_corner(
     waypoints[1].turn, waypoints[1].acceptance, waypoints[1].fly_over = turn, acceptance, fly_over
     waypoints[2].east, waypoints[2].north = _LEG * east, _LEG * north
     own.from_north = -_LEG
-    estimated.north = _SHORTER - _LEG if acceptance > 600.0 else -acceptance - 200.0
-    course, bank, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
-    while along < _LEG - _SHORTER and clock < 120.0:
+    # Between two of its looks the waypoint comes within the acceptance: in the middle, which is what they come to.
+    tick = speed * NAVIGATION_TICK
+    estimated.north = -acceptance - (math.floor(_BEFORE / tick) + 0.5) * tick
+    lag = ROLL_LAG * parameters.roll_time
+    left = math.exp(-NAVIGATION_TICK / lag)
+    course, side, clock, furthest, settled, along = 0.0, 0.0, 0.0, 0.0, 0.0, -1.0
+    while along < 0.75 * _LEG and clock < 120.0:
         estimated.velocity_east, estimated.velocity_north = speed * math.sin(course), speed * math.cos(course)
         navigate_legs(estimated, waypoints, parameters, own, 1.0, NAVIGATION_TICK)
-        wanted = roll_demand(own.side_acceleration, 0.0, airspeed, parameters)
-        bank += (wanted - bank) * min(1.0, NAVIGATION_TICK / (ROLL_LAG * parameters.roll_time))
-        course += GRAVITY * math.tan(bank) / speed * NAVIGATION_TICK
-        estimated.east += estimated.velocity_east * NAVIGATION_TICK
-        estimated.north += estimated.velocity_north * NAVIGATION_TICK
+        wanted = GRAVITY * math.tan(roll_demand(own.side_acceleration, 0.0, airspeed, parameters))
+        # The lag to the letter, and the way on the mean course.
+        turned = (wanted * NAVIGATION_TICK + (side - wanted) * lag * (1.0 - left)) / speed
+        side = wanted + (side - wanted) * left
+        estimated.east += tick * math.sin(course + 0.5 * turned)
+        estimated.north += tick * math.cos(course + 0.5 * turned)
+        course += turned
         clock += NAVIGATION_TICK
         along = estimated.east * east + estimated.north * north
         away = math.hypot(estimated.east, estimated.north)

@@ -11,11 +11,14 @@ from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_
 from planner.plan import Plan
 from world.frames import to_geo
 from world.geometry import leg_courses, turning_angles, wrap
+from world.wind import W20
 
 Floats = NDArray[np.float64]
 
 # Added to the fly-by offset of a waypoint, m: the tolerance of the verdict's waypoint rule.
 ACCEPTANCE_TOLERANCE = 10.0
+# Sharpest turn whose arc has that on top, and the sharpest that has an arc at all, rad.
+_SHARPEST, _U_TURN = math.radians(150.0), math.radians(179.0)
 
 
 def plan_mission(
@@ -28,9 +31,10 @@ def plan_mission(
     a waypoint by less than 8 mm on the map.
 
     The acceptance radius is the fly-by offset, how far a turn at this speed and bank, in the scenario's wind from
-    behind, passes from its waypoint, R(1/cos(theta/2) - 1), and `ACCEPTANCE_TOLERANCE` more, up to a whole metre.  It
-    is advisory: PX4 has its own on fixed wings.  An autopilot of which it is known how it tracks its legs gets the
-    radius with which it strays least from them: ArduPlane turns to the next leg that far before a waypoint.
+    behind, passes from its waypoint, R(1/cos(theta/2) - 1), and `ACCEPTANCE_TOLERANCE` more, up to a whole metre: no
+    arc of the flight misses it.  PX4 has its own on fixed wings.  An autopilot of which it is known how it tracks its
+    legs gets the radius with which it strays least from them: ArduPlane turns to the next leg that far before a
+    waypoint.
 
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("tight")
@@ -74,12 +78,19 @@ def plan_mission(
 def _acceptance(plan: Plan, airspeed: float, max_bank: float) -> Floats:
     """(w,) m, whole."""
     wind = max(math.hypot(*plan.scenario.wind.at(float(amsl))) for amsl in plan.waypoints[:, 2])
-    radius = (airspeed + wind) ** 2 / (GRAVITY * math.tan(max_bank))
-    # A U-turn's fly-by arc would pass at infinity.
-    half = np.minimum(turning_angles(plan.waypoints), math.radians(150.0)) / 2.0
+    turns, pull = turning_angles(plan.waypoints), GRAVITY * math.tan(max_bank)
     radii = np.full(len(plan.waypoints), ACCEPTANCE_TOLERANCE)
-    radii[1:-1] += radius * (1.0 / np.cos(half) - 1.0)
+    radii[1:-1] += _offsets(np.minimum(turns, _SHARPEST), (airspeed + wind) ** 2 / pull)
+    # Arcs are drawn with room for a gust; one sharper than these passes where it passes, and a U-turn's at infinity.
+    gust = 0.1 * W20[plan.scenario.wind.turbulence]
+    arcs = _offsets(np.minimum(turns, _U_TURN), (airspeed + wind + gust) ** 2 / pull)
+    radii[1:-1] = np.maximum(radii[1:-1], arcs)
     return np.ceil(radii - 1e-6)
+
+
+def _offsets(turns: Floats, radius: float) -> Floats:
+    """How far arcs of this radius (m) pass from the corners of these turns (rad), m."""
+    return np.asarray(radius * (1.0 / np.cos(turns / 2.0) - 1.0))
 
 
 def _turn_distances(plan: Plan, airspeed: float, tracking: TrackingError) -> Floats:

@@ -77,7 +77,7 @@ def place_stops(
     heights = _Heights(mission.source, itinerary, origin, terrain, notes)
     stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
     takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
-    landing_ground = heights.touchdown(itinerary.landing)
+    landing_ground = heights.touchdown(itinerary)
     return PlacedMission(mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground)
 
 
@@ -162,12 +162,17 @@ class _Heights:
             self._home_amsl = self._find_home(stop, self.home)
         return self._home_amsl
 
-    def touchdown(self, stop: ItineraryStop | None) -> float:
-        """Height of a place to land at, NaN for none, none stated, and no terrain to count it from."""
-        if stop is None or math.isnan(stop.alt) or (self.terrain is None and stop.frame not in AMSL | OVER_HOME):
+    def touchdown(self, itinerary: Itinerary) -> float:
+        """Height of the place to land at; NaN for none, none stated, and none to compare with the place before it."""
+        stop = itinerary.landing
+        if stop is None or math.isnan(stop.alt):
             return math.nan
+        known = stop.frame in AMSL or self.terrain is not None
+        if stop.frame in OVER_HOME:
+            before = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
+            known = known or not math.isnan(self.home.alt) or before in OVER_HOME
         east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
-        return self.amsl(stop, float(east), float(north), math.nan)
+        return self.amsl(stop, float(east), float(north), math.nan) if known else math.nan
 
     def ground_at_home(self) -> float:
         """Height of the ground at home, NaN where it is not known."""

@@ -25,7 +25,7 @@ RULES = {
     "waypoint": "waypoints",
     "corridor": "corridor",
     "speed": "airspeed",
-    "stall": "stall margin",
+    "stall": "stall",
     "takeoff": "take-off",
     "landing": "landing",
     "energy": "energy",

@@ -28,8 +28,7 @@ def fly(args: argparse.Namespace) -> int:
             every = 60 // args.log_hz
             flown = fly_and_judge(opened.setup, opened.airframe, target, advance, every=every, autopilot=program)
     print_verdict(flown.verdict, opened.setup.route.notes)
-    if not len(flown.track):
-        print("log       none: nothing was flown")
-    else:
-        print(f"log       {target}" + ("" if program is None else f" (the autopilot's own: {autopilot_log(target)})"))
+    print(f"log       {target}" if len(flown.track) else "log       none: nothing was flown")
+    if program is not None and len(flown.track):
+        print(f"          {autopilot_log(target)} (the autopilot's own)")
     return FLYABLE if flown.verdict.flyable else NOT_FLYABLE

@@ -20,7 +20,7 @@ from planfly.terminal.argument_types import (
     time_or_stations,
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
-from planfly.terminal.shared_options import (
+from planfly.terminal.parser_options import (
     flown_by_options,
     overwrite_option,
     own_link_options,

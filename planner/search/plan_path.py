@@ -1,7 +1,6 @@
 """An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,8 @@ from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import Algorithm, find_algorithm
+from planner.search.algorithms import find_algorithm
+from planner.search.limits_for import limits_for
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
@@ -84,8 +84,7 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
     progress: called with generations done, generations in all, and a short text.
-    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
-    the plan.
+    stop: asked between generations; a text ("interrupted") ends the search with the best path yet, and stands in it.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path of the same ends and number of waypoints to start from.
@@ -114,11 +113,6 @@ def plan_path(
         history=np.array(search.history).reshape(-1, 3),
         ended=search.ended,
     )
-
-
-def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
-    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
-    return limits if algorithm.graded else replace(limits, tracking=None)
 
 
 def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certificate]:

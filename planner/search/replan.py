@@ -11,7 +11,8 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
 from planner.search.algorithms import find_algorithm
-from planner.search.plan_path import limits_for, plan_path
+from planner.search.limits_for import limits_for
+from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
 from world.errors import MissionError
 from world.geometry import leg_courses, leg_runs

@@ -18,7 +18,7 @@ from pathlib import Path
 from queue import SimpleQueue
 
 from tests.mutations.choice import all_mutants, chosen_mutants
-from tests.mutations.covering import covering_tests, limits_at
+from tests.mutations.covering import covering_tests, kernels_on, limits_at
 from tests.mutations.mutant import ROOT, Mutant
 from tests.mutations.workplace import Trial, Workplace
 
@@ -60,13 +60,15 @@ def main() -> int:
 def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> list[Trial]:
     """Try all of them, each in the workplace that is free next."""
     places = [Workplace(folder / str(k), limit) for k in range(at_once)]
-    tests = sorted({test for mutant in mutants for test in covering_tests(mutant)})
+    # Looked up before the first trial, so that the repository may change meanwhile.
+    asked = {mutant: (covering_tests(mutant), kernels_on(mutant)) for mutant in mutants}
+    tests = sorted({test for covering, _ in asked.values() for test in covering})
     free: SimpleQueue[Workplace] = SimpleQueue()
 
     def try_out(mutant: Mutant) -> Trial:
         place = free.get()
         try:
-            return place.try_out(mutant)
+            return place.try_out(mutant, *asked[mutant])
         finally:
             free.put(place)
 

@@ -53,7 +53,8 @@ def kernels_on(mutant: Mutant) -> list[str]:
 def _own_tests(file: str) -> list[str]:
     """Tests of a module's name: tests/logs/verdict/rules/test_slope_rule.py, and test_slope_rule_limits.py."""
     path = Path(file)
-    folder = ROOT / "tests" / path.parent
+    # An aircraft's model stands in a folder of its own, its tests in that of all aircraft.
+    folder = ROOT / "tests" / (path.parent if path.suffix == ".py" else path.parent.parent)
     return [str(found.relative_to(ROOT)) for found in sorted(folder.glob(f"test_{path.stem}*.py"))]
 
 
@@ -70,7 +71,7 @@ def limits_at(mutant: Mutant) -> list[str]:
 def _users(names: list[str]) -> list[str]:
     """Modules that read one of some limits."""
     pattern = re.compile(rf"\b({'|'.join(names)})\b")
-    return [file for file, text in _sources().items() if file.startswith("logs/") and pattern.search(text)]
+    return [file for file, text in _sources().items() if file.startswith("logs/verdict/") and pattern.search(text)]
 
 
 @cache

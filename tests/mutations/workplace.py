@@ -9,7 +9,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.mutations.covering import covering_tests, kernels_on
 from tests.mutations.mutant import ROOT, Mutant
 
 _LEFT_OUT = shutil.ignore_patterns(".*", "runs", "build", "*.egg-info", "__pycache__", "*.mcap")
@@ -49,23 +48,26 @@ class Workplace:
         code, text = self._run(tests, self._warm, 3600.0, keep_bytecode=True)
         return "" if code == 0 else _failure(text) or text[-2000:]
 
-    def try_out(self, mutant: Mutant) -> Trial:
-        """Apply a mutant, run the tests that cover it, and put the source back."""
+    def try_out(self, mutant: Mutant, tests: list[str], kernels: list[str]) -> Trial:
+        """Apply a mutant, run the tests that cover it, and put the source back.
+
+        kernels: files whose compiled code rests on what it changes.
+        """
         target = self.copy / mutant.file
-        source, stamp = target.read_bytes(), target.stat()
-        dependents = [self.copy / file for file in kernels_on(mutant)]
-        stamps = [file.stat() for file in dependents]
+        # Numba knows a changed file by its bytes, and a remark at its end changes no line's number.
+        changed = {file: file.read_bytes() + b"#\n" for file in (self.copy / name for name in kernels)}
+        changed[target] = mutant.applied(target.read_bytes())
+        kept = {file: (file.read_bytes(), file.stat()) for file in changed}
         shutil.rmtree(self._cache, ignore_errors=True)
         shutil.copytree(self._warm, self._cache, copy_function=os.link)
         started = time.monotonic()
         try:
-            target.write_bytes(mutant.applied(source))
-            for file in dependents:
-                os.utime(file)
-            code, text = self._run(covering_tests(mutant), self._cache, self._limit)
+            for file, data in changed.items():
+                file.write_bytes(data)
+            code, text = self._run(tests, self._cache, self._limit)
         finally:
-            target.write_bytes(source)
-            for file, was in zip((target, *dependents), (stamp, *stamps), strict=True):
+            for file, (data, was) in kept.items():
+                file.write_bytes(data)
                 os.utime(file, ns=(was.st_atime_ns, was.st_mtime_ns))
         status = {None: "too long", 0: "alive"}.get(code, "killed")
         return Trial(mutant, status, _failure(text) if status == "killed" else "", time.monotonic() - started)

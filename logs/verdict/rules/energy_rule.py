@@ -61,7 +61,7 @@ def _never_ends(demands: RouteDemands, usable: float) -> Message:
     while begin > 0 and route.items[begin] != route.items[last]:
         begin -= 1
     one = sum(leg_energies(demands)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
-    lasts = f": the energy that may be used lasts for {usable / one:.0f} of its rounds" if one > 0.0 else ""
+    lasts = f": the energy lasts for {usable / one:.0f} rounds" if one > 0.0 else ""
     return message(f"the jump of item {route.endless} has no end{lasts}")
 
 
@@ -98,7 +98,7 @@ def needed_energy(setup: FlightSetup) -> float:
 
 def leg_energies(demands: RouteDemands) -> tuple[list[float], float]:
     """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
-    envelope, route = demands.setup.envelope, demands.setup.route
+    envelope, route = demands.setup.envelope, demands.route
     if not np.isfinite(demands.ground_speed).all():
         return [math.nan] * demands.legs, math.nan
     energies, most = [], 0.0

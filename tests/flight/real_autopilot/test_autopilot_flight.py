@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -167,12 +168,23 @@ with AutopilotFlight(make_setup(), AEROSONDE, Path({str(fake_autopilot())!r}), {
 
 
 def test_satellites_mistake_the_place_as_the_setup_says(fake_autopilot: MakeFake) -> None:
-    def off(nav: str) -> float:
-        spec = make_setup(flight={"nav": nav})
-        flown, _ = fly_autopilot(spec, AEROSONDE, fake_autopilot(), {})
-        return float(abs(flown.track.position[60:, 2] - 500.0).max())
+    def mistakes(nav: str) -> list[tuple[float, ...]]:
+        found = []
+        with AutopilotFlight(replace(make_setup(), nav=nav), AEROSONDE, fake_autopilot(), {}) as flight:
+            found.append(flight._lockstep.error)
+            flight.prepare()
+            for _ in range(20):
+                flight.block(60)
+                found.append(flight._lockstep.error)
+        return found
 
-    assert off("perfect") != off("gnss")
+    assert set(mistakes("perfect")) == {(0.0,) * 6}
+    off = np.array(mistakes("gnss"))
+    # 1.5 m on each axis, wandering in some 20 s, from before the flight on; and the velocity by its rate.
+    assert 0.3 < math.sqrt((off[:, :3] ** 2).mean()) < 4.0
+    assert abs(off[0, :3] - off[1, :3]).max() < 0.5
+    assert abs(off[0, :3]).min() > 0.0
+    assert 0.005 < math.sqrt((off[2:, 3:] ** 2).mean()) < 0.3
 
 
 @pytest.mark.client

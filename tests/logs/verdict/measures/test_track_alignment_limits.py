@@ -6,7 +6,7 @@ import pytest
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.measures.track_alignment import lay_track
-from tests.synthetic import edited, fly_path, make_setup
+from tests.synthetic import edited, fly_path, make_setup, waypoint_stations
 
 STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
 
@@ -60,3 +60,12 @@ def test_a_waypoint_further_than_half_a_kilometre_aside_is_none_of_the_flights(
     aligned = lay_track(route_demands(setup), track)
     assert aligned is not None
     assert aligned.passed.tolist() == [True, True, passed]
+
+
+def test_a_place_passed_twice_has_each_time_the_rows_of_its_own_passage() -> None:
+    """Two rounds of a square at one height: the second's waypoints are nearest to rows of the first, too."""
+    square = [[0.0, 0.0, 300.0], [0.0, 1500.0, 300.0], [1500.0, 1500.0, 300.0], [1500.0, 0.0, 300.0]]
+    setup = make_setup(square + square)
+    aligned = lay_track(route_demands(setup), fly_path(setup, rate=20.0))
+    assert aligned is not None
+    assert aligned.track.time[aligned.rows] == pytest.approx(waypoint_stations(setup) / 25.0, abs=0.1)

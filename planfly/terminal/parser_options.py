@@ -1,4 +1,4 @@
-"""Options that several commands have."""
+"""Options that several commands take."""
 
 import argparse
 
@@ -6,18 +6,18 @@ from planfly.terminal.argument_types import positive, wind
 
 
 def overwrite_option(parser: argparse.ArgumentParser) -> None:
-    """Add what replaces named targets."""
+    """Whether results may replace files."""
     parser.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
 
 
 def world_options(parser: argparse.ArgumentParser) -> None:
-    """Add what a mission is judged within."""
+    """What a mission is judged in."""
     parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
 
 
 def flown_by_options(parser: argparse.ArgumentParser) -> None:
-    """Add which aircraft flies, how fast, and in which wind."""
+    """What flies it, in which wind."""
     parser.add_argument("--aircraft", metavar="A", help="the aircraft, in place of the scenario's (default: aerosonde)")
     parser.add_argument(
         "--airspeed", metavar="M/S", type=positive, help="until the mission sets one (default: the aircraft's cruise)"
@@ -27,7 +27,7 @@ def flown_by_options(parser: argparse.ArgumentParser) -> None:
 
 
 def pilot_options(parser: argparse.ArgumentParser) -> None:
-    """Add who flies: ArduPlane with parameters, or a law of guidance."""
+    """Who flies it."""
     parser.add_argument(
         "--params", metavar="FILE", help="ArduPlane flies, with these parameters: as a ground station writes them"
     )
@@ -39,7 +39,7 @@ def pilot_options(parser: argparse.ArgumentParser) -> None:
 
 
 def steering_options(parser: argparse.ArgumentParser) -> None:
-    """Add who flies, and how well it knows where it is."""
+    """Who flies it, and how well it knows where it is."""
     pilot_options(parser)
     parser.add_argument(
         "--nav",
@@ -50,16 +50,16 @@ def steering_options(parser: argparse.ArgumentParser) -> None:
 
 
 def program_option(parser: argparse.ArgumentParser) -> None:
-    """Add the program of a real autopilot."""
+    """Which real autopilot flies it."""
     parser.add_argument(
         "--autopilot",
         metavar="PATH",
-        help="a real ArduPlane flies, in our physics: its program for software in the loop",
+        help="a real ArduPlane flies in our physics: its program, as built for software in the loop",
     )
 
 
 def own_link_options(parser: argparse.ArgumentParser, *, bind: str) -> None:
-    """Add where the vehicle listens, and who may talk to it."""
+    """Where and with whom a vehicle speaks MAVLink."""
     parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
     parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
     parser.add_argument(
