@@ -9,8 +9,14 @@ from collections.abc import Mapping
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
-from logs.verdict.levels import FlownBeside, LevelAnswer, LevelName
+from logs.verdict.judge_geometry import (
+    flown_level,
+    geometric_findings,
+    judge_geometry,
+    judge_plan_only,
+    judge_unflown,
+)
+from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
 from logs.verdict.places import Disagreement, Place
@@ -125,7 +131,6 @@ def _levels(
 
     Without the envelope there is nothing beside the flight.
     """
-    name: LevelName = "airframe" if demands.setup.parameters is None else "autopilot"
     levels = []
     if demands.envelope:
         predicted = geometric_findings(demands)
@@ -137,7 +142,7 @@ def _levels(
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
         differing = _differing("airframe", passed, flown)
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
-    return (*levels, LevelAnswer(name, flyable, headline(flown, flyable)))
+    return (*levels, LevelAnswer(flown_level(demands.setup), flyable, headline(flown, flyable)))
 
 
 def _differing(
