@@ -2,7 +2,7 @@
 
 A flight begins and ends in the air, so that both are judged by the mission's places alone, whether it was flown or not.
 An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than it can climb
-is not judged: ground stations draw climb-outs of 30 degrees, and autopilots climb on beyond the place.
+is not judged: a climb-out of 30 degrees is what QGroundControl draws (its TakeoffMissionItem), and autopilots climb on.
 """
 
 import math
