@@ -115,8 +115,7 @@ def kill_density(
         for row in range(max(0, lowest), min(rows, highest + 1)):
             # The part of the segment from which something in this row of cells may be near.
             north = kind.south + row * side - ay
-            f, g = (north - radius) * slant, (north + side + radius) * slant
-            f, g = _part(f, g) if slant != 0.0 else (0.0, 1.0)
+            f, g = _part((north - radius) * slant, (north + side + radius) * slant) if slant != 0.0 else (0.0, 1.0)
             x, x2 = ax + f * dx - kind.west, ax + g * dx - kind.west
             x, x2 = (x, x2) if x < x2 else (x2, x)
             left, right = _cell((x - radius) * per_metre, columns), _cell((x2 + radius) * per_metre, columns)

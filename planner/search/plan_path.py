@@ -75,8 +75,7 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
     progress: called with generations done, generations in all, and a short text.
-    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
-    the plan.
+    stop: asked between generations; a text ("interrupted") ends the search with the best path yet, and stands in it.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path of the same ends and number of waypoints to start from.
