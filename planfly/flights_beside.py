@@ -9,14 +9,19 @@ from flight.simulation.simulate import simulate
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.levels import AirframeAnswer, DecidingParameter
+from logs.verdict.measures.route_demands import true_route
 from logs.verdict.places import FLIGHT
 from planfly.deciding_parameter import deciding_parameter
 from world.errors import StartError
 
 
 def airframe_answer(setup: FlightSetup, aircraft: Aircraft) -> AirframeAnswer:
-    """Fly a setup by planfly's guidance, which knows exactly where it is, and judge that flight."""
-    ideal = replace(setup, parameters=None, program=None, guidance="path", nav="perfect")
+    """Fly a setup by planfly's guidance, which knows exactly where it is, and judge that flight.
+
+    It flies the same true airspeeds: those that ArduPlane takes for equivalent ones are higher the higher it flies.
+    """
+    same = true_route(setup)
+    ideal = replace(setup, parameters=None, program=None, guidance="path", nav="perfect", route=same)
     try:
         flown = simulate(ideal, aircraft)
     except StartError as error:

@@ -17,8 +17,8 @@ from world.kernels import Record, compiled, compiled_views
 # ArduPlane navigates and updates its height and speed law so often, s (its scheduler's table: 10 Hz).
 NAVIGATION_TICK = 0.1
 # A bank follows its demand so much later than RLL2SRV_TCONST says, as a share of it; and a pitch angle.
-ROLL_LAG = 0.76
-PITCH_LAG = 1.0
+ROLL_LAG = 0.84
+PITCH_LAG = 1.35
 # The international standard atmosphere below 11 km: temperature falls by this share of sea level's a metre, and density
 # with that power of the temperature.
 _LAPSE, _DENSITY_POWER = 2.25577e-5, 4.25588

@@ -19,7 +19,7 @@ from flight.ardupilot.parameters import ArduPilotParameters
 from flight.ardupilot.pilot import NAVIGATION_TICK, ROLL_LAG
 from flight.guidance.lateral_reference_laws import WAYPOINT
 from flight.guidance.navigation_error import ERRORS, MOTION
-from world.kernels import Record, Records, compiled
+from world.kernels import Record, Records, compiled, field_names, record_dtype
 from world.scenario_types import Navigation
 
 Floats = NDArray[np.float64]
@@ -72,18 +72,23 @@ def tracking_error(
     )
 
 
+# How a corner is tracked, m: by which acceptance, how far from its legs, along how much of each.
+CORNER_TRACKING = record_dtype("acceptance", "excursion", "before", "after")
+
+
 @lru_cache(maxsize=8)
 def _corners(parameters: ArduPilotParameters, airspeed: float, fly_over: bool) -> tuple[Floats, Floats, Floats, Floats]:
     """Tables (turns, speeds) of acceptance, excursion, and lengths of the legs before and after, m."""
-    tables = np.zeros((4, TURNS.size, SPEED_SHARES.size))
+    corners = np.zeros((TURNS.size, SPEED_SHARES.size), CORNER_TRACKING)
     record, speeds = parameters.record(), SPEED_SHARES * airspeed
-    _fill(record, airspeed, TURNS, speeds, fly_over, tables, np.zeros(3, WAYPOINT))
+    _fill(record, airspeed, TURNS, speeds, fly_over, corners, np.zeros(3, WAYPOINT))
     share, more = WIND_SPREAD
-    tables[1] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
+    corners["excursion"] *= (share + more * (TURNS / (0.5 * math.pi)) ** 2)[:, None]
     # Plans are the same on every machine, and a library's sines are not.
-    tables = tables.round(2)
-    tables.setflags(write=False)
-    return tables[0], tables[1], tables[2], tables[3]
+    acceptance, excursion, before, after = (corners[name].round(2) for name in field_names(CORNER_TRACKING))
+    for table in (acceptance, excursion, before, after):
+        table.setflags(write=False)
+    return acceptance, excursion, before, after
 
 
 @compiled
@@ -93,14 +98,15 @@ def _fill(
     turns: Floats,
     speeds: Floats,
     fly_over: bool,
-    tables: Floats,
+    corners: Records,
     waypoints: Records,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the tables by flights along three waypoints."""
+    """Fill `CORNER_TRACKING` records (turns, speeds) by flights along three waypoints."""
     for i in range(turns.size):
         for j in range(speeds.size):
+            corner = corners[i, j]
             if turns[i] == 0.0:
-                tables[0, i, j] = LEAST_ACCEPTANCE
+                corner.acceptance = LEAST_ACCEPTANCE
                 continue
             low, high = LEAST_ACCEPTANCE, MOST_ACCEPTANCE
             best, least = low, math.inf
@@ -111,10 +117,10 @@ def _fill(
                     flown = _fly_corner(parameters, airspeed, turns[i], speeds[j], acceptance, fly_over, waypoints)
                     if flown[0] < least:
                         best, least = acceptance, flown[0]
-                        tables[1, i, j], tables[3, i, j] = flown
+                        corner.excursion, corner.after = flown
                 low, high = max(LEAST_ACCEPTANCE, best - step), min(MOST_ACCEPTANCE, best + step)
-            tables[0, i, j] = best
-            tables[2, i, j] = 0.0 if fly_over else best
+            corner.acceptance = best
+            corner.before = 0.0 if fly_over else best
 
 
 @compiled

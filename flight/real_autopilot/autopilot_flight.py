@@ -61,6 +61,8 @@ class AutopilotFlight(Airborne):
         self._rail = self._make_rail(setup)
         self._disturb(setup)
         self._mission = uploaded_mission(setup)
+        # Compiled here, where no autopilot waits for it.
+        autopilot_tick(self._workspace.block.copy(), self._ground.heights)
         with contextlib.ExitStack() as stack, self._named():
             port = stack.enter_context(contextlib.closing(PhysicsPort()))
             self._link = stack.enter_context(contextlib.closing(AutopilotLink()))

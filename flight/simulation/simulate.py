@@ -83,7 +83,17 @@ def simulate(
 
 
 def fly_to_end(flight: Airborne, sink: Sink | None = None, progress: Progress | None = None) -> SimulatedFlight:
-    """Fly until the flight ends; sink, progress: as of `simulate`."""
+    """Fly until the flight ends; sink, progress: as of `simulate`.
+
+    >>> import numpy as np
+    >>> from types import SimpleNamespace
+    >>> from flight.simulation.track import TRACK_ROW
+    >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
+    >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
+    >>> flown = fly_to_end(SimpleNamespace(dt=1 / 60, memory=at, path=path, block=lambda count: next(blocks)))
+    >>> len(flown.track), flown.ended
+    (72, 'ground contact')
+    """
     blocks: list[Rows] = []
     ended = ""
     while not ended:

@@ -263,8 +263,9 @@ def _less_energy(demands: RouteDemands, item: Finding) -> tuple[Suggestion, ...]
 
 
 def _faster(demands: RouteDemands, place: Place, stall: float) -> tuple[Suggestion, ...]:
-    now = float(demands.setup.route.airspeed.min())
-    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED)) / 10.0
+    leg = int(np.argmin(demands.route.airspeed))
+    now = float(demands.setup.route.airspeed[leg])
+    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED) / _true(demands, leg)) / 10.0
     return ((Change("airspeed", place, now, wanted, "m/s"),),) if wanted > now else ()
 
 

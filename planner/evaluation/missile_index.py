@@ -98,7 +98,7 @@ def kill_density(
     """Mean kill density over the segment a-b, radii grown by the margin, and distances to the nearest such sphere, m.
 
     first, last: lengths (m) at a and at b: the distances are from there, and right if they are less than `within`.
-    below, above: how far below and above the segment a flight may be, m: what is nearest to each missile counts.
+    below, above: how far below and above the segment a flight may be, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -116,9 +116,7 @@ def kill_density(
         for row in range(max(0, lowest), min(rows, highest + 1)):
             # The part of the segment from which something in this row of cells may be near.
             north = kind.south + row * side - ay
-            f, g = (north - radius) * slant, (north + side + radius) * slant
-            f, g = (f, g) if f < g else (g, f)
-            f, g = (f if f > 0.0 else 0.0, g if g < 1.0 else 1.0) if slant != 0.0 else (0.0, 1.0)
+            f, g = _part((north - radius) * slant, (north + side + radius) * slant) if slant != 0.0 else (0.0, 1.0)
             x, x2 = ax + f * dx - kind.west, ax + g * dx - kind.west
             x, x2 = (x, x2) if x < x2 else (x2, x)
             left, right = _cell((x - radius) * per_metre, columns), _cell((x2 + radius) * per_metre, columns)
@@ -142,6 +140,13 @@ def kill_density(
                     if closest2 < grown * grown:
                         dose += _dose(along, start2, length2, grown, missile.scale)
     return dose, near_a, near_b
+
+
+@inlined
+def _part(f: float, g: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Fractions of a line in order, and within it."""
+    f, g = (f, g) if f < g else (g, f)
+    return f if f > 0.0 else 0.0, g if g < 1.0 else 1.0
 
 
 @inlined

@@ -1,9 +1,8 @@
 """The algorithms that a scenario or a command may name."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
-from aircraft.path_limits import Limits
 from world.errors import ScenarioError
 
 Optimiser = Literal["umda", "emna", "chain", "differential"]
@@ -123,8 +122,3 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     if found is None:
         raise ScenarioError(f"{source}: planner.algorithm: {name!r}: not known; allowed: {', '.join(ALGORITHMS)}")
     return found
-
-
-def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
-    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
-    return limits if algorithm.graded else replace(limits, tracking=None)

@@ -16,7 +16,8 @@ from planner.optimisers.markov_chain import MarkovChain
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.algorithms import find_algorithm
+from planner.search.limits_for import limits_for
 from planner.search.score_table import (
     CONSTRAINTS,
     DETECTION,
@@ -83,8 +84,7 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
     progress: called with generations done, generations in all, and a short text.
-    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
-    the plan.
+    stop: asked between generations; a text ("interrupted") ends the search with the best path yet, and stands in it.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path of the same ends and number of waypoints to start from.

@@ -10,7 +10,8 @@ from aircraft.path_limits import Limits
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
-from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.algorithms import find_algorithm
+from planner.search.limits_for import limits_for
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
 from world.errors import MissionError

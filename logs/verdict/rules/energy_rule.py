@@ -98,7 +98,7 @@ def needed_energy(setup: FlightSetup) -> float:
 
 def leg_energies(demands: RouteDemands) -> tuple[list[float], float]:
     """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
-    envelope, route = demands.setup.envelope, demands.setup.route
+    envelope, route = demands.setup.envelope, demands.route
     if not np.isfinite(demands.ground_speed).all():
         return [math.nan] * demands.legs, math.nan
     energies, most = [], 0.0

@@ -3,7 +3,7 @@
 A level turn with bank b takes a lift of n = 1 / cos b weights, and the slowest speed that carries it is the slowest of
 level flight times the root of n (Beard and McLain, *Small Unmanned Aircraft*, section 5.1; any text on the level turn).
 All speeds are true airspeeds at the height where they are flown, as those of the envelope are: that the air is thinner
-there is in them.
+there is in them, and an autopilot's equivalent airspeeds are taken to true ones first.
 """
 
 import math
@@ -50,7 +50,7 @@ def stall_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geome
 def _planned(demands: RouteDemands) -> list[Finding]:
     worst: tuple[float, int, _Margin] | None = None
     for i in range(1, demands.legs):
-        for speed in demands.setup.route.airspeed[i - 1 : i + 1].tolist():
+        for speed in demands.route.airspeed[i - 1 : i + 1].tolist():
             bank, level = planned_bank(demands, i, speed), level_stall(demands, float(demands.points[i, 2]))
             found = _Margin(speed, level / math.sqrt(math.cos(bank)), level, bank)
             if bank > 0.0 and math.isfinite(level) and (worst is None or found.left < worst[0]):
@@ -72,7 +72,7 @@ def planned_bank(demands: RouteDemands, i: int, speed: float) -> float:
         return 0.0
     # The bank limit's radius is that of the faster leg's ground speed.
     fastest = math.sqrt(float(demands.tightest[i]) * GRAVITY * math.tan(limit))
-    slower = max(demands.setup.route.airspeed[i - 1 : i + 1]) - speed
+    slower = max(demands.route.airspeed[i - 1 : i + 1]) - speed
     bank = math.atan(max(0.0, fastest - slower) ** 2 / (GRAVITY * radius))
     # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
     rolled = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))

@@ -87,7 +87,7 @@ def _slope(demands: RouteDemands, rule: str, first: int, last: int, low: float, 
 def _limit(demands: RouteDemands, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
     """Steepest slope of this sign over the ground on a leg's course (rad), and whose it is."""
     side, limits = (0 if slope >= 0.0 else 1), demands.limits
-    speed, course = float(demands.setup.route.airspeed[leg]), float(demands.courses[leg])
+    speed, course = float(demands.route.airspeed[leg]), float(demands.courses[leg])
     by_aircraft = min(limits.slopes(course, up, speed)[side] for up in (low, high))
     by_scenario = (limits.max_climb, limits.max_dive)[side]
     if by_scenario is not None and by_scenario < by_aircraft:

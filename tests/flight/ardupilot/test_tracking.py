@@ -9,8 +9,8 @@ from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
 from flight.ardupilot.tracking import LEAST_ACCEPTANCE, WIND_SPREAD, tracking_error
 
-# s by which a bank follows its demand, as ArduPlane's flights show it; and by which it turns later than it might, on the
-# mean: it looks ten times a second, and demands the next leg's bank at the look after that.
+# s by which a bank follows its demand, as ArduPlane's flights show it; and by which it turns late on the mean: it looks
+# ten times a second, and demands the next leg's bank at the look after that.
 LAG, LATER = 0.38, 0.15
 
 

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
+from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import item_problem
@@ -72,3 +73,18 @@ def test_no_arc_of_the_flight_misses_the_radius_that_is_exported(turn_deg: float
     gust = 0.1 * 15.4 if turbulence == "moderate" else 0.0
     radius = (25.0 + 8.0 + gust) ** 2 / (9.80665 * math.tan(math.radians(30.0)))
     assert exported.items[2].params[1] >= radius / math.cos(turn / 2.0) - radius
+
+
+def test_a_corner_has_the_acceptance_that_its_autopilot_strays_least_with() -> None:
+    """Of a table that is 100 m a radian and 2 m for each m/s over 25: at 60 degrees, 25.8 m/s at 700 m, 106.4 m."""
+    turns, speeds = np.meshgrid(TURNS, SPEED_SHARES * 25.0, indexing="ij")
+    acceptance = 15.0 + 100.0 * turns + 2.0 * (speeds - 25.0)
+    nothing = np.zeros(turns.shape)
+    error = TrackingError(25.0, acceptance, nothing, nothing, nothing, across=0.0, up=0.0, lag=3.0, step=15.0)
+    corner = [(0.0, 0.0, 700.0), (0.0, 1000.0, 700.0), (866.0, 1500.0, 700.0)]
+    exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0), tracking=error)
+    assert [item.params[1] for item in exported.items] == [25.0, 15.0, 121.0, 15.0]
+    windy = replace(a_plan(corner), scenario=with_wind(load_scenario("jacksboro"), 8.0, math.radians(240.0), None))
+    # On the second leg, at 60 degrees, the wind is from behind: 33.8 m/s.
+    blown = plan_mission(windy, 25.0, math.radians(30.0), tracking=error)
+    assert blown.items[2].params[1] == pytest.approx(15.0 + 104.7 + 2.0 * 8.85, abs=1.0)

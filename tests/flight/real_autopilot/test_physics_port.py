@@ -47,10 +47,22 @@ def test_a_frame_that_is_asked_for_again_is_told_again_and_no_frame(
     autopilot.send(packet(3))
     port.receive()
     port.answer(b"the third")
+    time.sleep(0.15)
     for frame in (3, 3, 4):
         autopilot.send(packet(frame))
     assert port.receive().frame == 4
     assert [autopilot.recv(100) for _ in range(3)] == [b"the third"] * 3
+
+
+def test_what_was_asked_before_the_answer_came_has_had_it(port: PhysicsPort, autopilot: socket.socket) -> None:
+    for frame in (3, 3, 3):
+        autopilot.send(packet(frame))
+    port.receive()
+    port.answer(b"the third")
+    autopilot.send(packet(4))
+    assert port.receive().frame == 4
+    port.answer(b"the fourth")
+    assert [autopilot.recv(100) for _ in range(2)] == [b"the third", b"the fourth"]
 
 
 def test_a_frame_that_was_before_is_a_new_beginning(port: PhysicsPort, autopilot: socket.socket) -> None:

@@ -72,7 +72,7 @@ def autopilot() -> Autopilot:
 
 
 def preflight(autopilot: Autopilot, clock: Clock) -> Preflight:
-    return Preflight(autopilot, lambda: clock.time)  # type: ignore[arg-type]
+    return Preflight(autopilot, lambda: clock.time, lambda: clock.time)  # type: ignore[arg-type]
 
 
 def test_it_is_given_the_mission_home_and_auto_in_order(autopilot: Autopilot, clock: Clock) -> None:
@@ -141,3 +141,17 @@ def test_who_is_no_plane_or_says_nothing_is_named(
 def test_a_version_without_a_name_is_its_number() -> None:
     assert version_text(["Barometer ready"], 0x04060000) == "ArduPlane 4.6.0"
     assert version_text([], None) == "ArduPlane, version unknown"
+
+
+def test_time_that_flies_is_no_reason_to_give_up(autopilot: Autopilot) -> None:
+    # A hundred times as fast as the clock: its answer comes after 2 s of its own time, 0.02 s by the clock.
+    clock = Clock()
+    autopilot.has, names = {"LATE": 1.0}, ["LATE"]
+    talk = Preflight(autopilot, lambda: clock.time, lambda: 0.01 * clock.time).meet(names)  # type: ignore[arg-type]
+    autopilot.has = {}
+    for _ in talk:
+        clock.time += 0.1
+        if clock.time > 2.0:
+            autopilot.news.parameters["LATE"] = 1.0
+    assert autopilot.news.parameters == {"LATE": 1.0}
+    assert clock.time < 3.0

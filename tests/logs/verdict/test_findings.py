@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import RULES, SCHEMA, Finding, Verdict, make_finding, verdict_json
@@ -25,6 +26,17 @@ THREAT = {
     "detection_radius_m": 700.0,
     "detection_scale_m": 400.0,
 }
+
+
+def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track) -> None:
+    program = AutopilotProgram("ArduPlane V4.6.0", "ab" * 32, {"WP_RADIUS": 60.0}, {"WP_RADIUS": 60.0}, ("FOO",))
+    verdict = judge(replace(setup, program=program), track)
+    assert "\nFlown by: ArduPlane V4.6.0 (sha256 abababab...), 1 parameters set for" in verdict.summary
+    assert json.loads(verdict_json(verdict))["flown_by"] == {
+        "version": "ArduPlane V4.6.0", "sha256": "ab" * 32, "parameters": {"WP_RADIUS": 60.0},
+        "changed": {"WP_RADIUS": 60.0}, "unused": ["FOO"],
+    }  # fmt: skip
+    assert json.loads(verdict_json(judge(setup, track)))["flown_by"] is None
 
 
 def test_each_rule_names_its_places(setup: FlightSetup, track: Track) -> None:

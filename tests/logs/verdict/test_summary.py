@@ -1,9 +1,13 @@
 """The summary's first line: the answer, the worst of each rule, and no more than four of them."""
 
+from dataclasses import replace
+
+from flight.simulation.autopilot_program import AutopilotProgram
 from logs.verdict.findings import RULES, Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Place
-from logs.verdict.summary import headline
+from logs.verdict.summary import flown_by, headline
 from tests.logs.verdict.judging import leg, missile, waypoint
+from tests.synthetic import make_setup
 
 
 def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
@@ -59,3 +63,14 @@ def test_a_take_off_or_a_landing_that_was_not_judged_is_named_too() -> None:
     assert headline([ends[0]], True) == "flyable; take-off not judged"
     assert headline([terrain, *ends], True) == "flyable; terrain not judged; take-off not judged; landing not judged"
     assert headline([make_finding("takeoff", waypoint(1), ok=True, reason="")], True) == "flyable"
+
+
+def test_a_real_autopilot_is_named_by_its_version_its_digest_and_what_was_changed() -> None:
+    setup, given = make_setup([[0, 0, 300], [0, 2000, 300]]), {f"P{k}": float(k) for k in range(40)}
+    program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0826d539" + "e" * 56, given, {"P1": 1.0, "P2": 2.5})
+    assert flown_by(replace(setup, program=program)) == (
+        "ArduPlane V4.6.0-dev (7fbc1660) (sha256 0826d539...), 40 parameters set for aerosonde, changed: P1 1, P2 2.5"
+    )
+    assert flown_by(replace(setup, program=replace(program, changed={}))).endswith("changed: none")
+    # No more than eight by name.
+    assert flown_by(replace(setup, program=replace(program, changed=given))).endswith("P6 6, P7 7, +32 more")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import Envelope
+from flight.ardupilot.parameters import default_parameters
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -50,6 +51,21 @@ def test_a_stall_speed_at_height_is_a_true_airspeed() -> None:
         setup = make_setup(way, airspeed=25.0, table=table, terrain={"kind": "none"})
         assert level_stall(route_demands(setup), amsl) == pytest.approx(least)
         assert of(judge_geometry(setup), "stall").limit == pytest.approx(least * math.sqrt(1.0 / math.cos(math.pi / 6)))
+
+
+def test_an_equivalent_airspeed_that_is_commanded_is_a_higher_true_one() -> None:
+    """At 1,000 m the standard atmosphere has 1.1116 of 1.225 kg/m^3: true airspeed is 1.0498 times the equivalent."""
+    setup = make_setup([[east, north, 1000] for east, north, _ in CORNER], airspeed=16.5)
+    equivalent = replace(setup, parameters=default_parameters())
+    true = 16.5 * math.sqrt(1.225 / 1.1116)
+    for flown, speed in ((setup, 16.5), (equivalent, true)):
+        item = of(judge_geometry(flown), "stall", FLIGHT)
+        assert item.planned == pytest.approx(speed, abs=2e-3)
+        assert item.limit == pytest.approx(BANKED, abs=1e-3)
+        assert item.ok is (speed > BANKED)
+    # What is asked for is what is commanded: 17.193 and 3 % are 17.71 m/s true, which are 16.87 equivalent.
+    slow = replace(equivalent, route=replace(setup.route, airspeed=np.full(2, 16.0)))
+    assert suggested(of(judge_geometry(slow), "stall"), "airspeed").wanted == pytest.approx(16.9)
 
 
 def test_the_bank_of_a_turn_is_that_of_its_radius_and_of_what_there_is_time_for() -> None:
