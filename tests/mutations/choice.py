@@ -25,7 +25,8 @@ def room_mutants(room: str) -> list[Mutant]:
     else:
         files = sorted((ROOT / "logs" / "verdict" / room).glob("*.py"))
         found = [mutant for file in files for mutant in walked_mutants(room, str(file.relative_to(ROOT)))]
-    return sorted(found, key=lambda mutant: (mutant.order(), mutant.start))
+    sources = {mutant.file: (ROOT / mutant.file).read_bytes() for mutant in found}
+    return sorted(found, key=lambda mutant: (mutant.order(sources[mutant.file]), mutant.start))
 
 
 def chosen_mutants(count: int | None) -> list[Mutant]:
