@@ -1,8 +1,8 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
-``python -m tests.bench [chain] [planner] [peers] [flight] [aircraft] [autopilot] [--runs N] [--seconds S] [--seeds N]``:
-parts to measure (default: all), seeds of each whole planner run (15), what OMPL is given (10 s), and seeds of flights
-(20).
+``python -m tests.bench [chain] [planner] [peers] [flight] [aircraft] [autopilot] [--runs N] [--seconds S]
+[--seeds N]``: parts to measure (default: all), seeds of each whole planner run (15), what OMPL is given (10 s), and
+seeds of flights (20).
 """
 
 import argparse

@@ -1,7 +1,7 @@
 """The verdict by ArduPlane's law against the verdict on ArduPlane's own flight of the same mission.
 
 ``python -m tests.bench.verdict_agreement [--missions N] [--from SEED] [--json FILE]`` makes missions that keep one
-limit by a little, or exceed it (`tests.bench.field_missions.close_mission`), flies each by the law, with satellites'
+limit by a little, or exceed it (`tests.field_missions.close_mission`), flies each by the law, with satellites'
 errors, and with the program that PLANFLY_ARDUPLANE names, both in the same air, judges both flights by the same rules,
 and counts where the answers differ.  ``--ordinary N`` instead flies ordinary missions by the law alone, and counts
 which of them it calls not flyable.
@@ -22,7 +22,7 @@ from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import make_setup
 from tests.bench.against_arduplane import BINARY
-from tests.bench.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
+from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
 
 # By so much at least clearance is lost, or a sphere entered, to count as grave, m.
 GRAVE = 1.0
