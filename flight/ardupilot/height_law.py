@@ -14,8 +14,8 @@ import math
 from aircraft.envelope import GRAVITY
 from world.kernels import Record, compiled
 
-# What ArduPlane reads by what is true: its sensor's noise adds to the pressure's mean.  Measured in the logs of 18 flights
-# of ArduPlane 4.6 in our physics, in still air as in turbulence: 1.0024 to 1.0030.
+# What ArduPlane reads by what is true: its sensor's noise adds to the pressure's mean.  Measured in logs of 20 flights
+# of ArduPlane 4.6 in planfly's physics, in still air as in turbulence: 1.0024 to 1.0030.
 AIRSPEED_READING = 1.0027
 # Of the rate of total energy, for the throttle's damping: smoothed over this long, s.
 _RATE_LAG = 0.5

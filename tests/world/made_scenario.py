@@ -31,11 +31,17 @@ def made_spec(**changes: Any) -> dict[str, Any]:
 def same_scenario(a: Scenario, b: Scenario) -> bool:
     """Whether two scenarios agree in their data and, bit for bit, in their arrays."""
     # JSON states who flies where a file may leave it to the default.
-    same = (
-        (a.name, a.origin, a.floor, a.ceiling, a.start_course, a.limits, a.planner, a.flight.stated(), a.wind)
-        == (b.name, b.origin, b.floor, b.ceiling, b.start_course, b.limits, b.planner, b.flight.stated(), b.wind)
-        and a.to_json() == b.to_json()
-    )
+    same = (a.name, a.origin, a.floor, a.ceiling, a.start_course, a.limits, a.planner, a.flight.stated(), a.wind) == (
+        b.name,
+        b.origin,
+        b.floor,
+        b.ceiling,
+        b.start_course,
+        b.limits,
+        b.planner,
+        b.flight.stated(),
+        b.wind,
+    ) and a.to_json() == b.to_json()
     arrays = [(getattr(a, name), getattr(b, name)) for name in ("bounds", "start", "destination")]
     arrays += [
         (getattr(a.threats, name), getattr(b.threats, name)) for name in ("position", "kill_radius", "kill_scale")

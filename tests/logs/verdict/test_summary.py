@@ -1,8 +1,12 @@
 """The summary's first line: the answer, the worst of each rule, and no more than four of them."""
 
+from dataclasses import replace
+
+from flight.ardupilot.parameters import default_parameters, parameters_of
 from logs.verdict.findings import RULES, Finding, make_finding, message
 from logs.verdict.places import FLIGHT, Place
-from logs.verdict.summary import headline
+from logs.verdict.summary import headline, summary_lines
+from tests.logs.made_flight import make_setup
 from tests.logs.verdict.judging import leg, missile, waypoint
 
 
@@ -49,3 +53,21 @@ def test_terrain_that_was_not_judged_is_named_where_all_else_passes() -> None:
     assert headline([known], True) == "flyable"
     assert headline([known, unknown], True) == "flyable; terrain not judged on 1 legs"
     assert headline([unknown], True) == "flyable; terrain not judged"
+
+
+def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
+    setup = replace(make_setup(), nav="gnss")
+    lines = summary_lines([], True, replace(setup, parameters=default_parameters()), "flown")
+    assert (
+        "Flown by: ArduPlane's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
+        " TECS_HDEM_TCONST 3 s); navigation with GNSS's error (1.5 m on each axis)"
+    ) in lines
+    assert not [line for line in lines if line.startswith("Parameters")]
+    mine = parameters_of("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
+    lines = summary_lines([], True, replace(setup, parameters=mine), "flown")
+    assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
+    known = len(mine.values) - 1
+    assert (
+        f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
+        " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
+    ) in lines
