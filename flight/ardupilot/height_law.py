@@ -27,6 +27,9 @@ _PITCH_SPARE, _THROTTLE_SPARE = math.radians(5.0), 0.1
 _SPEED_SHARE, _THROTTLE_SHARE = 0.25, 0.5
 # Of the greatest rate of energy, what a change of speed may take.
 _SPEED_CHANGE_SHARE = 0.5
+# So near to full throttle the demand touches it now and then, by the noise of what it is made of (0.005 to 0.02 fit the
+# saturated climbs of 4 flights; with none the law climbs up to 9 m more than ArduPlane in 400).
+_NEARLY = 0.0125
 # Below this share of AIRSPEED_MIN, with the throttle all but full, speed comes before height.
 _UNDERSPEED, _ALL_BUT_FULL = 0.9, 0.95
 
@@ -167,7 +170,7 @@ def _set_throttle(
     own.throttle_before = throttle
     throttle += own.throttle_sum
     own.throttle_demand = min(highest, max(lowest, throttle))
-    own.held = 1 if throttle >= highest else (-1 if throttle <= parameters.throttle_min else 0)
+    own.held = 1 if throttle >= highest - _NEARLY else (-1 if throttle <= parameters.throttle_min else 0)
 
 
 @compiled
