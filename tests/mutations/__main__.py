@@ -17,7 +17,7 @@ from dataclasses import asdict
 from pathlib import Path
 from queue import SimpleQueue
 
-from tests.mutations.choice import all_mutants, chosen_mutants
+from tests.mutations.choice import ROOMS, chosen_mutants
 from tests.mutations.covering import covering_tests, kernels_on, limits_at
 from tests.mutations.mutant import ROOT, Mutant
 from tests.mutations.workplace import Trial, Workplace
@@ -31,19 +31,15 @@ def main() -> int:
     """Try mutants out; the exit code."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutations", description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--count", type=int, default=200, help="how many mutants (0: all; default 200)")
-    parser.add_argument("--room", action="append", help="limits, rules, measures or physics; default: all of them")
+    parser.add_argument("--room", action="append", choices=ROOMS, help="may be given more than once; default: all")
     parser.add_argument("--match", default="", help="only mutants of files or texts with this in them")
     parser.add_argument("--at-once", type=int, default=2, help="how many are tried at the same time (2)")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds after which a mutant counts as noticed")
     parser.add_argument("--keep", type=Path, help="folder of the copies, kept for the next run of the same sources")
     parser.add_argument("--list", action="store_true", help="list the mutants and try none")
     args = parser.parse_args()
-    mutants = [
-        mutant
-        for mutant in (all_mutants() if args.match or args.room else chosen_mutants(args.count or None))
-        if (not args.room or mutant.room in args.room) and args.match in f"{mutant.file} {mutant.old} -> {mutant.new}"
-    ]
-    mutants = mutants[: args.count or None]
+    chosen = chosen_mutants(None if args.match else args.count or None, args.room or ROOMS)
+    mutants = [mutant for mutant in chosen if args.match in _text(mutant)][: args.count or None]
     if args.list:
         for mutant in mutants:
             print(_text(mutant))

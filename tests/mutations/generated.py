@@ -13,8 +13,8 @@ STEP = 1.3
 # Of bounds on garbage, condition numbers and rounding only the order of magnitude matters.
 ORDERS = 1000.0
 BY_ORDERS = ("FARTHEST", "FASTEST", "MOST_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CHORD_TIME", "FAR")
-# Where a number decides how much is computed: one way nothing changes but time.  The other way is tried.
-ONE_WAY = {"CHORD_TIME": "*", "FAR": "/", "TRIES": "-"}
+# Numbers that decide how much is computed, where more costs nothing but time: how each is changed.
+EFFORTS = {"CHORD_TIME": "*", "FAR": "/", "TRIES": ""}
 
 _COMPARISONS = {ast.Lt: ">=", ast.LtE: ">", ast.Gt: "<=", ast.GtE: "<", ast.Eq: "!=", ast.NotEq: "=="}
 _SIGNS: dict[type[ast.operator], tuple[str, str]] = {
@@ -38,16 +38,13 @@ def limit_mutants() -> list[Mutant]:
             continue
         names = [name.id for target in node.targets for name in ast.walk(target) if isinstance(name, ast.Name)]
         factor = ORDERS if any(name in BY_ORDERS for name in names) else STEP
-        ways = {ONE_WAY[name] for name in names if name in ONE_WAY}
         for number in ast.walk(node.value):
             # A name or a key is no number, nor is what calm air adds to one.
             if not isinstance(number, ast.Constant) or not isinstance(number.value, int | float) or not number.value:
                 continue
             whole = isinstance(number.value, int)
-            signs = ways or set("+-" if whole else "*/")
-            found += [
-                source.mutant(number, f"({number.value!r} {sign} {1 if whole else factor})") for sign in sorted(signs)
-            ]
+            signs = EFFORTS.get(names[0], "+-" if whole else "*/")
+            found += [source.mutant(number, f"({number.value!r} {sign} {1 if whole else factor})") for sign in signs]
     return found
 
 

@@ -34,9 +34,11 @@ class Mutant:
         """Its line, from 1 on."""
         return source[: self.start].count(b"\n") + 1
 
-    def order(self) -> str:
-        """A key that shuffles mutants alike each time, and does not depend on where in its file one stands."""
-        return hashlib.sha256(f"{self.file}|{self.old}|{self.new}".encode()).hexdigest()
+    def order(self, source: bytes) -> str:
+        """A key that shuffles mutants alike each time, by the line that one changes and not by that line's number."""
+        head, tail = source[: self.start].rsplit(b"\n", 1)[-1], source[self.stop :].split(b"\n", 1)[0]
+        place = b"|".join((self.file.encode(), head, self.old.encode(), self.new.encode(), tail))
+        return hashlib.sha256(place).hexdigest()
 
 
 def replacing(room: str, file: str, old: str, new: str) -> Mutant:

@@ -1,5 +1,7 @@
 """Which rows are usable, and which waypoints a flight has passed, just inside and just outside."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -43,9 +45,23 @@ def test_a_row_with_a_number_that_no_flight_has_is_bad(setup: FlightSetup, colum
     assert aligned.bad_rows == bad
 
 
-@pytest.mark.parametrize(("short", "arrived"), [(9.7, True), (10.3, False)])
-def test_a_flight_that_ends_ten_metres_short_has_arrived(setup: FlightSetup, short: float, arrived: bool) -> None:
-    aligned = lay_track(route_demands(setup), fly_path(setup, stop=6000.0 - short))
+@pytest.mark.parametrize(
+    ("acceptance", "short", "arrived"),
+    # Where the mission states no radius, and where it states a smaller or a larger one.
+    [
+        (0.0, 9.7, True),
+        (0.0, 10.3, False),
+        (3.0, 9.7, True),
+        (3.0, 10.3, False),
+        (30.0, 29.7, True),
+        (30.0, 30.3, False),
+    ],
+)
+def test_a_flight_that_ends_ten_metres_short_has_arrived(
+    setup: FlightSetup, acceptance: float, short: float, arrived: bool
+) -> None:
+    stated = replace(setup, route=replace(setup.route, acceptance=np.full(3, acceptance)))
+    aligned = lay_track(route_demands(stated), fly_path(setup, stop=6000.0 - short))
     assert aligned is not None
     assert aligned.passed.tolist() == [True, True, arrived]
 
@@ -63,9 +79,12 @@ def test_a_waypoint_further_than_half_a_kilometre_aside_is_none_of_the_flights(
 
 
 def test_a_place_passed_twice_has_each_time_the_rows_of_its_own_passage() -> None:
-    """Two rounds of a square at one height: the second's waypoints are nearest to rows of the first, too."""
+    """Two rounds of a square at one height, the first 3 m aside: the rows nearest to its waypoints are the second's."""
     square = [[0.0, 0.0, 300.0], [0.0, 1500.0, 300.0], [1500.0, 1500.0, 300.0], [1500.0, 0.0, 300.0]]
     setup = make_setup(square + square)
-    aligned = lay_track(route_demands(setup), fly_path(setup, rate=20.0))
+    stations = waypoint_stations(setup)
+    between = 0.5 * float(stations[3] + stations[4])
+    track = fly_path(setup, rate=20.0, across=lambda s: 3.0 * (s < between))
+    aligned = lay_track(route_demands(setup), track)
     assert aligned is not None
-    assert aligned.track.time[aligned.rows] == pytest.approx(waypoint_stations(setup) / 25.0, abs=0.1)
+    assert aligned.track.time[aligned.rows] == pytest.approx(stations / 25.0, abs=1.0)
