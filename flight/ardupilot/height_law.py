@@ -115,7 +115,9 @@ def weigh_energies(
     _estimate_airspeed(state, estimated, parameters, own, dt)
     speed = own.airspeed
     slowest = parameters.airspeed_min * factor
-    most, least = GRAVITY * parameters.tecs_climb_max, -GRAVITY * parameters.tecs_sink_min
+    # What it cannot climb now, full throttle does not give.
+    most = GRAVITY * parameters.tecs_climb_max * own.climb_share
+    least = -GRAVITY * parameters.tecs_sink_min
     full = own.throttle_demand >= _ALL_BUT_FULL * parameters.throttle_max
     under = speed < _UNDERSPEED * slowest and full
     wanted = slowest if under else airspeed
@@ -149,8 +151,8 @@ def _set_throttle(
     per_throttle = (most - least) / (highest - parameters.throttle_min)
     wanted = min(most, max(least, high / parameters.tecs_time))
     own.energy_rate_error += (wanted - rate - own.energy_rate_error) * dt / (dt + _RATE_LAG)
-    level = math.cos(state.roll) * math.cos(state.pitch)
-    drag = parameters.tecs_roll_to_throttle * (1.0 / min(1.0, max(0.1, level * level)) - 1.0)
+    tilt = math.sin(state.roll) * math.cos(state.pitch)
+    drag = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
     throttle = parameters.throttle_cruise + (wanted + drag) / per_throttle
     gain = 1.0 / (parameters.tecs_time * per_throttle)
     throttle += gain * (missing + parameters.tecs_throttle_damping * own.energy_rate_error)

@@ -19,6 +19,9 @@ NAVIGATION_TICK = 0.1
 # A bank follows its demand so much later than RLL2SRV_TCONST says, as a share of it; and a pitch angle.
 ROLL_LAG = 0.84
 PITCH_LAG = 1.35
+# TECS's two integrals of the pitch balance each other, and no steady flight tells how large they are; what came before
+# the first waypoint has left this in the one of speed, m^2/s^3 (12 to 39, 27 on average, in 18 flights of ArduPlane).
+SPEED_SUM = 27.0
 # The international standard atmosphere below 11 km: temperature falls by this share of sea level's a metre, and density
 # with that power of the temperature.
 _LAPSE, _DENSITY_POWER = 2.25577e-5, 4.25588
@@ -86,7 +89,8 @@ def _begin(
     own.airspeed_demand = state.airspeed
     # As it has flown before: what level flight here takes is known.
     own.pitch_demand = state.alpha - parameters.pitch_trim
-    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY
+    own.speed_sum = SPEED_SUM
+    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY - SPEED_SUM
     own.throttle_demand = memory.trim_throttle
     own.throttle_before = parameters.throttle_cruise
     own.throttle_sum = memory.trim_throttle - parameters.throttle_cruise

@@ -86,6 +86,11 @@ class AutopilotFlight(Airborne):
         """End the program, and remove what it has left."""
         self._stack.close()
 
+    @property
+    def exchanged(self) -> float:
+        """Seconds of the autopilot's time that have passed since its boot."""
+        return self._lockstep.time
+
     def prepare(self) -> None:
         """Have the autopilot settle, take the mission and fly to the first waypoint.  Raises FlightError."""
         with self._named():

@@ -28,7 +28,14 @@ _PR_SET_PDEATHSIG = 1
 
 
 def check_binary(binary: Path) -> str:
-    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run."""
+    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run.
+
+    >>> try:
+    ...     check_binary(Path("nobody/arduplane"))
+    ... except FlightError as error:
+    ...     print(error)
+    nobody/arduplane: no such file; the program of an ArduPlane for software in the loop is expected
+    """
     if not binary.exists():
         raise FlightError(f"{binary}: no such file; the program of an ArduPlane for software in the loop is expected")
     if not binary.is_file():

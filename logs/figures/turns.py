@@ -107,12 +107,13 @@ def _zoom(axes: Any, values: list[PlaceValue], rule: str) -> None:
     limits = [abs(value.limit) for value in values if math.isfinite(value.limit)]
     if rule == "clearance" and limits and near:
         axes.set_ylim(0.0, max(min(max(near), 12.0 * max(limits)), 1.5 * max(limits), 1.1 * min(near)))
-    elif rule == "turn" and near and limits and max(limits) > 4.0 * max(near):
+    elif rule in ("turn", "corridor") and near and limits and max(limits) > 4.0 * max(near):
         axes.set_ylim(
             0.0, max(1.3 * max(near), 1.1 * min(limits)) if min(limits) < 4.0 * max(near) else 1.3 * max(near)
         )
+        unit = "°" if rule == "turn" else " m"
         axes.annotate(
-            f"limits from {min(limits):.0f}°", (1.0, 1.0), (0, 3), xycoords="axes fraction",
+            f"limits from {min(limits):.0f}{unit}", (1.0, 1.0), (0, 3), xycoords="axes fraction",
             textcoords="offset points", ha="right", fontsize=7, color=style.MISSILE,
         )  # fmt: skip
 

@@ -9,8 +9,14 @@ from collections.abc import Mapping
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only, judge_unflown
-from logs.verdict.levels import AirframeAnswer, FlownBeside, LevelAnswer
+from logs.verdict.judge_geometry import (
+    flown_level,
+    geometric_findings,
+    judge_geometry,
+    judge_plan_only,
+    judge_unflown,
+)
+from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
 from logs.verdict.places import Disagreement, Place
@@ -79,21 +85,19 @@ def judge_flight(
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
     findings = with_suggestions(demands, aligned, findings)
-    others = _other_levels(demands, findings, None if beside is None else beside.airframe) if envelope else ()
-    own = LevelAnswer("airframe" if setup.parameters is None else "autopilot", flyable, headline(findings, flyable))
+    levels = _levels(demands, findings, flyable, beside)
     deciding = None if beside is None or flyable else beside.deciding
-    lines = summary_lines(findings, setup, "flown", (*others, own), deciding)
-    ends = () if aligned is None else aligned.leg_ends()
+    lines = summary_lines(findings, setup, "flown", levels, deciding)
     return Verdict(
         findings,
         flyable,
         complete,
         lines,
         "flown",
-        levels=(*others, own),
+        levels=levels,
         deciding=deciding,
         notes=setup.route.notes,
-        leg_ends=ends,
+        leg_ends=() if aligned is None else aligned.leg_ends(),
         program=setup.program,
     )
 
@@ -120,19 +124,25 @@ def _flown_findings(
     return fold_loiters(demands, aligned, findings)
 
 
-def _other_levels(
-    demands: RouteDemands, flown: tuple[Finding, ...], airframe: AirframeAnswer | None
+def _levels(
+    demands: RouteDemands, flown: tuple[Finding, ...], flyable: bool, beside: FlownBeside | None
 ) -> tuple[LevelAnswer, ...]:
-    """What geometry says, and the airframe where it was flown beside, and where each differs from the flight."""
-    predicted = geometric_findings(demands)
-    flyable = not any(item.ok is False for item in predicted)
-    outcomes = {(item.rule, item.place): item.ok for item in predicted}
-    levels = [LevelAnswer("geometry", flyable, headline(predicted, flyable), _differing("geometry", outcomes, flown))]
-    if airframe is not None:
-        outcomes = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
-        differing = _differing("airframe", outcomes, flown)
+    """What geometry says, and the airframe where it was flown beside, where each differs; and the flight's own answer.
+
+    Without the envelope there is nothing beside the flight.
+    """
+    levels = []
+    if demands.envelope:
+        predicted = geometric_findings(demands)
+        passes = not any(item.ok is False for item in predicted)
+        differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
+        levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))
+    if demands.envelope and beside is not None and beside.airframe is not None:
+        airframe = beside.airframe
+        passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
+        differing = _differing("airframe", passed, flown)
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
-    return tuple(levels)
+    return (*levels, LevelAnswer(flown_level(demands.setup), flyable, headline(flown, flyable)))
 
 
 def _differing(

@@ -4,7 +4,7 @@ import math
 
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
-from logs.verdict.levels import LevelAnswer
+from logs.verdict.levels import LevelAnswer, LevelName
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.places import FLIGHT, PLAN
 from logs.verdict.rules.bounds_rule import bounds_findings
@@ -75,6 +75,11 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
 
 
+def flown_level(setup: FlightSetup) -> LevelName:
+    """The level that a flight of a setup answers."""
+    return "airframe" if setup.parameters is None else "autopilot"
+
+
 def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> Verdict:
     """Judge a flight of which there is no row: its route's geometry, and why nothing was flown; never complete.
 
@@ -90,8 +95,13 @@ def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> V
     stopped = make_finding(
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )
-    findings = (*with_suggestions(demands, None, geometric_findings(demands)), stopped)
-    levels = (LevelAnswer("geometry", False, headline(findings, False)),)
+    predicted = geometric_findings(demands)
+    passes = not any(item.ok is False for item in predicted)
+    findings = (*with_suggestions(demands, None, predicted), stopped)
+    levels = (
+        LevelAnswer("geometry", passes, headline(predicted, passes)),
+        LevelAnswer(flown_level(setup), False, headline(findings, False)),
+    )
     lines = summary_lines(findings, setup, "geometric", levels)
     return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes)
 

@@ -163,7 +163,9 @@ def summary_lines(
         lines.append(f"Flown by: {flown_by(setup)}; navigation {_NAV[setup.nav]}")
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
-    lines += [f"{_LEVELS[other.name]}: {other.headline}; {_agreement(other)}" for other in others]
+    for other in others:
+        agreement = f"; {_agreement(other)}" if level == "flown" else ""
+        lines.append(f"{_LEVELS[other.name]}: {other.headline}{agreement}")
     return tuple(lines)
 
 

@@ -109,8 +109,7 @@ def kill_density(
         kind = index.classes[number]
         per_metre, columns, rows = kind.cells_per_metre, kind.columns, kind.rows
         # A hair more, for what rounding would leave out.
-        radius = kind.largest_radius + margin + within + 1e-6
-        side = 1.0 / per_metre
+        radius, side = kind.largest_radius + margin + within + 1e-6, 1.0 / per_metre
         lowest = _cell((min(ay, by) - radius - kind.south) * per_metre, rows)
         highest = _cell((max(ay, by) + radius - kind.south) * per_metre, rows)
         for row in range(max(0, lowest), min(rows, highest + 1)):

@@ -18,16 +18,7 @@ from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
 from planner.search.limits_for import limits_for
-from planner.search.score_table import (
-    CONSTRAINTS,
-    DETECTION,
-    HEIGHT,
-    KILL,
-    LENGTH,
-    best_first,
-    no_scores,
-    safe,
-)
+from planner.search.score_table import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, best_first, no_scores, safe
 from planner.search.search_state import Archive, Improved, Search, SearchProgress, StopCondition
 from planner.seeding.first_samples import bridge_basis, first_samples
 from planner.seeding.grid_routes import GridRoute, grid_routes

@@ -51,11 +51,11 @@ def kernels_on(mutant: Mutant) -> list[str]:
 
 
 def _own_tests(file: str) -> list[str]:
-    """Tests of a module's name: tests/logs/verdict/rules/test_slope_rule.py, and test_slope_rule_limits.py."""
+    """Tests of a module's name: tests/logs/verdict/rules/test_slope_rule.py, and limits/test_slope_rule_limits.py."""
     path = Path(file)
     # An aircraft's model stands in a folder of its own, its tests in that of all aircraft.
     folder = ROOT / "tests" / (path.parent if path.suffix == ".py" else path.parent.parent)
-    return [str(found.relative_to(ROOT)) for found in sorted(folder.glob(f"test_{path.stem}*.py"))]
+    return [str(found.relative_to(ROOT)) for found in sorted(folder.rglob(f"test_{path.stem}*.py"))]
 
 
 def limits_at(mutant: Mutant) -> list[str]:

@@ -144,7 +144,17 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
 
 
 def true_route(setup: FlightSetup) -> Route:
-    """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height."""
+    """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height.
+
+    >>> from flight.ardupilot.parameters import default_parameters
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> true_route(setup) is setup.route
+    True
+    >>> faster = true_route(replace(setup, parameters=default_parameters()))
+    >>> bool((faster.airspeed > setup.route.airspeed).all())
+    True
+    """
     route = setup.route
     if setup.parameters is None:
         return route

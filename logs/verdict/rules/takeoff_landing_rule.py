@@ -1,6 +1,8 @@
 """The take-off and landing rules: the climb from the ground to a mission's first place, and the approach to its last.
 
 A flight begins and ends in the air, so that both are judged by the mission's places alone, whether it was flown or not.
+An approach steeper than the aircraft can sink misses its landing place, and fails.  A climb steeper than it can climb
+is not judged: a climb-out of 30 degrees is what QGroundControl draws (its TakeoffMissionItem), and autopilots climb on.
 """
 
 import math
@@ -12,6 +14,8 @@ from logs.verdict.tolerances import PLAN_TOLERANCE
 
 # How the flight does it instead.
 _ENDS = {"takeoff": "begins", "landing": "ends"}
+# What is said of a slope beyond the limit.
+_BEYOND = {"takeoff": None, "landing": False}
 
 
 def takeoff_landing_findings(demands: RouteDemands) -> list[Finding]:
@@ -65,15 +69,16 @@ def _slope(demands: RouteDemands, rule: str, first: int, last: int, low: float, 
     limit, source = _limit(demands, first, low, high, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(high - low):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
-    ok = abs(slope) <= limit + PLAN_TOLERANCE
+    within = abs(slope) <= limit + PLAN_TOLERANCE
     reason = f"{text} of {math.degrees(limit):.1f}°; not flown: the flight {_ENDS[rule]} in the air"
     fault = message(text, f"; at most {math.degrees(limit):.1f}° can be flown at this speed and in this wind")
+    ok = True if within else _BEYOND[rule]
     return make_finding(
         rule,
         place,
         ok=ok,
-        reason=reason if ok else fault.text,
-        faults=[] if ok else [fault],
+        reason=reason if within else fault.text,
+        faults=[] if within else [fault],
         planned=math.degrees(abs(slope)),
         limit=math.degrees(limit),
         source=source,

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
+from flight.dynamics.fdm import Fdm
+from flight.dynamics.trim import straight
 from flight.real_autopilot.servo_map import ServoOutput, load_servo_map
 from world.errors import FlightError
 
@@ -61,11 +63,16 @@ def test_the_controls_come_from_their_outputs(tmp_path: Path) -> None:
 def test_full_pulses_are_the_aircrafts_full_throws(name: str) -> None:
     aircraft = load_aircraft(name)
     servos = load_servo_map(aircraft)
-    full = servos.commands([1900, 1900, 2000, 1900])
+    elevator, *full = servos.commands([1900, 1900, 2000, 1900])
     # More is: roll right, nose up, full throttle, nose right; a trailing edge down and a yaw to the left are positive.
-    limits = (-aircraft.max_elevator, aircraft.max_aileron, -aircraft.max_rudder, 1.0)
-    assert full == pytest.approx(limits)
-    assert servos.commands([1500, 1500, 1000, 1500]) == pytest.approx((0.0, 0.0, 0.0, 0.0))
+    assert full == pytest.approx([aircraft.max_aileron, -aircraft.max_rudder, 1.0])
+    middle, *rest = servos.commands([1500, 1500, 1000, 1500])
+    assert rest == pytest.approx([0.0, 0.0, 0.0])
+    # The elevator moves by as much about the place where level flight at cruise has it.
+    level = straight(Fdm(aircraft), aircraft.airspeed, 500.0)
+    assert level is not None
+    assert middle == pytest.approx(level.elevator, abs=math.radians(0.1))
+    assert elevator - middle == pytest.approx(-aircraft.max_elevator)
 
 
 @pytest.mark.parametrize(

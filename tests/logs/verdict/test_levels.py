@@ -96,3 +96,12 @@ def test_where_only_the_aircraft_fails_the_verdict_is_the_autopilots(autopilot: 
 )
 def test_words_of_a_deciding_parameter(rule: str, off: float | None, text: str) -> None:
     assert deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", rule, leg(4), off)) == text
+
+
+def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilot: FlightSetup) -> None:
+    for setup, name in ((autopilot, "autopilot"), (replace(autopilot, parameters=None), "airframe")):
+        verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no way made")
+        assert [(level.name, level.flyable) for level in verdict.levels] == [("geometry", True), (name, False)]
+        assert verdict.headline == verdict.levels[-1].headline
+        assert "not started: no way made" in verdict.headline
+        assert verdict.lines[-1] == "By geometry alone: flyable"

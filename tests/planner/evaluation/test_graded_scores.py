@@ -41,6 +41,8 @@ def test_a_sphere_cut_between_points_is_seen_only_by_the_graded_scores(problem: 
     assert graded[0, Objective.KILL_EXPOSURE] > 0
 
 
+# Ground whose raster can hold a ramp.
+FINE = {"kind": "peaks", "peak": [{"east_m": 0, "north_m": 0, "height_m": 1, "sigma_m": 100}]}
 # An autopilot that strays from its legs, over level ground at 0 m; 60 m of clearance.
 CORNER = np.array([[0.0, 0.0, 200.0], [3000.0, 0.0, 200.0], [3000.0, 2500.0, 200.0], [6000.0, 2500.0, 200.0]])
 
@@ -96,7 +98,7 @@ def test_ground_under_a_climb_is_kept_by_the_lag(strayed: Callable[..., ProblemA
         [[0.0, 0.0, top + 40.0], [2000.0, 0.0, top + 40.0], [3400.0, 0.0, top + 180.0], [6000.0, 0.0, top + 180.0]]
     )
     # Ground that rises with the climb, 8 m nearer than it may be.
-    data = strayed({"lag": lag})
+    data = strayed({"lag": lag}, terrain=FINE)
     heights = np.zeros(data.heights.shape, dtype=np.float32)
     columns = np.arange(heights.shape[1])
     east = data_east(data, columns)

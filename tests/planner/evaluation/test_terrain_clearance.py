@@ -82,7 +82,9 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
             depth = terrain_excess(rough, data.slope_bounds, required, 0.0, tuple(ends), *line)
             assert (depth > 0.0) == (off < 0.0)
             # With more wanted by what it is clear, or less by what it is deep and a step between samples.
-            more = terrain_excess(rough, data.slope_bounds, required, step if off > 0.0 else -step, tuple(ends), *line)
+            more = terrain_excess(
+                rough, data.slope_bounds, required, step if off > 0.0 else -step - 0.5, tuple(ends), *line
+            )
             assert (more > 0.0) == (off > 0.0)
             both[int(depth > 0.0)] += 1
     assert both.min() > 100

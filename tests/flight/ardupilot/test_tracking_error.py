@@ -7,7 +7,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
-from flight.ardupilot.tracking import LEAST_ACCEPTANCE, WIND_SPREAD, tracking_error
+from flight.ardupilot.tracking_error import LEAST_ACCEPTANCE, WIND_SPREAD, tracking_error
 
 # s by which a bank follows its demand, as ArduPlane's flights show it; and by which it turns late on the mean: it looks
 # ten times a second, and demands the next leg's bank at the look after that.
