@@ -30,3 +30,18 @@ def test_a_flown_clearance_is_kept_to_a_decimetre_from_the_first_row_to_the_last
     assert item.ok is ok
     assert item.flown == pytest.approx(up, abs=0.01)
     assert np.isclose(item.margin or 0.0, up - 60.0, atol=0.01)
+
+
+@pytest.mark.parametrize(("up", "ok"), [(59.92, True), (59.88, False)])
+@pytest.mark.parametrize(("number", "at"), [(0, 500.0), (2, 9500.0)])
+def test_what_was_flown_before_the_first_waypoint_and_after_the_last_counts(
+    up: float, ok: bool, number: int, at: float
+) -> None:
+    """A track that begins a kilometre before its route and ends a kilometre after it."""
+    longer = make_setup([[0, 0, 100], [0, 10_000, 100]])
+    setup = make_setup(
+        [[0, 1000, 100], [0, 4000, 100], [0, 6000, 100], [0, 9000, 100]], limits={"min_clearance_m": 60.0}
+    )
+    item = of(judge(setup, fly_path(longer, up=bump(at, up - 100.0, 50.0))), "clearance", leg(number))
+    assert item.ok is ok
+    assert item.flown == pytest.approx(up, abs=0.01)
