@@ -18,7 +18,7 @@ from world.kernels import Record, compiled, compiled_views
 NAVIGATION_TICK = 0.1
 # A bank follows its demand so much later than RLL2SRV_TCONST says, as a share of it; and a pitch angle.
 ROLL_LAG = 0.84
-PITCH_LAG = 1.35
+PITCH_LAG = 1.1
 # TECS's two integrals of the pitch balance each other, and no steady flight tells how large they are; what came before
 # the first waypoint has left this in the one of speed, m^2/s^3 (12 to 39, 27 on average, in 18 flights of ArduPlane).
 SPEED_SUM = 27.0

@@ -161,6 +161,7 @@ def summary_lines(
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
     if level == "flown":
         lines.append(f"Flown by: {flown_by(setup)}; navigation {_NAV[setup.nav]}")
+        lines += _parameter_lines(setup)
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
     for other in others:
@@ -205,6 +206,21 @@ def _program_text(program: AutopilotProgram, aircraft: str) -> str:
         f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
         f" {Path(aircraft).name}, changed: {', '.join(changed[:_CHANGED]) or 'none'}{more}"
     )
+
+
+def _parameter_lines(setup: FlightSetup) -> list[str]:
+    """Where ArduPlane's parameters are from, if a file states any, and which of the file's have no use here."""
+    parameters = setup.parameters
+    if parameters is None or not parameters.source:
+        return []
+    names = {origin: len(parameters.by_origin(origin)) for origin in ("file", "aircraft", "default")}
+    unused = list(parameters.unused[:_NAMED])
+    more = len(parameters.unused) - len(unused)
+    said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
+    return [
+        f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
+        f" {names['default']} ArduPlane's defaults{said}"
+    ]
 
 
 def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:

@@ -8,6 +8,7 @@ keeps.  --keep writes what the program flew, with its missions, as `tests.author
 """
 
 import argparse
+import hashlib
 import json
 import math
 import os
@@ -216,8 +217,9 @@ def summary(all_compared: list[Compared]) -> dict[str, Any]:
 
 
 def kept_flight(compared: Compared, setup: FlightSetup) -> dict[str, Any]:
-    """What `tests.authorities` keeps of a real flight: its scenario, its mission, and its figures."""
+    """What `tests.authorities` keeps of a real flight: who flew, its scenario, its mission, and its figures."""
     return {
+        "arduplane_sha256": hashlib.sha256(BINARY.read_bytes()).hexdigest(),
         "seed": setup.seed,
         "scenario": setup.scenario.to_json(),
         "mission": setup.mission_text,

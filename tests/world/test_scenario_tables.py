@@ -10,7 +10,7 @@ import pytest
 from tests.world.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario_file import check_scenario, parse_scenario
-from world.scenario_tables import ScenarioFile
+from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile
 
 
 def test_every_default() -> None:
@@ -52,6 +52,29 @@ def test_every_default() -> None:
         },
         "wind": {"speed_mps": 0.0, "from_deg": 0.0, "gradient": 0.0, "turbulence": "none", "seed": None},
     }
+
+
+@pytest.mark.parametrize(
+    ("stated", "flown_by"),
+    [
+        ({}, (DEFAULT_AUTOPILOT, "path", "perfect" if DEFAULT_AUTOPILOT == "ideal" else "gnss")),
+        ({"guidance": "l1"}, ("ideal", "l1", "perfect")),
+        ({"autopilot": "ideal"}, ("ideal", "path", "perfect")),
+        ({"autopilot": "ideal", "nav": "gnss"}, ("ideal", "path", "gnss")),
+        ({"autopilot": "ardupilot"}, ("ardupilot", "path", "gnss")),
+        ({"params": "mine.parm"}, ("ardupilot", "path", "gnss")),
+        ({"params": "mine.parm", "nav": "perfect"}, ("ardupilot", "path", "perfect")),
+    ],
+)
+def test_who_flies(stated: dict[str, Any], flown_by: tuple[str, str, str]) -> None:
+    table = FlightTable(**stated)
+    assert table.steering == flown_by
+    # As it is written down, it says the same whatever the default becomes.
+    again = table.stated()
+    assert again.steering == flown_by
+    assert (again.autopilot == "ardupilot") == (flown_by[0] == "ardupilot")
+    assert (again.guidance is None) == (flown_by[0] == "ardupilot")
+    assert again.nav == flown_by[2]
 
 
 # What is replaced in the small file or appended to it, and what the line must say.

@@ -12,6 +12,7 @@ import pytest
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
+from flight.ardupilot.parameters import default_parameters, parameters_of
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
 from flight.simulation.autopilot_program import AutopilotProgram
@@ -45,15 +46,37 @@ def test_the_real_autopilot_that_flew_comes_back(tmp_path: Path, track: Track) -
 
 def test_no_field_of_a_setup_is_left_behind() -> None:
     # A field with a default could be forgotten in silence: these are all that the log knows of.  What a setup works
-    # out of its other fields, it works out again.
+    # out of its other fields, it works out again; the room that plans keep for an autopilot is no flight's.
     kinds = (FlightSetup, Limits, Mission, Route, Envelope)
     names = {kind: [item.name for item in dataclasses.fields(kind) if item.init] for kind in kinds}
     assert len(names[FlightSetup]) == 14
-    assert len(names[Limits]) == 8
+    assert len(names[Limits]) == 9
     assert len(names[Mission]) == 7
-    assert len(names[Route]) == 8
+    assert len(names[Route]) == 11
     assert len(names[Envelope]) == 14
     assert len(dataclasses.fields(MissionItem)) == 8
+
+
+def test_arduplanes_parameters_come_back_with_who_states_them(tmp_path: Path, track: Track) -> None:
+    parameters = parameters_of("NAVL1_PERIOD 16.3\nLIM_ROLL_CD 3210\nFS_LONG_ACTN 0\n", "mine.parm")
+    setup = dataclasses.replace(make_setup(with_plan=False), parameters=parameters, nav="gnss")
+    log = read_log(record(tmp_path / "a.mcap", setup, track))
+    assert log.setup.parameters == parameters
+    same(log.setup, setup)
+
+
+def test_a_log_of_before_there_were_parameters_was_flown_by_guidance(tmp_path: Path, track: Track) -> None:
+    attachments = altered(make_setup(with_plan=False), lambda data: data.pop("parameters"))
+    assert unpack_setup(attachments, "old.mcap").setup.parameters is None
+
+
+def test_a_parameter_that_is_not_allowed_is_refused() -> None:
+    def change(data: dict[str, Any]) -> None:
+        data["parameters"]["values"]["WP_RADIUS"] = -5.0
+
+    setup = dataclasses.replace(make_setup(with_plan=False), parameters=default_parameters())
+    with pytest.raises(LogError, match=r"setup.json: parameters.values: WP_RADIUS: -5: allowed"):
+        unpack_setup(altered(setup, change), "a.mcap")
 
 
 def test_an_external_mission_without_terrain_comes_back(tmp_path: Path, track: Track) -> None:

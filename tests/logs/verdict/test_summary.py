@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+from flight.ardupilot.parameters import default_parameters, parameters_of
 from flight.simulation.autopilot_program import AutopilotProgram
 from logs.verdict.findings import RULES, Finding, make_finding, message
+from logs.verdict.levels import LevelAnswer
 from logs.verdict.places import FLIGHT, Place
-from logs.verdict.summary import flown_by, headline
+from logs.verdict.summary import flown_by, headline, summary_lines
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
 
@@ -74,3 +76,22 @@ def test_a_real_autopilot_is_named_by_its_version_its_digest_and_what_was_change
     assert flown_by(replace(setup, program=replace(program, changed={}))).endswith("changed: none")
     # No more than eight by name.
     assert flown_by(replace(setup, program=replace(program, changed=given))).endswith("P6 6, P7 7, +32 more")
+
+
+def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
+    setup = replace(make_setup([[0, 0, 300], [0, 2000, 300]]), nav="gnss")
+    levels = (LevelAnswer("autopilot", True, "flyable"),)
+    lines = summary_lines([], replace(setup, parameters=default_parameters()), "flown", levels)
+    assert (
+        "Flown by: ArduPlane's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
+        " TECS_HDEM_TCONST 3 s); navigation with GNSS's error (1.5 m on each axis)"
+    ) in lines
+    assert not [line for line in lines if line.startswith("Parameters")]
+    mine = parameters_of("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
+    lines = summary_lines([], replace(setup, parameters=mine), "flown", levels)
+    assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
+    known = len(mine.values) - 1
+    assert (
+        f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
+        " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
+    ) in lines

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -36,3 +37,12 @@ def test_each_option_changes_what_it_names() -> None:
     assert windy.wind.at(100.0) == pytest.approx((-7.0, 0.0), abs=1e-12)
     gusty = changed(wind=None, turbulence="none")
     assert (gusty.wind.speed, gusty.wind.turbulence) == (3.0, "none")
+
+
+def test_parameters_mean_arduplane_and_a_law_of_guidance_takes_its_place() -> None:
+    flown = changed(params="mine.parm").flight
+    assert flown.steering == ("ardupilot", "path", "gnss")
+    assert flown.params == str(Path("mine.parm").resolve())
+    again = scenario_change(argparse.Namespace(guidance="l1"))(changed(params="mine.parm")).flight
+    assert (again.params, again.steering) == (None, ("ideal", "l1", "perfect"))
+    assert changed(params="mine.parm", nav="rtk").flight.steering.nav == "rtk"
