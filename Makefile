@@ -24,6 +24,7 @@ bench: $(TESTED)
 
 soak: $(TESTED) clients
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest -n 2
+	$(BIN)/python -m tests.mutations --count 200
 
 dev: $(TESTED)
 

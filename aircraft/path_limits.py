@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
+from aircraft.tracking import TrackingError
 from world.geometry import wrap
 from world.kernels import compiled, compiled_views, inlined
 from world.wind import W20, Wind, mean_wind_speed
@@ -59,6 +60,7 @@ class Limits:
     airspeed: m/s.
     max_bank: rad, the tighter of scenario and aircraft.
     wind: over the whole area.
+    tracking: how far the autopilot strays from its legs, None where it holds its path.
     """
 
     max_turn: float | None
@@ -69,6 +71,7 @@ class Limits:
     airspeed: float
     max_bank: float
     wind: Wind
+    tracking: TrackingError | None = None
 
     def slopes(self, course: float, amsl: float, airspeed: float | None = None) -> tuple[float, float]:
         """Steepest climb and dive over the ground on a course (rad) at a height (m), rad, both positive.
@@ -115,6 +118,19 @@ def derated(table: PerformanceTable, share: float) -> PerformanceTable:
     climb, descent = (
         _locked(np.where(angles > 0.0, share * angles, angles)) for angles in (table.climb, table.descent)
     )
+    return table._replace(climb=climb, descent=descent)
+
+
+def within_rates(table: PerformanceTable, climb_rate: float, sink_rate: float) -> PerformanceTable:
+    """The same aircraft that climbs and sinks no faster than at these rates, m/s; inf for no limit.
+
+    >>> table = PerformanceTable(25.0, 0.58, 0.0, 0.0, 0.0, 0.0, 0.0, *(np.full(2, 0.3) for _ in range(3)))
+    >>> slower = within_rates(table, 5.0, math.inf)
+    >>> slower.climb.round(3).tolist(), slower.descent.tolist()
+    ([0.201, 0.201], [0.3, 0.3])
+    """
+    most = [math.asin(min(1.0, rate / table.airspeed)) for rate in (climb_rate, sink_rate)]
+    climb, descent = _locked(np.minimum(table.climb, most[0])), _locked(np.minimum(table.descent, most[1]))
     return table._replace(climb=climb, descent=descent)
 
 

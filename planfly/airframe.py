@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
 from aircraft.path_limits import Limits
 from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
+from flight.ardupilot.tracking_error import tracking_error
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.flight_setup import make_limits
 from world.errors import ScenarioError
@@ -48,8 +49,8 @@ def choose_seed(scenario: Scenario, seed: int | None) -> int:
 def load_airframe(scenario: Scenario) -> Airframe:
     """The scenario's aircraft, its envelope, and the limits that both set.
 
-    Raises ScenarioError for an unknown aircraft, a speed that it cannot fly, or a wind that leaves it no way, and
-    ParameterError for a bad file of ArduPilot's parameters.
+    Raises ScenarioError for an unknown aircraft, or a speed that it cannot fly, and ParameterError for a bad file of
+    ArduPilot's parameters.
 
     >>> from world.scenario import load_scenario
     >>> airframe = load_airframe(load_scenario("tight"))
@@ -70,14 +71,12 @@ def load_airframe(scenario: Scenario) -> Airframe:
             f"{scenario.name}: flight.airspeed_mps: {airspeed:g}: {aircraft.name} flies "
             f"{aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
         )
-    if scenario.wind.speed > 0.8 * airspeed:
-        raise ScenarioError(
-            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: at most 80 % of the airspeed {airspeed:g}, "
-            "to make way on every course"
-        )
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
     limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
+    if parameters is not None:
+        tracking = tracking_error(parameters, airspeed, table.steering.nav, fly_over=table.fly_over)
+        limits = replace(limits, tracking=tracking)
     return Airframe(aircraft, limits, battery, parameters)
 
 
@@ -85,4 +84,4 @@ def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:
     """An airframe within the limits and the bank of a scenario that differs in nothing else of the aircraft's."""
     old = airframe.limits
     limits = make_limits(scenario, old.envelope, old.airspeed, math.radians(scenario.flight.max_bank_deg))
-    return replace(airframe, limits=limits)
+    return replace(airframe, limits=replace(limits, tracking=old.tracking))

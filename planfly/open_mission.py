@@ -101,7 +101,8 @@ def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _
     plan = read_plan(path, terrain=terrain)
     scenario = change(plan.scenario)
     airframe = load_airframe(scenario)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=str(path))
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=str(path), tracking=tracking)
     return OpenedPlan(plan, scenario, airframe, mission)
 
 

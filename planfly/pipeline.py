@@ -1,8 +1,10 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from flight.mission.end_courses import with_end_courses
 from flight.mission.from_plan import plan_mission
@@ -10,16 +12,21 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
 from flight.mission.routing import lay_route, make_route
 from flight.mission_files.formats import mission_text
+from flight.simulation.airborne import Airborne
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.simulate import simulate
-from flight.simulation.track import Track
+from flight.simulation.simulate import Flight, fly_to_end
+from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import Recorder, thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
+from logs.verdict.levels import FlownBeside
+from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.flights_beside import airframe_answer, find_deciding_parameter
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
+from world.errors import FlightError, StartError
 from world.scenario import Scenario, load_scenario
 
 # Takes how far a stage is: done, whole, a remark.
@@ -27,6 +34,8 @@ Advance = Callable[[float, float, str], None]
 
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
 BATCH = 60
+# A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
+MOST_STORES = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,16 +62,20 @@ class PlanThenFly:
 class JudgedFlight:
     """A flight from its first tick to its verdict.
 
-    track: the rows that are recorded, all of them where there is no log.
+    setup: with the real autopilot that flew, if one did.
+    track: the rows that are recorded, all of them where there is no log; none of a flight that could not begin.
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
+    beside: what other flights had to say of it; None where none were flown.
     """
 
+    setup: FlightSetup
     track: Track
     ended: str
     verdict: Verdict
     events: tuple[LogEvent, ...]
+    beside: FlownBeside | None = None
 
 
 def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
@@ -80,7 +93,7 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     number = choose_seed(world, seed)
     airframe = load_airframe(world)
     plan = make_plan(world, airframe, number)
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
     if not plan.feasible:
         return PlanThenFly(plan, mission, None, judge_plan_only(plan))
     setup = make_setup(world, airframe, mission, number, plan=plan)
@@ -132,30 +145,111 @@ def make_setup(
 
 
 def fly_and_judge(
-    setup: FlightSetup, airframe: Airframe, log: Path | None, advance: Advance | None = None, *, every: int = 1
+    setup: FlightSetup,
+    airframe: Airframe,
+    log: Path | None,
+    advance: Advance | None = None,
+    *,
+    every: int = 1,
+    autopilot: Path | None = None,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
-    """
+    autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
 
+    An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
+    one passes, flights with other parameters.
+
+    A flight that cannot begin, or that needs more than `MOST_STORES` times the energy carried, has no row and no log:
+    its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it to its
+    end; no log is left then.
+    """
+    stores = _stores_needed(setup)
+    if stores > MOST_STORES:
+        return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
+    try:
+        if autopilot is None:
+            return _record_and_judge(setup, airframe, Flight(setup, airframe.aircraft), log, advance, every)
+        return _fly_program(setup, airframe, log, advance, every, autopilot)
+    except StartError as error:
+        return _unflown(setup, log, f"not started: {error.reason}")
+
+
+def _stores_needed(setup: FlightSetup) -> float:
+    """How many times the energy carried a route takes by prediction; 0 where not even full power all the way would."""
+    seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
+    most = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
+    return needed_energy(setup) / setup.battery if most > MOST_STORES * setup.battery else 0.0
+
+
+def _fly_program(
+    setup: FlightSetup,
+    airframe: Airframe,
+    log: Path | None,
+    advance: Advance | None,
+    every: int,
+    autopilot: Path,
+) -> JudgedFlight:
+    # Imported here: nobody else needs MAVLink.
+    from flight.real_autopilot.autopilot_flight import AutopilotFlight
+
+    with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
+        flight.prepare()
+        try:
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every)
+        except FlightError:
+            if log is not None:
+                log.unlink(missing_ok=True)
+            raise
+        if log is not None:
+            flight.keep_log(autopilot_log(log))
+    return judged
+
+
+def autopilot_log(log: Path) -> Path:
+    """Where a real autopilot's own log is kept, beside ours.
+
+    >>> autopilot_log(Path("runs/flight.mcap")).name
+    'flight.BIN'
+    """
+    return log.with_suffix(".BIN")
+
+
+def _record_and_judge(
+    setup: FlightSetup, airframe: Airframe, flight: Airborne, log: Path | None, advance: Advance | None, every: int
+) -> JudgedFlight:
     def report(done: float, whole: float) -> None:
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
 
     if log is None:
-        flown = simulate(setup, airframe.aircraft, progress=report)
-        return _judged(setup, flown.track, flown.ended)
+        flown = fly_to_end(flight, progress=report)
+        return _judged(setup, airframe, flown.track, flown.ended)
     with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows, progress=report)
-        judged = _judged(setup, thin_track(flown.track, every), flown.ended)
+        flown = fly_to_end(flight, recorder.write_rows, report)
+        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(judged.ended, judged.verdict)
+        recorder.finish(judged.ended, judged.verdict, judged.beside)
     return judged
 
 
-def _judged(setup: FlightSetup, track: Track, ended: str) -> JudgedFlight:
+def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
+    """A flight without a row, and without a log: none of a flight before it stays there."""
+    if log is not None:
+        log.unlink(missing_ok=True)
+    return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
+
+
+def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    return JudgedFlight(track, ended, judge_flight(setup, track, ended), (event,))
+    beside = None
+    if setup.parameters is not None:
+        beside = FlownBeside(airframe_answer(setup, airframe.aircraft))
+    verdict = judge_flight(setup, track, ended, beside=beside)
+    if beside is not None and beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
+        beside = replace(beside, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
+        verdict = judge_flight(setup, track, ended, beside=beside)
+    return JudgedFlight(setup, track, ended, verdict, (event,), beside)

@@ -95,7 +95,7 @@ def _slopes(spec: Spec, failed: list[Finding]) -> list[Tightening]:
 
 
 def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
-    if not any(item.rule in ("turn", "waypoint") for item in failed):
+    if not any(item.rule in ("turn", "waypoint", "corridor") for item in failed):
         return []
     now = _limits(spec).get("max_turn_deg", "aircraft")
     if now != "aircraft":

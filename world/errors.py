@@ -4,7 +4,8 @@
     ├── ScenarioError   a scenario file or a planner option
     ├── TerrainError    an elevation file
     ├── MissionError    a plan or mission file
-    ├── FlightError     an aircraft model or a flight that cannot start
+    ├── FlightError     an aircraft model or a start condition
+    │   └── StartError  a flight that cannot begin as its mission has it: `fly` makes a verdict of it
     ├── ParameterError  a file of an autopilot's parameters
     └── LogError        a flight log
 
@@ -35,6 +36,20 @@ class FlightError(PlanflyError):
 
 class ParameterError(PlanflyError):
     """A file of an autopilot's parameters cannot be used as it stands."""
+
+
+class StartError(FlightError):
+    """A flight cannot begin as its mission has it: the aircraft and the place are known, and no flight begins there.
+
+    source: what asks for it.  reason: why not.
+
+    >>> str(StartError("a.plan", "no way made"))
+    'a.plan: no way made'
+    """
+
+    def __init__(self, source: str, reason: str) -> None:
+        super().__init__(f"{source}: {reason}")
+        self.reason = reason
 
 
 class LogError(PlanflyError):

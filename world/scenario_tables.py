@@ -8,47 +8,26 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-# Positions lie within this distance of the map's origin, east or west and north or south, m.
-MAP_EXTENT = 500_000.0
-
-
-def _no_line_break(text: str) -> str:
-    if not text.isprintable():
-        raise ValueError("control characters are not allowed")
-    return text
-
-
-def _within(low: float, high: float, *, above: bool = False, below: bool = False, also: str = "") -> AfterValidator:
-    """Allow ``low``..``high``, without ``low`` if ``above`` and without ``high`` if ``below``; the error says so.
-
-    also: what else the field takes, for the message.
-    """
-
-    def check(value: float) -> float:
-        # Written so that NaN fails.
-        if (low < value if above else low <= value) and (value < high if below else value <= high):
-            return value
-        first, last = ("above " if above else ""), ("below " if below else "")
-        least, most = (x if isinstance(x, int) else f"{x:.12g}" for x in (low, high))
-        raise ValueError(f"allowed {first}{least}..{last}{most}{also}")
-
-    return AfterValidator(check)
-
-
-Metres = Annotated[float, _within(-MAP_EXTENT, MAP_EXTENT)]
-Amsl = Annotated[float, _within(-500.0, 9000.0)]
-Height = Annotated[float, _within(0.0, 9000.0)]
-Latitude = Annotated[float, _within(-89.0, 89.0)]
-Longitude = Annotated[float, _within(-180.0, 180.0)]
-Course = Annotated[float, _within(-360.0, 360.0)]
-Radius = Annotated[float, _within(0.0, 200_000.0, above=True)]
-Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(_no_line_break)]
-FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(_no_line_break)]
-Autopilot = Literal["ardupilot", "ideal"]
-Guidance = Literal["path", "l1", "vector-field"]
-Navigation = Literal["perfect", "rtk", "gnss"]
-Seed = Annotated[int, _within(0, 2**63 - 1)]
-Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
+from world.scenario_types import (
+    MAP_EXTENT,
+    Amsl,
+    Angle,
+    Autopilot,
+    Course,
+    FilePath,
+    Guidance,
+    Height,
+    Latitude,
+    Longitude,
+    Metres,
+    Name,
+    Navigation,
+    Radius,
+    Seed,
+    Span,
+    no_line_break,
+    within,
+)
 
 
 class _Table(BaseModel):
@@ -69,8 +48,8 @@ class PeakTable(_Table):
 
     east_m: Metres
     north_m: Metres
-    height_m: Annotated[float, _within(0.0, 9000.0, above=True)]
-    sigma_m: Annotated[float, _within(10.0, 100_000.0)]
+    height_m: Annotated[float, within(0.0, 9000.0, above=True)]
+    sigma_m: Annotated[float, within(10.0, 100_000.0)]
 
 
 class TerrainTable(_Table):
@@ -83,7 +62,7 @@ class TerrainTable(_Table):
     path: FilePath | None = None
     peak: Annotated[list[PeakTable], Field(max_length=1000)] | None = None
     amsl_m: Amsl | None = None
-    vertical_error_m: Annotated[float, _within(0.0, 1000.0)] | None = None
+    vertical_error_m: Annotated[float, within(0.0, 1000.0)] | None = None
     sha256: str | None = None
 
     @model_validator(mode="after")
@@ -176,37 +155,38 @@ class ThreatTable(PointTable):
         return self
 
 
-Angle = Annotated[float, _within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
-
-
 class LimitsTable(_Table):
-    """[limits]: a number, or "aircraft" for what the envelope allows."""
+    """[limits]: a number, or "aircraft" for what the envelope allows.
 
-    max_turn_deg: Annotated[float, _within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
+    corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
+    """
+
+    max_turn_deg: Annotated[float, within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
         "aircraft"
     )
     max_climb_deg: Angle = "aircraft"
     max_dive_deg: Angle = "aircraft"
-    min_clearance_m: Annotated[float, _within(0.0, 5000.0)] = 30.0
+    min_clearance_m: Annotated[float, within(0.0, 5000.0)] = 30.0
+    corridor_m: Annotated[float, within(1.0, 5000.0)] | None = None
 
 
 class GoalsTable(_Table):
     """[planner] goals of the second level of preference."""
 
-    length_ratio: Annotated[float, _within(1.0, 100.0)] | None = None
-    kill_exposure: Annotated[float, _within(0.0, 1e9)] | None = None
+    length_ratio: Annotated[float, within(1.0, 100.0)] | None = None
+    kill_exposure: Annotated[float, within(0.0, 1e9)] | None = None
 
 
 class PlannerTable(_Table):
     """[planner]."""
 
     algorithm: Name | None = None
-    waypoints: Annotated[int, _within(3, 500)] = 12
-    population: Annotated[int, _within(4, 100_000)] = 200
-    generations: Annotated[int, _within(0, 100_000)] = 100
-    across_m: Annotated[float, _within(0.0, MAP_EXTENT, above=True)] | None = None
+    waypoints: Annotated[int, within(3, 500)] = 12
+    population: Annotated[int, within(4, 100_000)] = 200
+    generations: Annotated[int, within(0, 100_000)] = 100
+    across_m: Annotated[float, within(0.0, MAP_EXTENT, above=True)] | None = None
     goals: GoalsTable = GoalsTable()
-    budget: Annotated[int, _within(4, 10**10)] | None = None
+    budget: Annotated[int, within(4, 10**10)] | None = None
     seed: Seed | None = None
 
 
@@ -220,7 +200,7 @@ def names_folder(aircraft: str) -> bool:
 
 
 # Who flies where a scenario names neither an autopilot nor what belongs to one.
-DEFAULT_AUTOPILOT: Autopilot = "ideal"
+DEFAULT_AUTOPILOT: Autopilot = "ardupilot"
 # How well an autopilot knows where it is, where a scenario does not say.
 _USUAL_NAVIGATION: dict[Autopilot, Navigation] = {"ardupilot": "gnss", "ideal": "perfect"}
 
@@ -248,8 +228,8 @@ class FlightTable(_Table):
     """
 
     aircraft: FilePath = "aerosonde"  # an embedded name, or a folder where there is a slash
-    airspeed_mps: Annotated[float, _within(15.0, 60.0)] | None = None
-    max_bank_deg: Annotated[float, _within(5.0, 60.0)] = 30.0
+    airspeed_mps: Annotated[float, within(15.0, 60.0)] | None = None
+    max_bank_deg: Annotated[float, within(5.0, 60.0)] = 30.0
     autopilot: Autopilot | None = None
     params: FilePath | None = None
     guidance: Guidance | None = None
@@ -257,7 +237,7 @@ class FlightTable(_Table):
     nav: Navigation | None = None
     fly_over: bool = False
     motor_braking: bool = False
-    battery_wh: Annotated[float, _within(0.0, 100_000.0, above=True)] | None = None
+    battery_wh: Annotated[float, within(0.0, 100_000.0, above=True)] | None = None
 
     @model_validator(mode="after")
     def _one_autopilot(self) -> "FlightTable":
@@ -289,9 +269,9 @@ class FlightTable(_Table):
 class WindTable(_Table):
     """[wind]: gradient in m/s per metre of height above the start."""
 
-    speed_mps: Annotated[float, _within(0.0, 40.0)] = 0.0
+    speed_mps: Annotated[float, within(0.0, 40.0)] = 0.0
     from_deg: Course = 0.0
-    gradient: Annotated[float, _within(-0.05, 0.05)] = 0.0
+    gradient: Annotated[float, within(-0.05, 0.05)] = 0.0
     turbulence: Literal["none", "light", "moderate"] = "none"
     seed: Seed | None = None
 
@@ -300,7 +280,7 @@ class ScenarioFile(_Table):
     """A whole scenario file."""
 
     name: Name
-    description: Annotated[str, Field(max_length=500), AfterValidator(_no_line_break)] = ""
+    description: Annotated[str, Field(max_length=500), AfterValidator(no_line_break)] = ""
     origin: OriginTable | None = None
     terrain: TerrainTable
     area: AreaTable | None = None

@@ -89,7 +89,7 @@ DEFINITIONS = {
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
-class Parameter(NamedTuple):
+class ParameterValue(NamedTuple):
     """A parameter's value in ArduPlane's unit, and who states it."""
 
     name: str
@@ -121,7 +121,7 @@ class ArduPilotParameters:
     rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
     """
 
-    values: tuple[Parameter, ...]
+    values: tuple[ParameterValue, ...]
     unused: tuple[str, ...] = ()
     source: str = ""
     navl1_period: float = field(init=False)
@@ -255,11 +255,11 @@ def _parameters(
 ) -> ArduPilotParameters:
     """Parameters of the first source that states each, and ArduPlane's default where none does."""
 
-    def found(definition: Definition) -> Parameter:
+    def found(definition: Definition) -> ParameterValue:
         for origin, values in stated:
             if definition.name in values:
-                return Parameter(definition.name, values[definition.name], origin)
-        return Parameter(definition.name, definition.default, "default")
+                return ParameterValue(definition.name, values[definition.name], origin)
+        return ParameterValue(definition.name, definition.default, "default")
 
     made = ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
     if stated:

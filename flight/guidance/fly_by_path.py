@@ -147,7 +147,8 @@ def waypoint_records(route: Route) -> Records:
     waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
     waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
     waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
-    waypoints["fly_over"], waypoints["acceptance"] = route.fly_over, route.acceptance
+    # A stated radius is what switches legs; only where there is none is a fly-over waypoint passed through.
+    waypoints["fly_over"], waypoints["acceptance"] = route.fly_over & (route.acceptance == 0.0), route.acceptance
     waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
     waypoints["up"] = route.waypoints[:, 2]
     _set_circles(waypoints[1:-1], route)

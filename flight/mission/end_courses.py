@@ -51,12 +51,15 @@ def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
     if lead_in is not None:
         length = math.dist(lead_in[:2], points[0][:2])
         started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
+    # Radii at the ends of the mission say nothing of turns that it does not have.
+    acceptance = np.array(route.acceptance)
+    acceptance[:head], acceptance[len(acceptance) - tail :] = 0.0, 0.0
     chain = [point for point in (lead_in, *points, lead_out) if point is not None]
     return replace(
         route,
         waypoints=np.array(chain),
         airspeed=np.pad(route.airspeed, (head, tail), mode="edge"),
-        acceptance=np.pad(route.acceptance, (head, tail)),
+        acceptance=np.pad(acceptance, (head, tail)),
         fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
         items=np.pad(route.items, (head, tail), constant_values=-1),
         arcs=np.pad(route.arcs, (head, tail)),

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from flight.mission.items import (
     LANDINGS,
@@ -16,6 +16,7 @@ from flight.mission.items import (
     MissionItem,
     command_name,
 )
+from flight.mission.notes import Notes
 from world.errors import MissionError
 
 # A mission unrolls to no more places than this, and no more items are walked through on the way.
@@ -67,7 +68,6 @@ class ItineraryStop:
 
     item: the mission item's seq, -1 where no item asks for it.
     command: the item's MAV_CMD.
-    lat_deg, lon_deg: degrees.
     alt: m in the item's frame, NaN to keep the last height.
     frame: the item's MAV_FRAME.
     airspeed: m/s on the leg that ends here, NaN for the aircraft's own.
@@ -94,6 +94,8 @@ class Itinerary:
     has_home: whether it is the mission's.
     takeoff: the item that the flight starts with, None for none.
     notes: what is not flown as written, with item numbers.
+    endless: seq of a jump without end, -1 for none.
+    landing: the place to land at, None for none; the flight ends above it.
     """
 
     stops: tuple[ItineraryStop, ...]
@@ -101,39 +103,8 @@ class Itinerary:
     has_home: bool
     takeoff: MissionItem | None
     notes: tuple[str, ...]
-
-
-@dataclass(slots=True)
-class Notes:
-    """Notes by text, each with the items it is about, in the order they came up."""
-
-    _items: dict[str, list[int]] = field(default_factory=dict)
-
-    def add(self, text: str, seq: int | None = None) -> None:
-        """Note something, about an item or the whole mission; the same note twice counts once."""
-        items = self._items.setdefault(text, [])
-        if seq is not None and seq not in items[-1:]:
-            items.append(seq)
-
-    def lines(self) -> tuple[str, ...]:
-        """One line a note: "items 3-5, 9: DO_SET_SERVO: not flown"."""
-        found = []
-        for text, items in self._items.items():
-            numbers = sorted(set(items))
-            label = f"item{'s' if len(numbers) > 1 else ''} {_ranges(numbers)}: " if numbers else ""
-            found.append(label + text)
-        return tuple(found)
-
-
-def _ranges(numbers: list[int]) -> str:
-    """Sorted numbers as "3-5, 9"."""
-    parts: list[list[int]] = []
-    for number in numbers:
-        if parts and number == parts[-1][1] + 1:
-            parts[-1][1] = number
-        else:
-            parts.append([number, number])
-    return ", ".join(str(low) if low == high else f"{low}-{high}" for low, high in parts)
+    endless: int = -1
+    landing: ItineraryStop | None = None
 
 
 def make_itinerary(mission: Mission) -> Itinerary:
@@ -144,7 +115,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
     """
     walk = _Walk(mission)
     reached = set()
-    for item in _in_flying_order(mission, walk.notes):
+    for item in _in_flying_order(mission, walk):
         reached.add(item.seq)
         walk.visit(item)
         if len(walk.stops) > MOST_STOPS:
@@ -158,11 +129,12 @@ def make_itinerary(mission: Mission) -> Itinerary:
             walk.notes.add("never reached", item.seq)
     if not walk.stops:
         raise MissionError(f"{mission.source}: no item with a position: at least two are expected")
-    return Itinerary(tuple(walk.stops), walk.home, walk.has_home, walk.takeoff, walk.notes.lines())
+    stops, notes = tuple(walk.stops), walk.notes.lines()
+    return Itinerary(stops, walk.home, walk.has_home, walk.takeoff, notes, walk.endless, walk.landing)
 
 
-def _in_flying_order(mission: Mission, notes: Notes) -> Iterator[MissionItem]:
-    """Items with jumps followed; a jump's counter is never reset, as in ArduPilot."""
+def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
+    """Items with jumps followed; a jump's counter is never reset, as in ArduPilot.  One without end is taken once."""
     index = {item.seq: k for k, item in enumerate(mission.items)}
     jumped: dict[int, int] = {}
     k = steps = 0
@@ -180,10 +152,11 @@ def _in_flying_order(mission: Mission, notes: Notes) -> Iterator[MissionItem]:
             raise MissionError(
                 f"{mission.source}: item {item.seq}: DO_JUMP p1 {target}: the mission has no item {target}"
             )
-        if repeats < 0:
-            notes.add("DO_JUMP without end: taken once", item.seq)
-            repeats = 1
-        if jumped.get(item.seq, 0) < repeats:
+        if repeats < 0 and item.seq in jumped:
+            walk.notes.add("DO_JUMP without end: taken once; the flight ends there", item.seq)
+            walk.endless = item.seq
+            return
+        if repeats < 0 or jumped.get(item.seq, 0) < repeats:
             jumped[item.seq] = jumped.get(item.seq, 0) + 1
             k = index[target]
 
@@ -197,7 +170,8 @@ class _Walk:
         self.notes = Notes()
         self.stops: list[ItineraryStop] = []
         self.takeoff: MissionItem | None = None
-        self.ended = False
+        self.ended, self.endless = False, -1
+        self.landing: ItineraryStop | None = None
         self.has_home = mission.home is not None
         self.home = mission.home or _first_position(mission)
 
@@ -290,7 +264,8 @@ class _Walk:
         self.ended = True
         if item.has_position:
             self.notes.add(f"{name}: not flown to the ground; the flight ends above it at the last height", item.seq)
-            self.stops.append(self._stop(replace(item, alt=math.nan)))
+            self.landing = self._stop(item)
+            self.stops.append(replace(self.landing, alt=math.nan))
         else:
             self.notes.add(f"{name} without a position: not flown; the flight ends at the place before", item.seq)
 

@@ -7,12 +7,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission
-from flight.mission.itinerary import Itinerary, ItineraryStop, Notes, make_itinerary
+from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
 from flight.mission.loiter_circles import PlacedStop
+from flight.mission.notes import Notes
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.geometry import leg_courses
-from world.scenario_tables import MAP_EXTENT
+from world.scenario_types import MAP_EXTENT
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -33,6 +34,8 @@ class PlacedMission:
 
     stops: in flying order, those at the position of the one before merged with it.
     notes: what came up in placing them, after the itinerary's.
+    takeoff_ground: height of the ground at home, m, NaN where it is not known or nothing takes off.
+    landing_ground: height of the place to land at, m, NaN where it is not known or nothing lands.
     """
 
     mission: Mission
@@ -40,6 +43,8 @@ class PlacedMission:
     itinerary: Itinerary
     stops: tuple[PlacedStop, ...]
     notes: tuple[str, ...]
+    takeoff_ground: float
+    landing_ground: float
 
 
 def place_stops(
@@ -69,15 +74,18 @@ def place_stops(
     notes = Notes()
     if itinerary is None:
         itinerary = make_itinerary(mission)
-    stops = _placed_stops(mission.source, itinerary, origin, terrain, notes, vertical_legs)
-    return PlacedMission(mission, origin, itinerary, tuple(stops), notes.lines())
+    heights = _Heights(mission.source, itinerary, origin, terrain, notes)
+    stops = _placed_stops(mission.source, itinerary, origin, heights, vertical_legs)
+    takeoff_ground = math.nan if itinerary.takeoff is None else heights.ground_at_home()
+    landing_ground = heights.touchdown(itinerary)
+    return PlacedMission(mission, origin, itinerary, tuple(stops), notes.lines(), takeoff_ground, landing_ground)
 
 
 def _placed_stops(
-    source: str, itinerary: Itinerary, origin: GeoOrigin, terrain: Terrain | None, notes: Notes, vertical_legs: bool
+    source: str, itinerary: Itinerary, origin: GeoOrigin, heights: "_Heights", vertical_legs: bool
 ) -> list[PlacedStop]:
     """Stops on the map, without those at the position of the one before."""
-    heights = _Heights(source, itinerary, origin, terrain, notes)
+    notes = heights.notes
     flat = on_map(source, itinerary.stops, origin)
     kept: list[PlacedStop] = []
     for stop, (east, north) in zip(itinerary.stops, flat, strict=True):
@@ -154,17 +162,35 @@ class _Heights:
             self._home_amsl = self._find_home(stop, self.home)
         return self._home_amsl
 
-    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
-        under = math.nan
+    def touchdown(self, itinerary: Itinerary) -> float:
+        """Height of the place to land at; NaN for none, none stated, and none to compare with the place before it."""
+        stop = itinerary.landing
+        if stop is None or math.isnan(stop.alt):
+            return math.nan
+        known = stop.frame in AMSL or self.terrain is not None
+        if stop.frame in OVER_HOME:
+            before = itinerary.stops[-2].frame if len(itinerary.stops) > 1 else stop.frame
+            known = known or not math.isnan(self.home.alt) or before in OVER_HOME
+        east, north = to_map(self.origin, stop.lat_deg, stop.lon_deg)
+        return self.amsl(stop, float(east), float(north), math.nan) if known else math.nan
+
+    def ground_at_home(self) -> float:
+        """Height of the ground at home, NaN where it is not known."""
+        home = self.home
         if self.terrain is not None:
             east, north = to_map(self.origin, home.lat_deg, home.lon_deg)
             if abs(float(east)) <= MAP_EXTENT and abs(float(north)) <= MAP_EXTENT:
-                under = float(self.terrain.height(east, north))
+                return float(self.terrain.height(east, north))
+        return math.nan
+
+    def _find_home(self, stop: ItineraryStop, home: Home) -> float:
+        under = self.ground_at_home()
         if not math.isnan(home.alt):
             if abs(home.alt - under) > _HOME_ERROR:
+                unset = "" if home.alt else "; ground stations write 0 where no home was set"
                 self.notes.add(
                     f"home is at {home.alt:.1f} m AMSL, and the ground there at {under:.1f} m:"
-                    " heights over home count from the former"
+                    f" heights over home count from the former{unset}"
                 )
             return home.alt
         if math.isnan(under):

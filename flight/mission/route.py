@@ -1,5 +1,6 @@
 """A mission as the aircraft flies it: world-frame waypoints with speeds, jumps unrolled."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -21,6 +22,9 @@ class Route:
     notes: what cannot be flown as written, with item numbers.
     arcs: (w,) m, the radius that the path turns with there, 0 for the bank limit's; a loiter is the corners of a
         polygon around its circle, all of one item, each with the circle's radius.
+    endless: seq of the jump that would have the last round flown for ever, -1 for none.
+    takeoff_ground, landing_ground: m, the ground that the mission takes off from and the place that it lands at, which
+        the flight begins and ends above; NaN where there is none or it is not known.
     """
 
     waypoints: Floats
@@ -31,6 +35,9 @@ class Route:
     started: str
     notes: tuple[str, ...] = ()
     arcs: Floats = field(default_factory=lambda: np.zeros(0))
+    endless: int = -1
+    takeoff_ground: float = math.nan
+    landing_ground: float = math.nan
 
     def __post_init__(self) -> None:
         """Lock the arrays."""

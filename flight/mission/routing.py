@@ -7,9 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from flight.mission.arc_misses import arc_misses
 from flight.mission.items import Mission, command_name
-from flight.mission.itinerary import Itinerary, ItineraryStop, Notes
+from flight.mission.itinerary import Itinerary, ItineraryStop
 from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, SpiralSlopes, lay_circles
+from flight.mission.notes import Notes
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission.route import Route
 from world.errors import MissionError
@@ -37,11 +39,10 @@ def make_route(
     """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
 
     terrain: None where none is known; heights above terrain are then an error.
-    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed is its ground station's estimate and
-        sets none).
-    fly_over: whether waypoints are flown through instead of by.
-    limits: the aircraft's, for the radius of a loiter that states none and the slope of a spiral; None takes 80 m and
-        5 %.
+    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed, a station's estimate, sets none).
+    fly_over: whether waypoints are flown through instead of by; one whose arc would miss its acceptance always is.
+    limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
+        a spiral (5 %).
 
     Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
     has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
@@ -80,20 +81,21 @@ def lay_route(placed: PlacedMission, default_airspeed: float, fly_over: bool, li
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])
-    if mission.cruise_speed not in (None, default_airspeed) and stops[1].airspeed == default_airspeed:
-        notes.add(
-            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
-            f" started at {default_airspeed:g} m/s"
-        )
+    airspeed = np.array([stop.airspeed for stop in stops[1:]])
+    acceptance = np.array([stop.acceptance for stop in stops])
+    _note_cruise_speed(mission, default_airspeed, stops[1], notes)
     return Route(
         waypoints=waypoints,
-        airspeed=np.array([stop.airspeed for stop in stops[1:]]),
-        acceptance=np.array([stop.acceptance for stop in stops]),
-        fly_over=np.where(arcs > 0.0, False, fly_over),
+        airspeed=airspeed,
+        acceptance=acceptance,
+        fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
         items=np.array([stop.item for stop in stops], dtype=np.int64),
         started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
         notes=placed.itinerary.notes + placed.notes + notes.lines(),
         arcs=arcs,
+        endless=placed.itinerary.endless,
+        takeoff_ground=placed.takeoff_ground,
+        landing_ground=placed.landing_ground,
     )
 
 
@@ -102,6 +104,15 @@ def _with_airspeed(place: PlacedStop, default: float) -> PlacedStop:
     if not math.isnan(place.stop.airspeed):
         return place
     return PlacedStop(replace(place.stop, airspeed=default), place.position)
+
+
+def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:
+    """Note a cruiseSpeed other than the default airspeed (m/s), if that is flown to the first stop."""
+    if mission.cruise_speed not in (None, airspeed) and first.airspeed == airspeed:
+        notes.add(
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
+            f" started at {airspeed:g} m/s"
+        )
 
 
 def _own_radius(limits: Limits | None) -> OwnRadius:

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aircraft.catalog import Aircraft
+from flight.ardupilot.parameter_file import read_parameter_file
+from flight.ardupilot.parameters import AIRCRAFT_FILE, DEFINITIONS
 from flight.real_autopilot.servo_map import ServoMap
 from flight.simulation.flight_setup import FlightSetup
-from world.errors import FlightError
 
-PARAMETER_FILE = "ardupilot.parm"
 # What our physics and a start in the air need, whatever the aircraft.
 SIMULATION = {
     # As often as JSBSim steps.
@@ -32,6 +32,10 @@ SIMULATION = {
     # It is armed in the air.
     "ARMING_CHECK": 0.0,
     "LOG_FILE_DSRMROT": 0.0,
+    # It tells what it is asked for, and no more.
+    **dict.fromkeys(
+        [f"SR0_{name}" for name in ("RAW_SENS", "EXT_STAT", "RC_CHAN", "POSITION", "EXTRA1", "EXTRA2", "EXTRA3")], 0.0
+    ),
 }
 # A person's parameters that say how an aircraft flies begin so; others belong to the hardware that they were read from.
 FLYING = (
@@ -58,7 +62,7 @@ class AutopilotParameters:
 def autopilot_parameters(
     setup: FlightSetup, aircraft: Aircraft, servos: ServoMap, own: Mapping[str, float]
 ) -> AutopilotParameters:
-    """Put the parameters of a flight together; own: the person's.  Raises FlightError for a bad file of the aircraft.
+    """Put the parameters of a flight together; own: the person's.  Raises ParameterError for a bad file.
 
     The mission's speed is the cruise speed, unless the person has one.
     """
@@ -70,24 +74,18 @@ def autopilot_parameters(
 
 
 def load_aircraft_parameters(aircraft: Aircraft) -> dict[str, float]:
-    """ArduPlane's parameters for an aircraft, from its folder.  Raises FlightError, in one line."""
-    return read_plain_parameters(aircraft.folder / PARAMETER_FILE)
+    """ArduPlane's parameters for an aircraft, from its folder.  Raises ParameterError, in one line."""
+    return {name: entry.value for name, entry in read_parameter_file(aircraft.folder / AIRCRAFT_FILE).items()}
 
 
-def read_plain_parameters(file: Path) -> dict[str, float]:
-    """Names and values of a file with one of each a line, as MAVProxy writes them.  Raises FlightError."""
-    try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FlightError(f"{file}: cannot be read: {getattr(error, 'strerror', None) or 'not a text'}") from error
-    found: dict[str, float] = {}
-    for number, line in enumerate(lines, 1):
-        words = line.partition("#")[0].replace(",", " ").split()
-        if not words:
-            continue
-        try:
-            name, value = words
-            found[name] = float(value)
-        except ValueError:
-            raise FlightError(f"{file}: line {number}: {line.strip()!r}: a name and a number are expected") from None
-    return found
+def person_parameters(setup: FlightSetup) -> dict[str, float]:
+    """What the scenario's file of parameters states, by present names and in their units.
+
+    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
+    """
+    file = setup.scenario.flight.params
+    if file is None:
+        return {}
+    old = {definition.old[0] for definition in DEFINITIONS.values() if definition.old is not None}
+    stated = {name: entry.value for name, entry in read_parameter_file(Path(file)).items() if name not in old}
+    return stated | ({} if setup.parameters is None else setup.parameters.by_origin("file"))

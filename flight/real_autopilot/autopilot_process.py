@@ -11,9 +11,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
+from flight.mission.items import Home
 from flight.real_autopilot.physics_port import LOOPBACK
 from world.errors import FlightError
 
@@ -27,7 +28,14 @@ _PR_SET_PDEATHSIG = 1
 
 
 def check_binary(binary: Path) -> str:
-    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run."""
+    """SHA-256, as hex, of an autopilot's program.  Raises FlightError, in one line, for what cannot be run.
+
+    >>> try:
+    ...     check_binary(Path("nobody/arduplane"))
+    ... except FlightError as error:
+    ...     print(error)
+    nobody/arduplane: no such file; the program of an ArduPlane for software in the loop is expected
+    """
     if not binary.exists():
         raise FlightError(f"{binary}: no such file; the program of an ArduPlane for software in the loop is expected")
     if not binary.is_file():
@@ -44,7 +52,7 @@ class AutopilotProcess:
     """The running program; a context manager, after which neither it nor its folder is left.
 
     binary: its file, checked by `check_binary`.
-    home: latitude and longitude (degrees), height (m AMSL) and heading (degrees) that it starts at.
+    home: where it starts.  heading: degrees, that it starts with.
     parameters: by name, its defaults for this flight.
     physics_port, link_port: on this machine, where it finds the physics (UDP) and us (TCP).
 
@@ -54,8 +62,9 @@ class AutopilotProcess:
     def __init__(
         self,
         binary: Path,
-        home: tuple[float, float, float, float],
-        parameters: dict[str, float],
+        home: Home,
+        heading: float,
+        parameters: Mapping[str, float],
         physics_port: int,
         link_port: int,
     ) -> None:
@@ -64,21 +73,19 @@ class AutopilotProcess:
         try:
             text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
             (self._folder / _DEFAULTS).write_text(text, encoding="ascii")
-            self._process = self._spawn(home, physics_port, link_port)
+            self._process = self._spawn(home, heading, physics_port, link_port)
         except BaseException:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise
 
-    def _spawn(
-        self, home: tuple[float, float, float, float], physics_port: int, link_port: int
-    ) -> "subprocess.Popen[bytes]":
-        lat, lon, amsl, heading = home
+    def _spawn(self, home: Home, heading: float, physics_port: int, link_port: int) -> "subprocess.Popen[bytes]":
+        place = f"{home.lat_deg:.9f},{home.lon_deg:.9f},{home.alt:.3f},{heading:.2f}"
         free = _free_ports(3)
         command = [
             str(self.binary.resolve()),
             *("--model", f"JSON:{LOOPBACK}"),
             *("--speedup", str(_SPEEDUP)),
-            *("--home", f"{lat:.9f},{lon:.9f},{amsl:.3f},{heading:.2f}"),
+            *("--home", place),
             *("--base-port", str(free[0]), "-I", "0"),
             *("--sim-port-out", str(physics_port), "--sim-port-in", str(free[1]), "--rc-in-port", str(free[2])),
             *("--serial0", f"tcpclient:{LOOPBACK}:{link_port}"),

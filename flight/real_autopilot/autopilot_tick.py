@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.guidance.navigation_error import navigate
 from flight.guidance.path_kernels import Records, profile, project
 from flight.simulation.tick import NOT_A_NUMBER, finish_tick, flight_status, sense
 from flight.simulation.workspace import PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS
@@ -29,6 +30,11 @@ def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover 
     settings, memory = work.settings, work.memory
     if not sense(work, heights):
         return NOT_A_NUMBER
+    noise = work.noise[work.timing.row].navigation
+    navigate(
+        work.true, work.estimated, work.navigation, noise, settings.navigation_sigma, settings.navigation_time,
+        work.timing.dt,
+    )  # fmt: skip
     place_on_path(work.true, path.piece[: settings.pieces], path.node[: settings.nodes], memory)
     memory.speed_command = path.waypoint[memory.leg].airspeed
     if settings.on_last_leg:

@@ -14,6 +14,8 @@ SILENCE = 10.0
 # How often (s) a wait looks whether the program still runs.
 _LOOK = 0.25
 _LARGEST = 1024
+# A question that comes sooner after the answer (s, by the clock) was asked before it: ArduPilot waits for a second.
+_ON_ITS_WAY = 0.1
 
 
 class PhysicsPort:
@@ -36,6 +38,7 @@ class PhysicsPort:
         self.watch: Callable[[], None] = _nothing
         self._frame = -1
         self._last = b""
+        self._answered = 0.0
         self._connected = False
 
     def close(self) -> None:
@@ -57,7 +60,9 @@ class PhysicsPort:
                     return packet
                 if packet.frame < self._frame:
                     raise FlightError(f"began anew in the air: frame {packet.frame} after frame {self._frame}")
-                self._send(self._last)
+                # What was asked while the answer was on its way has had it.
+                if time.monotonic() - self._answered > _ON_ITS_WAY:
+                    self._send(self._last)
             now = time.monotonic()
             waiting_since = waiting_since or now
             self.watch()
@@ -72,6 +77,7 @@ class PhysicsPort:
     def answer(self, data: bytes) -> None:
         """Tell the autopilot of the aircraft after the frame received last."""
         self._last = data
+        self._answered = time.monotonic()
         self._send(data)
 
     def _next_datagram(self) -> bytes:

@@ -4,6 +4,7 @@ A conversation is a generator: each time it is resumed a little more of the auto
 what has been told meanwhile.
 """
 
+import time
 from collections.abc import Callable, Generator, Iterable
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -23,6 +24,8 @@ AUTO = 10
 SPEAKS, KNOWS, ANSWERS, TAKES = 30.0, 60.0, 5.0, 30.0
 # Asked for again after so long, s.
 _AGAIN = 1.0
+# Messages take their time by the clock, however fast the autopilot's goes: at least so long is waited, s.
+_BY_THE_CLOCK = 0.5
 # Parameters that are asked for at a time: ArduPilot keeps no more than some twenty questions.
 _AT_ONCE = 10
 _EKF_NEEDED = (
@@ -41,14 +44,29 @@ _MISSION_RESULTS = {number: entry.name for number, entry in mavlink.enums["MAV_M
 _FORCE = 21196
 
 
+class _Since:
+    """Time since a moment, of the autopilot and by the clock."""
+
+    def __init__(self, now: Callable[[], float], clock: Callable[[], float]) -> None:
+        self._now, self._clock = now, clock
+        self._moments = now(), clock()
+
+    def longer_than(self, seconds: float) -> bool:
+        """Whether more of the autopilot's time has passed, and enough by the clock."""
+        began, by_clock = self._moments
+        return self._now() - began > seconds and self._clock() - by_clock > min(seconds, _BY_THE_CLOCK)
+
+
 class Preflight:
     """The conversation with one autopilot.
 
-    link: to it.  now: its own time, s.
+    link: to it.  now: its own time, s.  clock: anybody's, s.
     """
 
-    def __init__(self, link: AutopilotLink, now: Callable[[], float]) -> None:
-        self._link, self._now = link, now
+    def __init__(
+        self, link: AutopilotLink, now: Callable[[], float], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._link, self._now, self._clock = link, now, clock
         self._news = link.news
 
     def meet(self, parameters: Iterable[str]) -> Talk:
@@ -101,16 +119,17 @@ class Preflight:
         self, done: Callable[[], bool], seconds: float, failed: str, again: Callable[[], None] | None = None
     ) -> Talk:
         """Wait until something holds, asking for it each second; raise FlightError where it does not come to."""
-        started = self._now()
-        asked = -_AGAIN
+        started, asked = self._since(), None
         while not done():
-            waited = self._now() - started
-            if waited > seconds:
+            if started.longer_than(seconds):
                 raise FlightError(f"{failed} within {seconds:.0f} s{self._last_text()}")
-            if again is not None and waited - asked >= _AGAIN:
-                asked = waited
+            if again is not None and (asked is None or asked.longer_than(_AGAIN)):
+                asked = self._since()
                 again()
             yield
+
+    def _since(self) -> _Since:
+        return _Since(self._now, self._clock)
 
     def _last_text(self) -> str:
         return f"; it last said: {self._news.texts[-1]}" if self._news.texts else ""
@@ -149,20 +168,20 @@ class Preflight:
         """Read parameters; those that it does not have are not answered."""
         for name in names:
             self._link.send(mavlink.MAVLink_param_request_read_message(SYSTEM, COMPONENT, name.encode("ascii"), -1))
-        started, known = self._now(), self._news.parameters
-        while not known.keys() >= set(names) and self._now() - started < _AGAIN:
+        started, known = self._since(), self._news.parameters
+        while not (known.keys() >= set(names) or started.longer_than(_AGAIN)):
             yield
 
     def _upload(self, mission: UploadedMission) -> Talk:
         """Hand over the mission (MAVLink mission protocol), again while there is no space for it yet."""
-        started = self._now()
+        started = self._since()
         items = [_home_item(mission.home), *mission.items]
         while True:
             yield from self._offer(items)
             result = self._news.mission_result
             if result == mavlink.MAV_MISSION_ACCEPTED:
                 return
-            if result != mavlink.MAV_MISSION_NO_SPACE or self._now() - started > TAKES:
+            if result != mavlink.MAV_MISSION_NO_SPACE or started.longer_than(TAKES):
                 asked = self._news.requested
                 item = (
                     ""
@@ -178,17 +197,17 @@ class Preflight:
         news, link = self._news, self._link
         news.requested = news.mission_result = None
         link.send(mavlink.MAVLink_mission_count_message(SYSTEM, COMPONENT, len(items), MissionType.MISSION))
-        last, answered = None, self._now()
-        while news.mission_result is None and self._now() - answered < ANSWERS:
-            if news.requested is not None and (news.requested != last or self._now() - answered > _AGAIN):
-                last, answered = news.requested, self._now()
+        last, answered = None, self._since()
+        while news.mission_result is None and not answered.longer_than(ANSWERS):
+            if news.requested is not None and (news.requested != last or answered.longer_than(_AGAIN)):
+                last, answered = news.requested, self._since()
                 if last < len(items):
                     link.send(to_message(items[last], target_component=COMPONENT, seq=last))
             yield
 
     def _wait(self, seconds: float) -> Talk:
-        until = self._now() + seconds
-        while self._now() < until:
+        began = self._now()
+        while self._now() - began < seconds:
             yield
 
 

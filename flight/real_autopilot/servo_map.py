@@ -34,7 +34,7 @@ class ServoOutput:
 
     @property
     def rest(self) -> float:
-        """Pulse of the value nearest to zero."""
+        """Pulse in the middle of the throw: of the knot whose value is nearest to zero."""
         return min(zip(self.pulses, self.values, strict=True), key=lambda knot: abs(knot[1]))[0]
 
     def value(self, pulse: float) -> float:

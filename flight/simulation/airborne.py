@@ -23,7 +23,7 @@ from flight.simulation.local_map import Ground, LocalMap
 from flight.simulation.tick import ENDS
 from flight.simulation.track import Rows, join_rows, quantised
 from flight.simulation.workspace import BLOCK_TICKS, Workspace
-from world.errors import FlightError
+from world.errors import FlightError, StartError
 from world.frames import to_geo
 from world.geometry import leg_courses
 from world.random_streams import NAVIGATION, TURBULENCE, stream
@@ -89,6 +89,7 @@ class Airborne(ABC):
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle
+        self._work.settings.battery = setup.battery
         self.most_ticks = int((PATIENCE * self.path.length / _slowest_leg(setup) + PATIENCE_SECONDS) / self.dt)
 
     @abstractmethod
@@ -111,14 +112,13 @@ class Airborne(ABC):
             start_navigation(self._navigation_random.standard_normal(6), work.navigation)
 
     def _start(self, setup: FlightSetup) -> Start:
-        """Where the route begins.  Raises FlightError for a place that is not above the terrain."""
+        """Where the route begins.  Raises StartError for a place that is not above the terrain."""
         points = setup.route.waypoints
         east, north, up = (float(value) for value in points[0])
         under = self._ground.height(east, north)
         if not math.isnan(under) and up <= under:
-            raise FlightError(
-                f"{setup.mission.source}: start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
-            )
+            reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+            raise StartError(setup.mission.source, reason)
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
         step = points[1] - points[0]
         # A map course is the true course and this.
@@ -140,7 +140,7 @@ class Airborne(ABC):
         )
 
     def _trim(self, source: str, start: Start) -> Trim:
-        """Begin trimmed on the start's slope if the aircraft can hold it, else level.  Raises FlightError."""
+        """Begin trimmed on the start's slope if the aircraft can hold it, else level.  Raises StartError."""
         begin = (start.lat_deg, start.lon_deg, start.amsl, start.course, start.airspeed)
         try:
             trimmed = self.fdm.start(*begin, start.slope, start.wind, start.ground)
@@ -148,7 +148,7 @@ class Airborne(ABC):
             try:
                 trimmed = self.fdm.start(*begin, 0.0, start.wind, start.ground)
             except FlightError as error:
-                raise FlightError(f"{source}: {error}") from error
+                raise StartError(source, str(error)) from error
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         # All that blows is set as a gust.

@@ -5,15 +5,17 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal
 
+from aircraft.corridor import corridor_half_width
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.ardupilot.parameters import ArduPilotParameters
 from flight.guidance.fly_by_path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
+from flight.simulation.autopilot_program import AutopilotProgram
 from planner.plan import Plan
 from world.scenario import Scenario
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +35,7 @@ class FlightSetup:
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
     parameters: of the ArduPlane that flies; None where planfly's guidance does.
+    program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
     path: that is to be followed, of route and limits.
     """
 
@@ -49,6 +52,7 @@ class FlightSetup:
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
     parameters: ArduPilotParameters | None = None
+    program: AutopilotProgram | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -59,6 +63,12 @@ class FlightSetup:
     def envelope(self) -> Envelope:
         """Table of the aircraft's climbs, descents, speeds and powers."""
         return self.limits.envelope
+
+    @property
+    def corridor(self) -> float:
+        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        radius = None if self.parameters is None else self.parameters.wp_radius
+        return corridor_half_width(self.scenario.limits.corridor_m, radius)
 
     @property
     def airspeed(self) -> float:

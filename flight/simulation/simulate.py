@@ -19,7 +19,7 @@ from flight.simulation.loop import make_loop
 from flight.simulation.tick import tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from flight.simulation.workspace import READ_FIELDS
-from world.errors import FlightError
+from world.errors import StartError
 
 Progress = Callable[[float, float], None]
 Sink = Callable[[Rows], None]
@@ -62,7 +62,7 @@ def simulate(
     progress: is called with the distance flown and the whole, m.
     variation: an aircraft that differs from its model, which guidance knows nothing of: for robustness.
 
-    Raises FlightError for a flight that cannot start.
+    Raises FlightError for an aircraft that cannot be loaded, and StartError for a flight that cannot start.
 
     >>> import numpy as np
     >>> from aircraft.catalog import load_aircraft
@@ -83,7 +83,17 @@ def simulate(
 
 
 def fly_to_end(flight: Airborne, sink: Sink | None = None, progress: Progress | None = None) -> SimulatedFlight:
-    """Fly until the flight ends; sink, progress: as of `simulate`."""
+    """Fly until the flight ends; sink, progress: as of `simulate`.
+
+    >>> import numpy as np
+    >>> from types import SimpleNamespace
+    >>> from flight.simulation.track import TRACK_ROW
+    >>> blocks = iter([(np.zeros(60, TRACK_ROW), ""), (np.zeros(12, TRACK_ROW), "ground contact")])
+    >>> at, path = SimpleNamespace(distance=0.0), SimpleNamespace(length=9.0)
+    >>> flown = fly_to_end(SimpleNamespace(dt=1 / 60, memory=at, path=path, block=lambda count: next(blocks)))
+    >>> len(flown.track), flown.ended
+    (72, 'ground contact')
+    """
     blocks: list[Rows] = []
     ended = ""
     while not ended:
@@ -132,7 +142,7 @@ class Flight(Airborne):
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true))
         level = straight(model, reference, start.amsl)
         if level is None:
-            raise FlightError(f"{setup.aircraft}: no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL")
+            raise StartError(setup.aircraft, f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL")
         self._trim(setup.mission.source, start)
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha

@@ -25,7 +25,7 @@ Floats = NDArray[np.float64]
 
 STEEPEST_BANK = math.radians(75.0)
 # What `tick` returns, and how the flight ended by then.
-COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED = 1, 2, 3, 4, 5, 6
+COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY = 1, 2, 3, 4, 5, 6, 7
 # A flight that passes the end of its route further than this from it, m, has missed it.
 FAR = 100.0
 ENDS = {
@@ -35,6 +35,7 @@ ENDS = {
     BANKED: "departure: bank beyond 75 degrees",
     STALLED: "departure: airspeed below the stall",
     MISSED: "missed: passed the end of the route more than 100 m from it",
+    EMPTY: "nothing is left in the battery or the tank",
 }
 _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
@@ -128,7 +129,9 @@ def finish_tick(work: Record) -> None:  # pragma: no cover - compiled
 @compiled_views
 def flight_status(work: Record) -> int:  # pragma: no cover - compiled
     """How the flight stands after a tick: a key of `ENDS`, or 0 to fly on."""
-    return _status(work.state, work.memory, work.place.clearance, work.settings.slowest)
+    return _status(
+        work.state, work.memory, work.place.clearance, work.settings.slowest, work.air.energy >= work.settings.battery
+    )
 
 
 @compiled
@@ -143,7 +146,9 @@ def _to_si(state: Record, factors: Record) -> bool:  # pragma: no cover - compil
 
 
 @compiled
-def _status(state: Record, memory: Record, clearance: float, slowest: float) -> int:  # pragma: no cover
+def _status(
+    state: Record, memory: Record, clearance: float, slowest: float, empty: bool
+) -> int:  # pragma: no cover - compiled
     if clearance <= 0.0:
         return GROUND
     if abs(state.roll) > STEEPEST_BANK:
@@ -153,7 +158,7 @@ def _status(state: Record, memory: Record, clearance: float, slowest: float) -> 
     if memory.done:
         near = abs(memory.cross_track) <= FAR and abs(memory.height_error) <= FAR
         return COMPLETED if near else MISSED
-    return 0
+    return EMPTY if empty else 0
 
 
 @compiled

@@ -60,6 +60,7 @@ TIMING = record_dtype(
 )
 SETTINGS = record_dtype(
     "slowest",  # m/s, slower is a departure
+    "battery",  # Wh; a flight that has used as much ends
     "navigation_sigma",  # m
     "navigation_time",  # s
     "middle",  # rad, longitude of the local map's middle
@@ -134,6 +135,7 @@ class Workspace:
         self.readings = self._numbers("state", len(READ_FIELDS))
         self.output = self._numbers("output", len(field_names(OUTPUT)))
         self.commands = self._numbers("commands", len(field_names(COMMANDS)))
+        self._true, self._estimated = (self._numbers(name, len(field_names(MOTION))) for name in ("true", "estimated"))
         # Made once: numpy takes microseconds for each field of a record that Python asks for.
         self.ticks_flown: NDArray[np.int64] = self.array["timing"]["tick"]
         self.rows_filled: NDArray[np.int64] = self.array["timing"]["row"]
@@ -141,6 +143,11 @@ class Workspace:
         self.turbulence: Floats = self.array["noise"]["turbulence"][0]
         self.navigation: Floats = self.array["noise"]["navigation"][0]
         self.rows: Records = self.array["rows"][0]
+
+    def navigation_error(self) -> list[float]:
+        """The estimated motion less the true one: the fields of `flight.guidance.navigation_error.MOTION`."""
+        error: list[float] = (self._estimated - self._true).tolist()
+        return error
 
     def _numbers(self, field: str, count: int) -> Floats:
         """The first numbers of a field, as an array that shares its memory."""

@@ -33,6 +33,7 @@ _PANELS = (
     ("slope", "leg", "slope\n(°)"),
     ("clearance", "leg", "least height above\nground (m)"),
     ("waypoint", "waypoint", "passed at\n(m)"),
+    ("corridor", "leg", "farthest from\nthe legs (m)"),
 )
 
 
@@ -50,8 +51,9 @@ def place_values(findings: Sequence[Finding], rule: str) -> list[PlaceValue]:
 
 
 def draw_turns(name: str, verdict: Verdict) -> Figure:
-    """Panels of turns, slopes, clearances and waypoints: bars for the plan, dots for the flight, dashes for limits.
+    """Panels of turns, slopes, clearances, waypoints and corridor.
 
+    Bars stand for the plan, dots for the flight, dashes for limits.
     What fails is ringed and its number is written in the same colour.
     """
     shown = [(*panel, values) for panel in _PANELS if (values := place_values(verdict.findings, panel[0]))]
@@ -105,12 +107,13 @@ def _zoom(axes: Any, values: list[PlaceValue], rule: str) -> None:
     limits = [abs(value.limit) for value in values if math.isfinite(value.limit)]
     if rule == "clearance" and limits and near:
         axes.set_ylim(0.0, max(min(max(near), 12.0 * max(limits)), 1.5 * max(limits), 1.1 * min(near)))
-    elif rule == "turn" and near and limits and max(limits) > 4.0 * max(near):
+    elif rule in ("turn", "corridor") and near and limits and max(limits) > 4.0 * max(near):
         axes.set_ylim(
             0.0, max(1.3 * max(near), 1.1 * min(limits)) if min(limits) < 4.0 * max(near) else 1.3 * max(near)
         )
+        unit = "°" if rule == "turn" else " m"
         axes.annotate(
-            f"limits from {min(limits):.0f}°", (1.0, 1.0), (0, 3), xycoords="axes fraction",
+            f"limits from {min(limits):.0f}{unit}", (1.0, 1.0), (0, 3), xycoords="axes fraction",
             textcoords="offset points", ha="right", fontsize=7, color=style.MISSILE,
         )  # fmt: skip
 

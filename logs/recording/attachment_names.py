@@ -1,6 +1,7 @@
 """The attachments of a flight log: their names and media types.
 
-`setup.json` lists those that make up the setup; a verdict, a result and a recovery note come after the flight.
+`setup.json` lists those that make up the setup; what flights beside it gave, a verdict, a result and a recovery note
+come after the flight.
 """
 
 from pathlib import PurePath
@@ -11,6 +12,7 @@ SCENARIO_FILE: Final = "scenario.json"
 PLAN_FILE: Final = "plan.json"
 MISSION_FILE: Final = "mission.waypoints"
 TERRAIN_FILE: Final = "terrain.json"
+BESIDE_FILE: Final = "beside.json"
 VERDICT_FILE: Final = "verdict.json"
 RESULT_FILE: Final = "result.json"
 RECOVERY_FILE: Final = "recovery.json"

@@ -17,7 +17,7 @@ from mcap.records import Channel, Schema
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.attachment_names import RECOVERY_FILE, RESULT_FILE, SETUP_FILE, VERDICT_FILE
+from logs.recording.attachment_names import BESIDE_FILE, RECOVERY_FILE, RESULT_FILE, SETUP_FILE, VERDICT_FILE
 from logs.recording.chunk_layout import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.foxglove_scene import LEVELS
 from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream
@@ -37,6 +37,8 @@ from logs.recording.state_channel import (
     parse_row,
     state_class,
 )
+from logs.verdict.beside_file import parse_beside
+from logs.verdict.levels import FlownBeside
 from world.errors import LogError
 
 _MESSAGE = struct.Struct("<HIQQ")
@@ -68,6 +70,7 @@ class FlightLog:
     problem: what is, in a line; empty for a complete log.
     end_time: s, of the last row.
     lost: what of the flight is lost, in a line; ``problem`` adds to it that a recovered log is one.
+    beside: what other flights had to say of it; None where none were flown.
     """
 
     source: str
@@ -81,6 +84,7 @@ class FlightLog:
     problem: str
     end_time: float
     lost: str = ""
+    beside: FlownBeside | None = None
 
 
 class _MessageCollector:
@@ -187,9 +191,10 @@ def read_log(path: Path) -> FlightLog:
         raise LogError(f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}")
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
+    beside, unread = _beside(found.attachments)
     lost = fault or found.problem
     recovered = not lost and RECOVERY_FILE in found.attachments
-    lost = _loss(found.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled
+    lost = _loss(found.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled or unread
     track = decode_rows(rows)
     return FlightLog(
         source=str(path),
@@ -203,6 +208,7 @@ def read_log(path: Path) -> FlightLog:
         problem=f"recovered: {lost}" if recovered else lost,
         end_time=float(track.time[-1]),
         lost=lost,
+        beside=beside,
     )
 
 
@@ -256,6 +262,15 @@ def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]
         return None, ""
     verdict = _object(attachments[VERDICT_FILE])
     return (verdict, "") if verdict else (None, f"{VERDICT_FILE} is not a JSON object")
+
+
+def _beside(attachments: dict[str, bytes]) -> tuple[FlownBeside | None, str]:
+    if BESIDE_FILE not in attachments:
+        return None, ""
+    try:
+        return parse_beside(attachments[BESIDE_FILE], BESIDE_FILE), ""
+    except LogError as error:
+        return None, str(error)
 
 
 def _object(data: bytes) -> dict[str, Any]:

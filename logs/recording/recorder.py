@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
-from logs.recording.attachment_names import RESULT_FILE, VERDICT_FILE, media_type
+from logs.recording.attachment_names import BESIDE_FILE, RESULT_FILE, VERDICT_FILE, media_type
 from logs.recording.chunk_layout import (
     CHUNK,
     NOT_INCREASING,
@@ -47,7 +47,9 @@ from logs.recording.state_channel import (
     state_schema,
     times_ns,
 )
+from logs.verdict.beside_file import beside_json
 from logs.verdict.findings import Verdict, verdict_json
+from logs.verdict.levels import FlownBeside
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
@@ -187,14 +189,16 @@ class Recorder:
         message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
         self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))
 
-    def finish(self, ended: str, verdict: Verdict | None = None) -> None:
-        """Write how the flight ended and its verdict, and close the file."""
+    def finish(self, ended: str, verdict: Verdict | None = None, beside: FlownBeside | None = None) -> None:
+        """Write how the flight ended, its verdict and what other flights had to say of it, and close the file."""
         if self._skipped is not None:
             self._append(self._skipped)
             self._skipped = None
         self._emit(None)
         end = max(self._last_ns, EPOCH_NS)
         self._write([self._poses.whole(end)])
+        if beside is not None:
+            self._attach(BESIDE_FILE, beside_json(beside).encode(), end)
         if verdict is not None:
             self._attach(VERDICT_FILE, verdict_json(verdict).encode(), end)
         result = {

@@ -22,14 +22,17 @@ from logs.recording.setup_schema import (
     Finite,
     MissionFile,
     ParametersFile,
+    ProgramFile,
     RouteFile,
     SetupModel,
     envelope_file,
     mission_file,
     parameters_file,
+    program_file,
     read_envelope,
     read_mission_table,
     read_parameters,
+    read_program,
     read_route,
     route_file,
 )
@@ -38,7 +41,7 @@ from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
 from world.scenario import Scenario, from_spec
 from world.scenario_file import first_error
-from world.scenario_tables import Guidance, Navigation
+from world.scenario_types import Guidance, Navigation
 from world.terrain import Terrain
 
 LOG_SCHEMA = "planfly.log/1"
@@ -71,6 +74,7 @@ class _Setup(SetupModel):
     nav: Navigation
     guidance_hz: Literal[30, 60]
     parameters: ParametersFile | None = None  # a log of before there were any was flown by planfly's guidance
+    program: ProgramFile | None = None
     mission: MissionFile
     route: RouteFile
     envelope: EnvelopeFile
@@ -135,6 +139,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
         parameters=None if setup.parameters is None else parameters_file(setup.parameters),
+        program=None if setup.program is None else program_file(setup.program),
         mission=mission_file(setup.mission),
         route=route_file(setup.route),
         envelope=envelope_file(setup.envelope),
@@ -179,6 +184,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         nav=file.nav,
         guidance_hz=file.guidance_hz,
         parameters=None if file.parameters is None else read_parameters(file.parameters, f"{source}: {SETUP_FILE}"),
+        program=None if file.program is None else read_program(file.program),
     )
     return StoredSetup(setup, file.versions)
 

@@ -3,6 +3,7 @@
 Names carry their units.  Numbers are written as Python's repr, which reads back to the same float.
 """
 
+import math
 from typing import Annotated
 
 import numpy as np
@@ -13,6 +14,7 @@ from aircraft.envelope import Envelope
 from flight.ardupilot.parameters import ArduPilotParameters, Origin, stored_parameters
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
+from flight.simulation.autopilot_program import AutopilotProgram
 from world.errors import LogError, ParameterError
 from world.geometry import leg_runs
 
@@ -71,6 +73,9 @@ class RouteFile(SetupModel):
     started: str
     notes: list[str]
     arcs_m: Column = []
+    endless_jump: int = -1
+    takeoff_ground_m: Finite | None = None
+    landing_ground_m: Finite | None = None
 
 
 class EnvelopeFile(SetupModel):
@@ -99,6 +104,16 @@ class ParametersFile(SetupModel):
     origins: dict[str, Origin]
     unused: list[str]
     source: str
+
+
+class ProgramFile(SetupModel):
+    """An `AutopilotProgram` as a table."""
+
+    version: str
+    sha256: str
+    parameters: dict[str, Finite]
+    changed: dict[str, Finite]
+    unused: list[str]
 
 
 def _item_file(item: MissionItem) -> _Item:
@@ -159,6 +174,9 @@ def route_file(route: Route) -> RouteFile:
         started=route.started,
         notes=list(route.notes),
         arcs_m=route.arcs.tolist(),
+        endless_jump=route.endless,
+        takeoff_ground_m=None if math.isnan(route.takeoff_ground) else route.takeoff_ground,
+        landing_ground_m=None if math.isnan(route.landing_ground) else route.landing_ground,
     )
 
 
@@ -183,6 +201,9 @@ def read_route(file: RouteFile, source: str) -> Route:
         started=file.started,
         notes=tuple(file.notes),
         arcs=np.array(file.arcs_m, dtype=np.float64),
+        endless=file.endless_jump,
+        takeoff_ground=math.nan if file.takeoff_ground_m is None else file.takeoff_ground_m,
+        landing_ground=math.nan if file.landing_ground_m is None else file.landing_ground_m,
     )
 
 
@@ -259,3 +280,19 @@ def read_parameters(file: ParametersFile, source: str) -> ArduPilotParameters:
         return stored_parameters(values, tuple(file.unused), file.source)
     except ParameterError as error:
         raise LogError(f"{source}: parameters.values: {error}") from error
+
+
+def program_file(program: AutopilotProgram) -> ProgramFile:
+    """Write which autopilot flew as a table."""
+    return ProgramFile(
+        version=program.version,
+        sha256=program.sha256,
+        parameters=dict(program.parameters),
+        changed=dict(program.changed),
+        unused=list(program.unused),
+    )
+
+
+def read_program(file: ProgramFile) -> AutopilotProgram:
+    """Read which autopilot flew."""
+    return AutopilotProgram(file.version, file.sha256, file.parameters, file.changed, tuple(file.unused))

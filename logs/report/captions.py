@@ -90,8 +90,10 @@ def _route_captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
 _FLIGHT_CAPTIONS = {
     "turns": _Caption(
         "Turn by turn, leg by leg",
-        "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground and waypoint.",
-        "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's. Ringed: fails.",
+        "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground, waypoint, and of "
+        "the distance from the legs.",
+        "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint what "
+        "counts as reached. Ringed: fails.",
     ),
     "time": _Caption(
         "Over time",

@@ -75,7 +75,8 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 
 def _judge(log: FlightLog) -> Verdict:
-    return judge_flight(log.setup, log.track, log.ended or "the log ends before the flight does", whole=log.complete)
+    ended = log.ended or "the log ends before the flight does"
+    return judge_flight(log.setup, log.track, ended, whole=log.complete, beside=log.beside)
 
 
 def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:

@@ -20,7 +20,7 @@ from logs.figures.elements.failures import failures
 from logs.figures.elements.scene_data import scene_json
 from logs.report import tables
 from logs.report.captions import report_pictures
-from logs.report.text import badge_of, count_sentence, finding_rows, rule_rows
+from logs.report.text import badge_of, count_sentence, finding_rows, level_rows, rule_rows
 from logs.verdict.findings import Verdict
 from logs.verdict.measures.leg_numbers import with_legs
 from world.atomic_files import write_whole
@@ -107,6 +107,7 @@ def _page(
         failing=[row for row in rows if row.state == "fail"],
         counts=count_sentence(rows),
         flight_line=tables.flight_sentence(setup, track),
+        levels=level_rows(verdict),
         rules=rule_rows(verdict.findings),
         findings=rows,
         notes=[note for note in tables.notes_of(setup) if note not in verdict.notes],

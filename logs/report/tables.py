@@ -176,7 +176,8 @@ def _limit_facts(setup: FlightSetup) -> Facts:
         (
             "Limits",
             f"turn {angle(limits.max_turn_deg)}, climb {angle(limits.max_climb_deg)}, "
-            f"dive {angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground",
+            f"dive {angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground; "
+            f"within {quantity(setup.corridor, 'm')} of the legs",
         ),
         ("Wind", f"{wind_text if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
     ]

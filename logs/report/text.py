@@ -47,6 +47,18 @@ class RuleRow:
 
 
 @dataclass(frozen=True, slots=True)
+class LevelRow:
+    """One level's answer as text.  state: "pass" or "fail"; sign: the same for people who see no colour."""
+
+    state: str
+    sign: str
+    name: str
+    asks: str
+    flown_by: str
+    answer: str
+
+
+@dataclass(frozen=True, slots=True)
 class Badge:
     """The verdict in a word.  state: "pass", "fail" or "unjudged"."""
 
@@ -55,6 +67,12 @@ class Badge:
     word: str
 
 
+# What each level asks, and who flies for it.
+_LEVELS = {
+    "geometry": ("Does the path ask for more than the envelope gives?", "nobody"),
+    "airframe": ("Can this aircraft follow it at all?", "planfly's guidance"),
+    "autopilot": ("Does it go well with the autopilot that will fly?", "ArduPlane, by its parameters"),
+}
 _SIGNS = {"pass": "✓", "fail": "✗", "unjudged": "?"}
 _WORDS = {"pass": "ok", "fail": "fails", "unjudged": "not judged"}
 
@@ -109,6 +127,16 @@ def badge_of(verdict: Verdict) -> Badge:
     if not broken and not verdict.complete:
         return Badge("fail", "!", "Incomplete, so not flyable")
     return Badge("fail", _SIGNS["fail"], "Not flyable" if verdict.complete else "Not flyable, and incomplete")
+
+
+def level_rows(verdict: Verdict) -> list[LevelRow]:
+    """Each level that was asked, geometry first; the verdict's own is the last."""
+    rows = []
+    for level in verdict.levels:
+        state = state_of(level.flyable)
+        asks, flown_by = _LEVELS[level.name]
+        rows.append(LevelRow(state, f"{_SIGNS[state]} {_WORDS[state]}", level.name, asks, flown_by, level.headline))
+    return rows
 
 
 def finding_rows(findings: Iterable[Finding]) -> list[FindingRow]:

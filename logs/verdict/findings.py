@@ -3,13 +3,15 @@
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from logs.verdict.places import Disagreement, Place, Suggestion
-from logs.verdict.wording import disagreement_text, place_text, suggestions_text
+from flight.simulation.autopilot_program import AutopilotProgram
+from logs.verdict.levels import DecidingParameter, LevelAnswer
+from logs.verdict.places import Place, Suggestion
+from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
 
-SCHEMA = "planfly.verdict/2"
+SCHEMA = "planfly.verdict/3"
 
 # Each rule and its title, in the order in which a verdict lists them.
 RULES = {
@@ -21,11 +23,29 @@ RULES = {
     "threat": "threats",
     "bounds": "bounds",
     "waypoint": "waypoints",
+    "corridor": "corridor",
     "speed": "airspeed",
+    "stall": "stall",
+    "takeoff": "take-off",
+    "landing": "landing",
     "energy": "energy",
     "departure": "departure",
     "completion": "completion",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A number that a rule measured and does not judge.
+
+    what: "overshoot", "settled", "bank", "radius", "height error", "slope error", "throttle at full", "throttle at
+    idle", "too slow", "too fast", "speed error", "nearest".
+    value: in ``unit``.
+    """
+
+    what: str
+    value: float
+    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +64,7 @@ class Finding:
     brief: the reason in a few words, for a headline.
     placed: whether the reason begins with the place.
     check: where a rule has several checks, which one; "" otherwise.
+    facts: what was measured beside it and is no fault.
     """
 
     rule: str
@@ -62,18 +83,7 @@ class Finding:
     brief: str = ""
     placed: bool = False
     check: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Prediction:
-    """What the geometric level says of a mission that was flown.
-
-    headline: its answer in a line.  disagreements: the findings that the two levels judge differently.
-    """
-
-    flyable: bool
-    headline: str
-    disagreements: tuple[Disagreement, ...]
+    facts: tuple[Fact, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +96,13 @@ class Verdict:
     lines: the summary for a person, of which the first, the headline, answers the question.
     level: "flown", "geometric" (from the envelope, without a flight) or "plan" (no feasible plan, so nothing was
     flown).
-    prediction: of a flown verdict, what the geometric level says beside it.
+    levels: what each level says that was asked, geometry first, the verdict's own last; none of a plan that was not
+    flown.
+    deciding: the autopilot's parameter that decides, where the flight fails by one and the aircraft passes.
     notes: what is not flown as the mission has it; the lines say it too.
     leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
     it did not get to; empty where too little was recorded to tell.
+    program: of a flown verdict, the real autopilot that flew, None where none did.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -101,9 +114,11 @@ class Verdict:
     complete: bool
     lines: tuple[str, ...]
     level: str
-    prediction: Prediction | None = None
+    levels: tuple[LevelAnswer, ...] = ()
+    deciding: DecidingParameter | None = None
     notes: tuple[str, ...] = ()
     leg_ends: tuple[float, ...] = ()
+    program: AutopilotProgram | None = None
 
     @property
     def headline(self) -> str:
@@ -153,10 +168,12 @@ def make_finding(
     unit: str = "",
     method: str = "",
     check: str = "",
+    facts: Sequence[Fact] = (),
 ) -> Finding:
     """Make a finding of plain numbers: rounded to 1e-6, and None for what is not finite.
 
     faults: what the reason begins with, where it begins with faults.
+    facts: measured beside it; one that is not a number is left out.
     A finding that fails by other evidence than its number has no margin: the reason says what failed.
 
     >>> make_finding("speed", Place("leg", 2), ok=False, reason="too slow", limit=16.0, margin=0.5).margin is None
@@ -180,6 +197,7 @@ def make_finding(
         brief=faults[0].brief if faults else reason,
         placed=bool(faults) and faults[0].placed,
         check=check,
+        facts=tuple(replace(fact, value=round(fact.value, 6) + 0.0) for fact in facts if math.isfinite(fact.value)),
     )
 
 
@@ -207,7 +225,7 @@ def verdict_json(verdict: Verdict) -> str:
     >>> finding = make_finding("turn", Place("waypoint", 1, item=2), ok=True, reason="turns 30.0°", planned=30.0)
     >>> written = json.loads(verdict_json(Verdict((finding,), True, True, ("flyable",), "flown")))
     >>> written["schema"], written["summary"], written["findings"][0]["where"], written["findings"][0]["place"]["index"]
-    ('planfly.verdict/2', 'flyable', 'waypoint 1 (item 2)', 1)
+    ('planfly.verdict/3', 'flyable', 'waypoint 1 (item 2)', 1)
     """
     data: dict[str, Any] = {
         "schema": SCHEMA,
@@ -215,20 +233,27 @@ def verdict_json(verdict: Verdict) -> str:
         "flyable": verdict.flyable,
         "complete": verdict.complete,
         "summary": verdict.summary,
-        "geometric": None if verdict.prediction is None else _prediction_data(verdict.prediction),
+        "flown_by": None if verdict.program is None else asdict(verdict.program),
+        "levels": [_level_data(level) for level in verdict.levels],
+        "deciding_parameter": None if verdict.deciding is None else _deciding_data(verdict.deciding),
         "findings": [_finding_data(finding) for finding in verdict.findings],
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
 
 
-def _prediction_data(prediction: Prediction) -> dict[str, Any]:
-    differing = prediction.disagreements
+def _level_data(level: LevelAnswer) -> dict[str, Any]:
+    differing = level.disagreements
     return {
-        "flyable": prediction.flyable,
-        "headline": prediction.headline,
+        "name": level.name,
+        "flyable": level.flyable,
+        "headline": level.headline,
         "disagreements": [disagreement_text(one) for one in differing],
         "differences": [asdict(one) for one in differing],
     }
+
+
+def _deciding_data(deciding: DecidingParameter) -> dict[str, Any]:
+    return {**asdict(deciding), "text": deciding_text(deciding)}
 
 
 def _finding_data(finding: Finding) -> dict[str, Any]:

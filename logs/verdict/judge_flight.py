@@ -4,21 +4,33 @@ What guidance noted about itself (leg, cross-track, height error, clearance) and
 not read.
 """
 
+from collections.abc import Mapping
+
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.findings import Finding, Prediction, Verdict
-from logs.verdict.judge_geometry import geometric_findings, judge_geometry, judge_plan_only
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.judge_geometry import (
+    flown_level,
+    geometric_findings,
+    judge_geometry,
+    judge_plan_only,
+    judge_unflown,
+)
+from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import lay_track
-from logs.verdict.places import Disagreement
+from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from logs.verdict.places import Disagreement, Place
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
 from logs.verdict.rules.completion_rule import completion_findings
+from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
+from logs.verdict.rules.stall_rule import stall_findings
+from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
 from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
 from logs.verdict.rules.waypoint_rule import waypoint_findings
@@ -28,15 +40,25 @@ from logs.verdict.summary import headline, summary_lines
 __all__ = ["judge_flight", "judge_geometry", "judge_plan_only"]
 
 
-def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = True, envelope: bool = True) -> Verdict:
+def judge_flight(
+    setup: FlightSetup,
+    track: Track,
+    ended: str,
+    *,
+    whole: bool = True,
+    envelope: bool = True,
+    beside: FlownBeside | None = None,
+) -> Verdict:
     """Judge a flown track: level "flown".
 
-    Any track is judged, however short or damaged: what cannot be known makes it incomplete.
+    Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
+    flight that never began: its route is judged, level "geometric".
 
     ended: how the flight ended, "completed" or what stopped it.
     whole: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and
     the scenario's numbers alone.
+    beside: what other flights have to say of this one.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -56,37 +78,81 @@ def judge_flight(setup: FlightSetup, track: Track, ended: str, *, whole: bool = 
     'flyable'
     """
     demands = route_demands(setup, envelope=envelope)
+    if not len(track):
+        return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
-    findings: tuple[Finding, ...] = (
+    findings = _flown_findings(demands, aligned, ended, whole, envelope)
+    complete = all(item.ok is True for item in findings if item.rule == "completion")
+    flyable = complete and not any(item.ok is False for item in findings)
+    findings = with_suggestions(demands, aligned, findings)
+    levels = _levels(demands, findings, flyable, beside)
+    deciding = None if beside is None or flyable else beside.deciding
+    lines = summary_lines(findings, setup, "flown", levels, deciding)
+    return Verdict(
+        findings,
+        flyable,
+        complete,
+        lines,
+        "flown",
+        levels=levels,
+        deciding=deciding,
+        notes=setup.route.notes,
+        leg_ends=() if aligned is None else aligned.leg_ends(),
+        program=setup.program,
+    )
+
+
+def _flown_findings(
+    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
+) -> tuple[Finding, ...]:
+    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
+    findings = (
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
         *threat_findings(demands, aligned),
         *bounds_findings(demands, aligned),
         *waypoint_findings(demands, aligned),
+        *corridor_findings(demands, aligned),
         *speed_findings(demands, aligned),
+        *(stall_findings(demands, aligned) if envelope else ()),
+        *takeoff_landing_findings(demands),
         *energy_findings(demands, aligned),
         *departure_findings(demands, aligned),
         *completion_findings(demands, aligned, ended, whole),
     )
-    findings = fold_loiters(demands, aligned, findings)
-    complete = all(item.ok is True for item in findings if item.rule == "completion")
-    flyable = complete and not any(item.ok is False for item in findings)
-    findings = with_suggestions(demands, aligned, findings)
-    prediction = _predict(demands, findings) if envelope else None
-    lines = summary_lines(findings, flyable, setup, "flown", prediction)
-    ends = () if aligned is None else aligned.leg_ends()
-    return Verdict(findings, flyable, complete, lines, "flown", prediction, setup.route.notes, ends)
+    return fold_loiters(demands, aligned, findings)
 
 
-def _predict(demands: RouteDemands, flown: tuple[Finding, ...]) -> Prediction:
-    """What the geometric level says, and where it and the flight differ."""
-    predicted = geometric_findings(demands)
+def _levels(
+    demands: RouteDemands, flown: tuple[Finding, ...], flyable: bool, beside: FlownBeside | None
+) -> tuple[LevelAnswer, ...]:
+    """What geometry says, and the airframe where it was flown beside, where each differs; and the flight's own answer.
+
+    Without the envelope there is nothing beside the flight.
+    """
+    levels = []
+    if demands.envelope:
+        predicted = geometric_findings(demands)
+        passes = not any(item.ok is False for item in predicted)
+        differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
+        levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))
+    if demands.envelope and beside is not None and beside.airframe is not None:
+        airframe = beside.airframe
+        passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
+        differing = _differing("airframe", passed, flown)
+        levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
+    return (*levels, LevelAnswer(flown_level(demands.setup), flyable, headline(flown, flyable)))
+
+
+def _differing(
+    level: str, outcomes: Mapping[tuple[str, Place], bool | None], flown: tuple[Finding, ...]
+) -> tuple[Disagreement, ...]:
+    """Where a level and the flight judge differently, in the level's order."""
     judged = {(item.rule, item.place): item.ok for item in flown}
-    disagreements = []
-    for item in predicted:
-        other = judged.get((item.rule, item.place))
-        if item.ok is not None and other is not None and item.ok != other:
-            disagreements.append(Disagreement(item.rule, item.place, item.ok, other))
-    flyable = not any(item.ok is False for item in predicted)
-    return Prediction(flyable, headline(predicted, flyable), tuple(disagreements))
+    out = []
+    for (rule, place), there in outcomes.items():
+        here = judged.get((rule, place))
+        if there is not None and here is not None and there != here:
+            out.append(Disagreement(rule, place, level, there, here))
+    return tuple(out)

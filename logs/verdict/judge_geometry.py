@@ -1,20 +1,25 @@
-"""Verdicts without a flight: of a route's geometry, and of a plan that was not feasible."""
+"""Verdicts without a flight: of a route, of a flight that never began, and of a plan that was not feasible."""
 
 import math
 
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import Finding, Verdict, make_finding, message
+from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
+from logs.verdict.levels import LevelAnswer, LevelName
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.places import PLAN
+from logs.verdict.places import FLIGHT, PLAN
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
+from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.px4_rule import mission_findings
 from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
+from logs.verdict.rules.stall_rule import stall_findings
+from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
 from logs.verdict.rules.threat_rule import threat_findings
 from logs.verdict.rules.turn_rule import turn_findings
+from logs.verdict.rules.waypoint_rule import waypoint_findings
 from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 from planner.plan import Plan, Violation
@@ -28,7 +33,11 @@ def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
         *clearance_findings(demands, None, geometric=True),
         *threat_findings(demands, None, geometric=True),
         *bounds_findings(demands, None, geometric=True),
+        *waypoint_findings(demands, None, geometric=True),
+        *corridor_findings(demands, None, geometric=True),
         *speed_findings(demands, None, geometric=True),
+        *stall_findings(demands, None, geometric=True),
+        *takeoff_landing_findings(demands),
         *energy_findings(demands, None, geometric=True),
     )
     return fold_loiters(demands, None, findings)
@@ -61,8 +70,40 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     )
     complete = setup.plan is None or setup.plan.feasible
     flyable = complete and not any(item.ok is False for item in findings)
-    lines = summary_lines(findings, flyable, setup, "geometric")
-    return Verdict(findings, flyable, complete, lines, "geometric", notes=setup.route.notes)
+    levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
+
+
+def flown_level(setup: FlightSetup) -> LevelName:
+    """The level that a flight of a setup answers."""
+    return "airframe" if setup.parameters is None else "autopilot"
+
+
+def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> Verdict:
+    """Judge a flight of which there is no row: its route's geometry, and why nothing was flown; never complete.
+
+    ended: why not.  whole: the record has its end.
+
+    >>> from logs.recording.example_log import example_log
+    >>> verdict = judge_unflown(route_demands(example_log().setup), "not started: no way made against the wind")
+    >>> verdict.level, verdict.headline
+    ('geometric', 'not flyable: completion (not started: no way made against the wind), ...')
+    """
+    setup = demands.setup
+    faults = [message(ended), *([] if whole else [message("the log is damaged or unfinished")])]
+    stopped = make_finding(
+        "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
+    )
+    predicted = geometric_findings(demands)
+    passes = not any(item.ok is False for item in predicted)
+    findings = (*with_suggestions(demands, None, predicted), stopped)
+    levels = (
+        LevelAnswer("geometry", passes, headline(predicted, passes)),
+        LevelAnswer(flown_level(setup), False, headline(findings, False)),
+    )
+    lines = summary_lines(findings, setup, "geometric", levels)
+    return Verdict(findings, False, False, lines, "geometric", levels, notes=setup.route.notes)
 
 
 def judge_plan_only(plan: Plan) -> Verdict:

@@ -68,9 +68,14 @@ Suggestion = tuple[Change, ...]
 
 @dataclass(frozen=True, slots=True)
 class Disagreement:
-    """A rule at a place that the geometric and the flown level judge differently; True: passes."""
+    """A rule at a place that another level and the verdict judge differently.
+
+    level: the other level, a name of `logs.verdict.levels.LevelName`.
+    there, here: whether it passes at that level, and in the verdict.
+    """
 
     rule: str
     place: Place
-    geometric: bool
-    flown: bool
+    level: str
+    there: bool
+    here: bool

@@ -52,6 +52,8 @@ def _suggest(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding)
             return _inside(item)
         case "energy", _:
             return _less_energy(demands, item)
+        case "stall", _ if item.limit is not None:
+            return _faster(demands, item.place, item.limit)
         case "speed", Place("leg", int(leg)) if item.limit is not None and item.margin is not None:
             return _level_speeds(demands, item.place, leg)
     return ()
@@ -146,7 +148,7 @@ def _gentler_turn(demands: RouteDemands, i: int, allowed: float) -> float:
     was found.
     """
     first, last = max(0, i - 2), min(len(demands.points), i + 3)
-    route = demands.setup.route
+    route = demands.route
     near = replace(
         route,
         waypoints=route.waypoints[first:last],
@@ -171,11 +173,20 @@ def _gentler_turn(demands: RouteDemands, i: int, allowed: float) -> float:
     return 0.0
 
 
-def _speeds(demands: RouteDemands, amsl: float, now: float) -> list[float]:
-    """Speeds of level flight at this height in the envelope, the nearest to ``now`` first."""
+def _true(demands: RouteDemands, leg: int) -> float:
+    """True airspeed by the airspeed that is commanded on a leg."""
+    return float(demands.route.airspeed[leg] / demands.setup.route.airspeed[leg])
+
+
+def _speeds(demands: RouteDemands, amsl: float, now: float, factor: float) -> list[float]:
+    """Speeds to command for level flight at this height in the envelope, the nearest to ``now`` first.
+
+    factor: true airspeed by the one commanded.
+    """
     envelope = demands.setup.envelope
     low, high = envelope.level_speeds(amsl)
     low, high = max(low * ABOVE_SLOWEST, float(envelope.airspeed[0])), min(high, float(envelope.airspeed[-1]))
+    low, high = low / factor, high / factor
     steps = np.arange(math.ceil(low / SPEED_STEP), math.floor(high / SPEED_STEP) + 1) * SPEED_STEP
     return sorted((float(v) for v in steps), key=lambda v: (abs(v - now), v))
 
@@ -184,8 +195,9 @@ def _slope_speed(demands: RouteDemands, leg: int, slope: float) -> float | None:
     """Airspeed nearest to the commanded one at which the aircraft can hold a slope on a leg, or None."""
     course, side = float(demands.courses[leg]), 0 if demands.slopes[leg] >= 0.0 else 1
     heights = (float(demands.points[leg, 2]), float(demands.points[leg + 1, 2]))
-    for speed in _speeds(demands, max(heights), float(demands.setup.route.airspeed[leg])):
-        table = demands.limits.performance(speed)
+    factor = _true(demands, leg)
+    for speed in _speeds(demands, max(heights), float(demands.setup.route.airspeed[leg]), factor):
+        table = demands.limits.performance(speed * factor)
         if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
             return speed
     return None
@@ -195,8 +207,10 @@ def _turn_speed(demands: RouteDemands, i: int) -> float | None:
     """Highest lower airspeed at which the turn at a waypoint fits its legs beside its neighbours, or None."""
     now = float(max(demands.setup.route.airspeed[i - 1 : i + 1]))
     available = min(available_lengths(demands.runs, demands.before, demands.after, demands.reversal, i))
-    for speed in sorted((v for v in _speeds(demands, float(demands.points[i, 2]), now) if v < now), reverse=True):
-        table = demands.limits.performance(speed)
+    factor = _true(demands, i)
+    speeds = _speeds(demands, float(demands.points[i, 2]), now, factor)
+    for speed in sorted((v for v in speeds if v < now), reverse=True):
+        table = demands.limits.performance(speed * factor)
         radius = turn_radius_between(table, demands.courses[i - 1], demands.courses[i], float(demands.points[i, 2]))
         used = turn_lengths(abs(float(demands.turns[i])), radius, bool(demands.setup.route.fly_over[i]))
         if max(used) + BUFFER_LENGTH <= available:
@@ -248,10 +262,17 @@ def _less_energy(demands: RouteDemands, item: Finding) -> tuple[Suggestion, ...]
     return (shorter,), (larger,)
 
 
+def _faster(demands: RouteDemands, place: Place, stall: float) -> tuple[Suggestion, ...]:
+    leg = int(np.argmin(demands.route.airspeed))
+    now = float(demands.setup.route.airspeed[leg])
+    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED) / _true(demands, leg)) / 10.0
+    return ((Change("airspeed", place, now, wanted, "m/s"),),) if wanted > now else ()
+
+
 def _level_speeds(demands: RouteDemands, place: Place, leg: int) -> tuple[Suggestion, ...]:
     commanded = float(demands.setup.route.airspeed[leg])
     up = float(max(demands.points[leg, 2], demands.points[leg + 1, 2]))
-    low, high = demands.setup.envelope.level_speeds(up)
+    low, high = (speed / _true(demands, leg) for speed in demands.setup.envelope.level_speeds(up))
     if low <= commanded <= high:
         return ()
     low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0

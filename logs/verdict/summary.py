@@ -1,13 +1,19 @@
 """The verdict in a line, and what a reader should know beside it."""
 
+import math
 from collections.abc import Sequence
+from pathlib import Path
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import RULES, Finding, Prediction
-from logs.verdict.wording import disagreement_text, place_text, shortened
+from logs.verdict.findings import RULES, Finding
+from logs.verdict.levels import DecidingParameter, LevelAnswer
+from logs.verdict.wording import deciding_text, disagreement_text, place_text, shortened
 
 # Failed findings that the first line names.
 _NAMED = 4
+# Changed parameters of a real autopilot that its line names.
+_CHANGED = 8
 _UNITS = {"deg": "°", "m": " m", "s": " s", "m/s": " m/s", "Wh": " Wh", "legs": " legs"}
 _GUIDANCE = {
     "path": "planfly's guidance on the fly-by path",
@@ -19,23 +25,60 @@ _NAV = {
     "rtk": "with RTK's error (0.05 m on each axis)",
     "gnss": "with GNSS's error (1.5 m on each axis)",
 }
+# How the other levels are introduced.
+_LEVELS = {
+    "geometry": "By geometry alone",
+    "airframe": "By the airframe (planfly's guidance, exact navigation)",
+}
+# Rules whose silence the first line tells, by what they judge.
+_UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
 # What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
 _FIRST = ("departure", "completion", "mission", "slope")
 _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
 
 
 def headline(findings: Sequence[Finding], flyable: bool) -> str:
-    """First line: the answer, and what failed or was not judged."""
+    """First line: the answer, and what failed, or was not judged or only just passed."""
     if flyable:
-        terrain = [item for item in findings if item.rule == "clearance" and item.ok is None]
-        if not terrain:
-            return "flyable"
-        whole = len(terrain) == sum(item.rule == "clearance" for item in findings)
-        return "flyable; terrain not judged" if whole else f"flyable; terrain not judged on {len(terrain)} legs"
+        silent = [_not_judged(findings, rule) for rule in _UNJUDGED]
+        return "; ".join(["flyable", *filter(None, silent), *_by_luck(findings)])
     failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
     named = _spread(failed)
     more = len(failed) - len(named)
     return "not flyable: " + ", ".join(_phrase(item) for item in named) + (f", +{more} more" if more else "")
+
+
+def first_failed(findings: Sequence[Finding]) -> Finding | None:
+    """The failed finding that the first line names first; None where nothing failed.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import FLIGHT
+    >>> findings = [make_finding(rule, FLIGHT, ok=False, reason="") for rule in ("energy", "completion")]
+    >>> first = first_failed(findings)
+    >>> first.rule
+    'completion'
+    """
+    failed = sorted((item for item in findings if item.ok is False), key=lambda item: _URGENCY[item.rule])
+    return _spread(failed)[0] if failed else None
+
+
+def _not_judged(findings: Sequence[Finding], rule: str) -> str:
+    """What of a rule was not judged, in words; "" for nothing."""
+    mine = [item for item in findings if item.rule == rule]
+    silent = sum(item.ok is None for item in mine)
+    if not silent:
+        return ""
+    return f"{_UNJUDGED[rule]} not judged" + ("" if silent == len(mine) else f" on {silent} legs")
+
+
+def _by_luck(findings: Sequence[Finding]) -> list[str]:
+    """Threats that the aircraft missed by less than it may have been off, in words."""
+    out = []
+    for item in findings:
+        facts = {fact.what: fact.value for fact in item.facts if item.rule == "threat" and item.ok}
+        if facts.get("nearest", math.inf) < facts.get("navigation error", 0.0):
+            out.append(f"a missile missed by {facts['nearest']:.1f} m, less than the navigation error")
+    return out
 
 
 def _spread(failed: list[Finding]) -> list[Finding]:
@@ -91,16 +134,28 @@ def _numbers(item: Finding) -> str:
 
 
 def summary_lines(
-    findings: Sequence[Finding], flyable: bool, setup: FlightSetup, level: str, prediction: Prediction | None = None
+    findings: Sequence[Finding],
+    setup: FlightSetup,
+    level: str,
+    levels: Sequence[LevelAnswer],
+    deciding: DecidingParameter | None = None,
 ) -> tuple[str, ...]:
-    """Lines of the summary: the answer; how the flight started; what was not judged; what is not flown as written."""
-    lines = [headline(findings, flyable)]
+    """Lines of the summary: the answer; whose fault it is; the start; what was not judged; what the levels say.
+
+    levels: the verdict's own last, with the headline.
+    """
+    *others, own = levels
+    lines = [own.headline, *_whose_fault(levels, deciding, tried=setup.program is None)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("mission", "clearance", "threat", "bounds", "energy"):
+        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    # Limits of that autopilot's own, which say nothing of the aircraft.
+    lines += [
+        f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None
+    ]
     lines += _less_error(findings, setup)
     if setup.route.notes:
         lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
@@ -109,20 +164,47 @@ def summary_lines(
         lines += _parameter_lines(setup)
     if level == "geometric":
         lines.append("Level: geometric, from the route and the aircraft's envelope, without a flight")
-    if prediction is not None:
-        lines.append(f"By geometry alone: {prediction.headline}; {_agreement(prediction)}")
+    for other in others:
+        agreement = f"; {_agreement(other)}" if level == "flown" else ""
+        lines.append(f"{_LEVELS[other.name]}: {other.headline}{agreement}")
     return tuple(lines)
+
+
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, tried: bool) -> list[str]:
+    """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides.
+
+    tried: whether other parameters were flown.
+    """
+    answers = {level.name: level.flyable for level in levels}
+    if answers.get("autopilot") is not False or not answers.get("airframe"):
+        return []
+    why = ": no single parameter that was tried would pass" if tried else ""
+    if deciding is not None:
+        why = f": {deciding_text(deciding)}"
+    return [f"The aircraft can, ArduPlane with these parameters cannot{why}"]
 
 
 def flown_by(setup: FlightSetup) -> str:
     """Who steers, in words: planfly's guidance or ArduPlane, with the parameters that decide most of its flight."""
     parameters = setup.parameters
+    if setup.program is not None:
+        return _program_text(setup.program, setup.aircraft)
     if parameters is None:
         return _GUIDANCE[setup.guidance]
     whose = f"the parameters of {parameters.source}" if parameters.source else "its default parameters"
     return (
         f"ArduPlane's law with {whose} (WP_RADIUS {parameters.wp_radius:g} m,"
         f" NAVL1_PERIOD {parameters.navl1_period:g} s, TECS_HDEM_TCONST {parameters.tecs_height_demand_time:g} s)"
+    )
+
+
+def _program_text(program: AutopilotProgram, aircraft: str) -> str:
+    """A real autopilot in words; every parameter stands in the verdict's data."""
+    changed = [f"{name} {value:g}" for name, value in program.changed.items()]
+    more = f", +{len(changed) - _CHANGED} more" if len(changed) > _CHANGED else ""
+    return (
+        f"{program.version} (sha256 {program.sha256[:8]}...), {len(program.parameters)} parameters set for"
+        f" {Path(aircraft).name}, changed: {', '.join(changed[:_CHANGED]) or 'none'}{more}"
     )
 
 
@@ -158,9 +240,10 @@ def _less_error(findings: Sequence[Finding], setup: FlightSetup) -> list[str]:
     ]
 
 
-def _agreement(prediction: Prediction) -> str:
-    differing = prediction.disagreements
+def _agreement(other: LevelAnswer) -> str:
+    """Where the verdict and another level differ, in words."""
+    differing = other.disagreements
     if not differing:
-        return "flight and geometry agree on every finding"
+        return "flight and geometry agree on every finding" if other.name == "geometry" else "both flights agree"
     more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
     return "; ".join(map(disagreement_text, differing[:_NAMED])) + more

@@ -46,8 +46,18 @@ WATCHED = 10.0
 # Radii of the planned arc.  A flown radius from this on is a nearly straight flight's, and says nothing of a turn.
 STRAIGHT = 10.0
 
+# Share of the corridor's half width.  A corner is a jog where the way without it passes it within this: an aircraft
+# that takes that way, or swings out as far again beyond it, is still well inside.
+JOG_SHARE = 0.25
+# Waypoints.  No more in a row are looked at as one jog, or as one step: a survey's shortest lines are longer.
+JOG_WAYPOINTS = 8
+
 # The slope rule
 
+# m.  A leg beyond its limit is a step where all that is too steep in a row rises or falls by no more: an aircraft that
+# begins it early or late is within this of it.  ArduPlane itself flies changes of height below GLIDE_SLOPE_MIN, 15 m
+# by default, as a step (ArduPilot's parameter reference).
+STEP = 10.0
 # rad.  A fitted slope may differ from the plan's by this, beside the fit's own tolerance.
 OFF_SLOPE = math.radians(0.5)
 # m.  Height from the leg's line, away from the blends at its ends; more where no part of the leg is.
@@ -112,9 +122,9 @@ ROUGH_COURSE, ROUGH_SLOPE = math.radians(0.75), math.radians(0.5)
 
 # The rules about waypoints, speed, departure and completion
 
-# m.  A waypoint is passed within this of where the fly-by path passes it, and within this height of that path, beside
-# what the blend of slopes takes.
-PASS, PASS_HEIGHT = 10.0, 15.0
+# m.  Where neither mission nor autopilot says what counts as reached: this beside where the fly-by path passes; and the
+# corridor is as much wider than a turn that needs more than it.
+PASS = 10.0
 # m.  Approaches to a waypoint within this of the closest are equally close, as on a path that crosses itself above or
 # below: of them the one nearest in height counts.
 EQUALLY_CLOSE = 0.5
@@ -134,8 +144,6 @@ MOST_BANK = math.radians(75.0)
 # m/s.  Airspeed below this is a departure of the Aerosonde, and this share of its slowest level speed, which for the
 # Aerosonde is the same, of every other aircraft.
 SLOWEST, SLOWEST_SHARE = 15.0, 0.94
-# m.  A leg counts as flown if the track keeps within this of its line, clear of the turns.
-CORRIDOR = 20.0
 # s.  A log with a pause this long between rows has lost some.
 LONGEST_GAP = 0.5
 # Median steps between rows.  In a log of few rows a second, where `LONGEST_GAP` is an ordinary step, this many are a
@@ -143,6 +151,11 @@ LONGEST_GAP = 0.5
 GAP_STEPS = 5.0
 # m/s.  By how much position and velocity of one tick may disagree before the record contradicts itself.
 CONTRADICTION = 10.0
+# s.  Airspeed, bank and load factor are means over this long where they are held against the stall.
+STALL_MEAN = 1.0
+# m/s.  By how much a flown airspeed may be below the stall in a bank, and a gust's standard deviation more: guidance
+# lets the speed swing by as much when it rolls into a turn in calm air.
+STALL_TOLERANCE = 0.2
 # Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 

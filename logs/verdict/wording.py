@@ -2,6 +2,7 @@
 
 import math
 
+from logs.verdict.levels import DecidingParameter
 from logs.verdict.places import Change, Disagreement, Place, Suggestion
 from logs.verdict.tolerances import ON_THE_SPOT
 from world.threats import threat_label
@@ -99,14 +100,34 @@ def suggestions_text(suggestions: tuple[Suggestion, ...]) -> str:
     return ", or ".join(map(suggestion_text, suggestions))
 
 
-def disagreement_text(one: Disagreement) -> str:
-    """That the two levels judge a place differently.
+# How a level judges, after "passes" and "fails".
+_BY_LEVEL = {"geometry": "by geometry", "airframe": "with planfly's guidance", "autopilot": "with the autopilot"}
 
-    >>> disagreement_text(Disagreement("speed", Place("leg", 0), geometric=True, flown=False))
+
+def disagreement_text(one: Disagreement) -> str:
+    """That another level and the verdict judge a place differently.
+
+    >>> disagreement_text(Disagreement("speed", Place("leg", 0), "geometry", there=True, here=False))
     'speed at leg 0 passes by geometry and fails in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    return f"{one.rule} at {place_text(one.place)} {verbs[one.geometric]} by geometry and {verbs[one.flown]} in flight"
+    where = f"{one.rule} at {place_text(one.place)}"
+    return f"{where} {verbs[one.there]} {_BY_LEVEL[one.level]} and {verbs[one.here]} in flight"
+
+
+def deciding_text(deciding: DecidingParameter) -> str:
+    """Which parameter decides, what its value does, and which would pass.
+
+    >>> deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2))
+    'TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass'
+    """
+    where, off = place_text(deciding.place), deciding.off
+    does = f"fails {deciding.rule} at {where}"
+    if off is not None and deciding.rule == "corridor":
+        does = f"takes it {abs(off):.0f} m off {where}"
+    elif off is not None:
+        does = f"puts it {abs(off):.0f} m {'low' if off < 0.0 else 'high'} on {where}"
+    return f"{deciding.name} {deciding.current:g} {does}; {deciding.passing:g} would pass"
 
 
 def shortened(text: str) -> str:

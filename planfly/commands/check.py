@@ -41,10 +41,12 @@ def check(args: argparse.Namespace) -> int:
 
 def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
     """Read a log, over another terrain where one is named.  Raises ScenarioError for options that it cannot take."""
-    given = [name for name in ("aircraft", "airspeed", "params", "guidance") if getattr(args, name) is not None]
+    names = ("aircraft", "airspeed", "wind", "turbulence", "params", "guidance")
+    given = [name for name in names if getattr(args, name) is not None]
     if given:
         raise ScenarioError(
-            f"{source}: --{given[0]}: a log is judged with the aircraft, the speeds and the autopilot it was flown with"
+            f"{source}: --{given[0]}: a log is judged with the aircraft, the speeds, the wind and the autopilot it was"
+            " flown with"
         )
     if args.scenario:
         raise ScenarioError(

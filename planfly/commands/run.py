@@ -12,6 +12,7 @@ from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planfly.refine import refine
+from planfly.terminal.autopilot_option import autopilot_program
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, write_missions, write_pictures, write_verdict
@@ -30,6 +31,7 @@ class _Task:
     airframe: its aircraft.
     command: the line that repeats it, for the report.
     folder: where the results go.
+    program: the real autopilot that flies, None for none.
     """
 
     scenario: Scenario
@@ -37,17 +39,23 @@ class _Task:
     seed: int
     command: str
     folder: Path
+    program: Path | None
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
+    with autopilot_program(args) as program:
+        return _run(args, program)
+
+
+def _run(args: argparse.Namespace, program: Path | None) -> int:
     scenario = scenario_change(args)(load_scenario(args.scenario))
     seed = choose_seed(scenario, args.seed)
     airframe = load_airframe(scenario)
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
     if args.out:
         refuse_folder(folder, args.overwrite)
-    task = _Task(scenario, airframe, seed, _command_line(args, seed), folder)
+    task = _Task(scenario, airframe, seed, _command_line(args, seed), folder, program)
     cleared = False
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
@@ -68,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _command_line(args: argparse.Namespace, seed: int) -> str:
-    options = [(name, getattr(args, name)) for name in ("refine", "params", "guidance", "nav")]
+    options = [(name, getattr(args, name)) for name in ("refine", "params", "guidance", "nav", "autopilot")]
     given = "".join(f" --{name} {value}" for name, value in options if value)
     return f"planfly run {args.scenario} --seed {seed}{given}"
 
@@ -77,7 +85,8 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
     """Write a plan and its mission, and fly it if it is feasible: the verdict, and whether it was flown."""
     folder, airframe = task.folder, task.airframe
     write_whole(folder / "plan.json", plan_json(plan))
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints")
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="mission.waypoints", tracking=tracking)
     write_missions(mission, [folder / "mission.waypoints", folder / "mission.plan"])
     if not plan.feasible:
         verdict = judge_plan_only(plan)
@@ -87,12 +96,13 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
         return verdict, False
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with progress("flying") as advance:
-        flown = fly_and_judge(setup, airframe, folder / "flight.mcap", advance)
+        flown = fly_and_judge(setup, airframe, folder / "flight.mcap", advance, autopilot=task.program)
     write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):
-        write_pictures(folder, setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)
+        write_pictures(folder, flown.setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)
     print_verdict(flown.verdict, setup.route.notes)
-    print(f"results   {folder}/ (report.html, map.png, profile.png, flight.mcap, verdict.json, plan.json, missions)")
+    flight = "flight.mcap" if len(flown.track) else "no flight"
+    print(f"results   {folder}/ (report.html, map.png, profile.png, {flight}, verdict.json, plan.json, missions)")
     return flown.verdict, True
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from aircraft.catalog import Aircraft
 from flight.live.flight_process import (
     FlightJudged,
     JudgeMission,
@@ -27,8 +28,10 @@ from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.levels import FlownBeside
 from logs.verdict.wording import place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.flights_beside import airframe_answer
 from planfly.open_mission import open_mission
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
@@ -151,14 +154,14 @@ class ServedFlights:
                 break
             except FileExistsError:
                 number += 1
-        return ServedLog(path, setup)
+        return ServedLog(path, setup, self.aircraft)
 
 
 class ServedLog:
     """The log of one served flight."""
 
-    def __init__(self, path: Path, setup: FlightSetup) -> None:
-        self._path, self._setup = path, setup
+    def __init__(self, path: Path, setup: FlightSetup, aircraft: Aircraft) -> None:
+        self._path, self._setup, self._aircraft = path, setup, aircraft
         self._recorder = Recorder(path, setup)
         self._blocks: list[Track] = []
 
@@ -171,10 +174,13 @@ class ServedLog:
     def finish(self, ended: str) -> FlightJudged:
         """Judge the flight and close the log."""
         track = join_tracks(self._blocks)
-        verdict = judge_flight(self._setup, track, ended)
+        beside = None
+        if self._setup.parameters is not None and ended == "completed":
+            beside = FlownBeside(airframe_answer(self._setup, self._aircraft))
+        verdict = judge_flight(self._setup, track, ended, beside=beside)
         end = float(track.time[-1]) if len(track) else 0.0
         self._recorder.event(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-        self._recorder.finish(ended, verdict)
+        self._recorder.finish(ended, verdict, beside)
         return FlightJudged(verdict.flyable, (*verdict_texts("flown", verdict), StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:

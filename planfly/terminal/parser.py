@@ -18,9 +18,17 @@ from planfly.terminal.argument_types import (
     speedup,
     threat,
     time_or_stations,
-    wind,
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
+from planfly.terminal.parser_options import (
+    flown_by_options,
+    overwrite_option,
+    own_link_options,
+    pilot_options,
+    program_option,
+    steering_options,
+    world_options,
+)
 
 
 class _Parser(argparse.ArgumentParser):
@@ -63,43 +71,6 @@ def build_parser() -> argparse.ArgumentParser:
 _Command = Callable[[str, str, str], argparse.ArgumentParser]
 
 
-def _overwrite(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
-
-
-def _world(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
-    parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
-
-
-def _flown_by(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--aircraft", metavar="A", help="the aircraft, in place of the scenario's (default: aerosonde)")
-    parser.add_argument(
-        "--airspeed", metavar="M/S", type=positive, help="until the mission sets one (default: the aircraft's cruise)"
-    )
-
-
-def _pilot(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "--params", metavar="FILE", help="ArduPlane flies, with these parameters: as a ground station writes them"
-    )
-    parser.add_argument(
-        "--guidance",
-        choices=("path", "l1", "vector-field"),
-        help="planfly's guidance flies: its own law (path), L1 along the legs, or Beard and McLain's vector field",
-    )
-
-
-def _steering(parser: argparse.ArgumentParser) -> None:
-    _pilot(parser)
-    parser.add_argument(
-        "--nav",
-        choices=("perfect", "rtk", "gnss"),
-        help="how well it knows where it is: errors of 0, 0.05 or 1.5 m on each axis (default: gnss for ArduPlane, "
-        "perfect for planfly's guidance)",
-    )
-
-
 def _add_run_and_plan(command: _Command) -> None:
     run = command("run", "plan, export, fly, log, judge and report", "planfly run jacksboro --seed 3 --out my-run")
     run.add_argument(
@@ -118,8 +89,9 @@ def _add_run_and_plan(command: _Command) -> None:
         default=0,
         help="where it does not fly, tighten and try again, up to N times",
     )
-    _steering(run)
-    _overwrite(run)
+    steering_options(run)
+    program_option(run)
+    overwrite_option(run)
     # Names and summaries only: what they stand for is imported with the command.
     from planner.search.algorithms import algorithm_lines
 
@@ -153,9 +125,9 @@ def _add_run_and_plan(command: _Command) -> None:
         action="append",
         help="with --from: a threat that has popped up, in m; --add-threat=-... where EAST is negative; repeatable",
     )
-    _pilot(plan)
+    pilot_options(plan)
     plan.add_argument("--out", metavar="FILE", help="the plan file (default: runs/<name>-seed<N>/plan.json, replaced)")
-    _overwrite(plan)
+    overwrite_option(plan)
 
 
 def _add_export_and_fly(command: _Command) -> None:
@@ -170,26 +142,25 @@ def _add_export_and_fly(command: _Command) -> None:
     export.add_argument(
         "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
     )
-    _overwrite(export)
+    overwrite_option(export)
     fly = command(
         "fly", "fly a plan or any mission file, write the log, end with the verdict",
         "planfly fly mission.waypoints --terrain jacksboro --wind 8,270 --turbulence light",
     )  # fmt: skip
     fly.add_argument("mission", metavar="MISSION", help="plan.json, .waypoints or .plan")
-    _world(fly)
-    _flown_by(fly)
+    world_options(fly)
+    flown_by_options(fly)
     fly.add_argument(
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
-    fly.add_argument("--wind", metavar="SPEED,FROM", type=wind, help="steady wind, m/s and degrees it blows from")
-    fly.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
     fly.add_argument("--seed", metavar="N", type=seed, help="of the turbulence (default: the plan's, or 1)")
     fly.add_argument(
         "--log-hz", metavar="HZ", type=int, choices=(60, 30, 20, 10), default=60,
         help="rows a second in the log: 60 (default), 30, 20 or 10; the verdict is that of these rows",
     )  # fmt: skip
-    _steering(fly)
-    _overwrite(fly)
+    steering_options(fly)
+    program_option(fly)
+    overwrite_option(fly)
 
 
 def _add_log_commands(command: _Command) -> None:
@@ -198,11 +169,11 @@ def _add_log_commands(command: _Command) -> None:
         "planfly check flight.mcap --json verdict.json",
     )  # fmt: skip
     check.add_argument("file", metavar="LOG.mcap|MISSION", help="a flight log, or plan.json, .waypoints, .plan")
-    _world(check)
-    _flown_by(check)
-    _pilot(check)
+    world_options(check)
+    flown_by_options(check)
+    pilot_options(check)
     check.add_argument("--json", metavar="FILE", help="write the verdict there")
-    _overwrite(check)
+    overwrite_option(check)
     _add_replay_and_recover(command)
     report = command(
         "report",
@@ -215,7 +186,7 @@ def _add_log_commands(command: _Command) -> None:
     )
     report.add_argument("--svg", action="store_true", help="write the figures as SVG, too")
     report.add_argument("--layout", metavar="FILE", help="write the layout file for Foxglove there, and nothing else")
-    _overwrite(report)
+    overwrite_option(report)
     compare = command(
         "compare", "lay two flights over each other: a table of differences, and pictures",
         "planfly compare calm.mcap windy.mcap --out both",
@@ -226,7 +197,7 @@ def _add_log_commands(command: _Command) -> None:
         "--out", metavar="DIR", help="write pictures and compare.html there (default: the table alone)"
     )
     compare.add_argument("--svg", action="store_true", help="write the pictures as SVG, too")
-    _overwrite(compare)
+    overwrite_option(compare)
 
 
 def _add_replay_and_recover(command: _Command) -> None:
@@ -250,7 +221,7 @@ def _add_replay_and_recover(command: _Command) -> None:
         type=time_or_stations,
         help="to this time of the flight, s; or play the log into the ground stations that listen there",
     )
-    _own_link(replay, bind="127.0.0.1:0")
+    own_link_options(replay, bind="127.0.0.1:0")
     replay.add_argument(
         "--wait", metavar="S", type=positive, help="wait S seconds for a ground station (10) or Foxglove (without end)"
     )
@@ -259,22 +230,14 @@ def _add_replay_and_recover(command: _Command) -> None:
     )
     replay.add_argument("--foxglove", action="store_true", help="play it to Foxglove on this machine over WebSocket")
     replay.add_argument("--port", metavar="N", type=port, default=8765, help="of --foxglove (8765; 0: a free one)")
-    _overwrite(replay)
+    overwrite_option(replay)
     recover = command(
         "recover", "make an unfinished or damaged log whole again, as far as it can be read",
         "planfly recover flight.mcap --out whole.mcap",
     )  # fmt: skip
     recover.add_argument("log", metavar="LOG.mcap", help="a flight log")
     recover.add_argument("--out", metavar="FILE", help="the new log (default: <log>-recovered.mcap beside it)")
-    _overwrite(recover)
-
-
-def _own_link(parser: argparse.ArgumentParser, *, bind: str) -> None:
-    parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
-    parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
-    parser.add_argument(
-        "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
-    )
+    overwrite_option(recover)
 
 
 def _add_serve(command: _Command) -> None:
@@ -283,13 +246,13 @@ def _add_serve(command: _Command) -> None:
         "planfly serve mission.waypoints --terrain jacksboro",
     )  # fmt: skip
     serve.add_argument("mission", metavar="MISSION", nargs="?", help="plan.json, .waypoints or .plan to begin with")
-    _world(serve)
-    _steering(serve)
+    world_options(serve)
+    steering_options(serve)
     serve.add_argument(
         "--to", metavar="IP:PORT,...", default="127.0.0.1:14550",
         help="where ground stations listen (default: 127.0.0.1:14550)",
     )  # fmt: skip
-    _own_link(serve, bind="127.0.0.1:14580")
+    own_link_options(serve, bind="127.0.0.1:14580")
     serve.add_argument(
         "--speed", metavar="X", type=speedup, default=1.0, help="fly at X times real time, 0.1 to 100 (default: 1)"
     )
@@ -313,7 +276,7 @@ def _add_paper(command: _Command) -> None:
     )
     paper.add_argument("--jobs", metavar="N", type=positive_count, help="processes (default: one a core)")
     paper.add_argument("--out", metavar="DIR", help="where tables and figures go (default: runs/paper, replaced)")
-    _overwrite(paper)
+    overwrite_option(paper)
 
 
 def _add_aircraft(command: _Command) -> None:
@@ -324,4 +287,4 @@ def _add_aircraft(command: _Command) -> None:
     aircraft.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)")
     aircraft.add_argument("--out", metavar="DIR", help="where the pictures go (default: runs/aircraft-NAME, replaced)")
     aircraft.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
-    _overwrite(aircraft)
+    overwrite_option(aircraft)

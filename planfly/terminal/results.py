@@ -30,7 +30,7 @@ def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
     for rule, title in RULES.items():
         mine = [finding for finding in verdict.findings if finding.rule == rule]
         if mine:
-            print(f"  {title:<11}{_state(mine)}")
+            print(f"  {title:<13}{_state(mine)}")
     for note in notes:
         print(f"  note    {note}")
 

@@ -15,6 +15,8 @@ def flight_entries(args: argparse.Namespace) -> dict[str, str | float | None]:
     return {
         "aircraft": getattr(args, "aircraft", None),
         "airspeed_mps": getattr(args, "airspeed", None),
+        # A real one is an ArduPlane.
+        "autopilot": None if getattr(args, "autopilot", None) is None else "ardupilot",
         "guidance": getattr(args, "guidance", None),
         "nav": getattr(args, "nav", None),
         # Whatever folder the scenario is in.

@@ -11,7 +11,7 @@ CUT_SHORT = "the log ends before the flight does"
 
 def judge_log(log: FlightLog) -> Verdict:
     """The verdict on a log's flight, of the rows it holds."""
-    return judge_flight(log.setup, log.track, log.ended or CUT_SHORT, whole=log.complete)
+    return judge_flight(log.setup, log.track, log.ended or CUT_SHORT, whole=log.complete, beside=log.beside)
 
 
 def warn_of_loss(log: FlightLog) -> None:

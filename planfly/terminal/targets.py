@@ -10,6 +10,7 @@ RUN_FILES = (
     "mission.waypoints",
     "mission.plan",
     "flight.mcap",
+    "flight.BIN",
     "verdict.json",
     "map.png",
     "profile.png",

@@ -18,6 +18,7 @@ from planner.evaluation.leg_geometry import (
     turn_length,
 )
 from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.strayed_pieces import strayed_pieces
 from world.kernels import Record, Records, compiled
 from world.terrain import segment_clearance
 
@@ -34,8 +35,18 @@ _MOST_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 @compiled
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma: no cover - compiled
-    """Distance from the legs and arcs of a path (w, 3) to the nearest missile sphere's surface, m; inf without any."""
+    """Distance from where a flight of a path (w, 3) may be to the nearest missile sphere's surface, m; inf without any.
+
+    A flight is on its legs and arcs, or about them as far as its autopilot strays.
+    """
     nearest = math.inf
+    if data.tracking.strays:
+        for piece in strayed_pieces(data, waypoints):
+            a, b = piece.begin.copy(), piece.end.copy()
+            for shift in (0.0, -piece.below, piece.above):
+                a[2], b[2] = piece.begin[2] + shift, piece.end[2] + shift
+                nearest = min(nearest, _segment_distance(data.threats, a, b, math.inf) - piece.beside)
+        return nearest
     last = waypoints.shape[0] - 1
     for i in range(last):
         nearest = _segment_distance(data.threats, waypoints[i], waypoints[i + 1], nearest)
@@ -116,7 +127,9 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`CERTIFIED_PIECE` records of the legs of a path (w, 3), and then of its fly-by arcs."""
+    """`CERTIFIED_PIECE` records of the legs of a path (w, 3), and then of its fly-by arcs or of its corners."""
+    if data.tracking.strays:
+        return _strayed_heights(data, strayed_pieces(data, waypoints))
     last = waypoints.shape[0] - 1
     radii = fly_by_radii(data, waypoints)
     out = np.zeros(last + last * _MOST_PIECES, dtype=CERTIFIED_PIECE)
@@ -129,6 +142,28 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # 
             _measure_piece(data, arc[k], arc[min(k + 1, arc.shape[0] - 1)], True, i, out[count])
             count += 1
     return out[:count]
+
+
+@compiled
+def _strayed_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
+    """`CERTIFIED_PIECE` records of `STRAYED_PIECE` records: least heights along them and beside them."""
+    out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
+    for k in range(pieces.size):
+        piece = pieces[k]
+        dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
+        run = max(1e-9, math.hypot(dx, dy))
+        least = math.inf
+        for side in (0.0, -1.0, 1.0):
+            a, b = piece.begin.copy(), piece.end.copy()
+            for end, beside in ((a, piece.beside_begin), (b, piece.beside_end)):
+                end[0] += side * beside * dy / run
+                end[1] -= side * beside * dx / run
+                end[2] -= piece.below
+            height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
+            least = math.nan if math.isnan(height) or math.isnan(least) else min(least, height)
+        out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, least
+        out[k].buffer = _buffer_on(data, piece.begin, piece.end)
+    return out
 
 
 @compiled

@@ -72,6 +72,21 @@ def fly_by_vertices(
     return out
 
 
+@compiled
+def legs_about(
+    before: Floats, at: Floats, after: Floats, length_before: float, length_after: float
+) -> Floats:  # pragma: no cover - compiled
+    """The legs before and after the waypoint `at`, as far as these lengths (m), as vertices (3, 3)."""
+    out = np.empty((3, 3))
+    for row, other, length in ((0, before, length_before), (2, after, length_after)):
+        run = math.hypot(at[0] - other[0], at[1] - other[1])
+        share = min(1.0, length / max(run, 1e-6))
+        for axis in range(3):
+            out[row, axis] = at[axis] + share * (other[axis] - at[axis])
+    out[1] = at
+    return out
+
+
 @inlined
 def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  # pragma: no cover - compiled
     out[row, 0] = east

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
 from planner.evaluation.clearance_buffer import RequiredClearance
-from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length
+from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length, legs_about
+from planner.evaluation.height_lags import HEIGHT_LAG, below_at, measure_lags
 from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
 from planner.evaluation.leg_geometry import CORNER, LEG, measure_corners, measure_legs
 from planner.evaluation.missile_index import MissileIndex, kill_density
@@ -59,6 +60,7 @@ class PathScratch(NamedTuple):
     extents: (w,) how far from each waypoint a flight leaves the legs, m.
     terrain_legs: `TERRAIN_LEG` records (w - 1,), and unfinished: (w - 1,) legs whose samples are not all taken.
     gaps: `MISSILE_GAP` records (w - 1,).
+    lags: `HEIGHT_LAG` records (w - 1,).
     """
 
     legs: Records
@@ -68,6 +70,7 @@ class PathScratch(NamedTuple):
     terrain_legs: Records
     unfinished: Ints
     gaps: Records
+    lags: Records
 
 
 @compiled
@@ -81,6 +84,7 @@ def make_scratch(count: int) -> PathScratch:  # pragma: no cover - compiled
         np.zeros(count - 1, dtype=TERRAIN_LEG),
         np.zeros(count - 1, dtype=np.int64),
         np.zeros(count - 1, dtype=MISSILE_GAP),
+        np.zeros(count - 1, dtype=HEIGHT_LAG),
     )
 
 
@@ -98,20 +102,25 @@ def score_path(
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
-    terrain_legs, gaps = scratch.terrain_legs, scratch.gaps
+    terrain_legs, gaps, lags = scratch.terrain_legs, scratch.gaps, scratch.lags
+    strays = data.tracking.strays
     count = path.shape[0]
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
     add_leg_violations(data, limits, path, legs, corners, True, violations)
-    _measure_flown(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
-    sample_terrain(heights, bounds, to_pixel, required, path, legs, extents, terrain_legs, scratch.unfinished)
+    if strays:
+        measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
+        _measure_strayed(corners, flown, extents)
+    else:
+        _measure_flown(aircraft, data.legs_hold_turns, data.fly_over, path, legs, corners, flown, extents)
+    sample_terrain(heights, bounds, to_pixel, required, path, legs, extents, lags, terrain_legs, scratch.unfinished)
     length, kill = 0.0, 0.0
     for i in range(count - 1):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
         x2, y2, z2 = path[i + 1, 0], path[i + 1, 1], path[i + 1, 2]
         within = max(flown[i].missile_distance, flown[i + 1].missile_distance)
         dose, at_beginning, at_end = kill_density(
-            missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1]
+            missiles, margin, within, x, y, z, x2, y2, z2, extents[i], extents[i + 1], lags[i].most, -lags[i].least
         )
         gaps[i].at_beginning, gaps[i].at_end = at_beginning, at_end
         violations.terrain += terrain_legs[i].depth
@@ -124,11 +133,17 @@ def score_path(
         close = drop + aside > CORNER_TOLERANCE or min(gaps[i - 1].at_end, gaps[i].at_beginning) < drop + aside
         if drop + aside < 0.01 or not (low or close):
             continue
-        vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
+        if strays:
+            vertices = legs_about(path[i - 1], path[i], path[i + 1], corners[i].before, corners[i].after)
+            below, above = _lag_about(lags[i], legs[i], corners[i])
+            more, spare = below + bounds.steepest * aside, margin + aside
+        else:
+            vertices = fly_by_vertices(aircraft, path[i - 1], path[i], path[i + 1], flown[i].radius)
+            below, above, more, spare = 0.0, 0.0, 0.0, margin
         if low:
-            violations.terrain += _corner_depth(heights, bounds, to_pixel, required, vertices)
+            violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
-            kill += _corner_kill(missiles, margin, vertices)
+            kill += _corner_kill(missiles, spare, vertices, below, above)
     objectives.length_ratio = length / limits.straight_distance
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
 
@@ -209,26 +224,50 @@ def _measure_flown(
 
 
 @compiled_views
+def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
+    """How far below and above the legs a flight may be about a corner, m; lag, leg: of the leg after it."""
+    here, settled = below_at(lag, 0.0), below_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
+    return max(0.0, here, settled), max(0.0, -here, -settled)
+
+
+@compiled_views
+def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints that an autopilot strays about."""
+    for i in range(1, corners.shape[0] - 1):
+        aside = corners[i].excursion
+        flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, aside
+        flown[i].missile_distance = aside if aside <= CORNER_TOLERANCE else 0.0
+        extents[i] = max(corners[i].before, corners[i].after)
+
+
+@compiled_views
 def _corner_depth(
-    heights: Heights, slope_bounds: SlopeBounds, to_pixel: PolyMapRecord, required: RequiredClearance, vertices: Floats
+    heights: Heights,
+    slope_bounds: SlopeBounds,
+    to_pixel: PolyMapRecord,
+    required: RequiredClearance,
+    more: float,
+    vertices: Floats,
 ) -> float:  # pragma: no cover - compiled
-    """Depth below the required clearance along a flown corner (k, 3), m x km."""
+    """Depth below the required clearance and `more` (m) along a flown corner (k, 3), m x km."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
         x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
         ends = segment_pixels(to_pixel, x, y, x2, y2)
-        total += terrain_excess(heights, slope_bounds, required, ends, x, y, z, x2, y2, z2)
+        total += terrain_excess(heights, slope_bounds, required, more, ends, x, y, z, x2, y2, z2)
     return total
 
 
 @compiled_views
-def _corner_kill(missiles: MissileIndex, margin: float, vertices: Floats) -> float:  # pragma: no cover - compiled
-    """Kill density x length along a flown corner (k, 3)."""
+def _corner_kill(
+    missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
+) -> float:  # pragma: no cover - compiled
+    """Kill density x length along a flown corner (k, 3); below, above: m that it may be flown lower and higher."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
         x2, y2, z2 = vertices[k + 1, 0], vertices[k + 1, 1], vertices[k + 1, 2]
-        dose, _, _ = kill_density(missiles, margin, 0.0, x, y, z, x2, y2, z2, 0.0, 0.0)
+        dose, _, _ = kill_density(missiles, margin, 0.0, x, y, z, x2, y2, z2, 0.0, 0.0, below, above)
         total += dose * math.sqrt((x2 - x) ** 2 + (y2 - y) ** 2 + (z2 - z) ** 2)
     return total

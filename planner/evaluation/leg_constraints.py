@@ -159,7 +159,7 @@ def add_leg_violations(
     """
     # Each sum grows in the order of these lines, on which its last digit depends.
     _add_turns(data, limits, legs, graded, violations)
-    _add_bounds(data, path, graded, violations)
+    _add_bounds(data, path, corners, graded, violations)
     if data.legs_hold_turns:
         _add_turn_lengths(data, limits, path, legs, corners, graded, violations)
     for i in range(legs.shape[0]):
@@ -192,14 +192,16 @@ def _add_turns(
 
 @compiled_views
 def _add_bounds(
-    data: ProblemArrays, path: Floats, graded: bool, violations: Record
+    data: ProblemArrays, path: Floats, corners: Records, graded: bool, violations: Record
 ) -> None:  # pragma: no cover - compiled
-    """Add the waypoints off the map, below the floor or above the ceiling (eq. 7)."""
+    """Add the waypoints off the map, with what is strayed about them, below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
     for i in range(path.shape[0]):
         x, y, z = path[i, 0], path[i, 1], path[i, 2]
-        outside = max(0.0, west - x, x - east, south - y, y - north, floor - z, z - ceiling)
+        aside = corners[i].excursion
+        outside = max(0.0, west - x + aside, x - east + aside, south - y + aside, y - north + aside)
+        outside = max(outside, floor - z, z - ceiling)
         violations.bounds += _violation(outside, graded)
 
 

@@ -5,9 +5,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from aircraft.envelope import GRAVITY
 from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, roll_reversal_length
+from aircraft.tracking import corner_room, faster_by
 from planner.evaluation.problem_arrays import ProblemArrays
-from world.kernels import Records, compiled, compiled_views, inlined
+from world.kernels import Record, Records, compiled, compiled_views, inlined
 
 Floats = NDArray[np.float64]
 # East and north of the unit vector that the wind blows towards.
@@ -15,8 +17,9 @@ Wind = tuple[float, float]
 
 # A leg: its unit course (0, 0 for none), its horizontal length and its length, m.
 LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64), ("length", np.float64)])
-# A corner: length of leg that its fly-by arc takes on either side, and the arc's radius, m.
-CORNER = np.dtype([("tangent", np.float64), ("radius", np.float64)])
+# A corner: length of leg that its fly-by arc takes on either side, and the arc's radius; lengths of the legs before and
+# after it that turning there takes, the autopilot's settling included; and how far it then strays from the legs, m.
+CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before", "after", "excursion")])
 
 # Leg left over between its two turns: this share of the leg, and this length (m) or what small turns use of it.
 SETTLING_SHARE = 0.05
@@ -41,21 +44,44 @@ def measure_corners(
     data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
 ) -> None:  # pragma: no cover - compiled
     """Fill `CORNER` records (w,) of a path (w, 3) whose legs are measured."""
-    aircraft = data.aircraft
-    wx, wy = wind
+    aircraft, tracking = data.aircraft, data.tracking
     last: int = legs.shape[0]
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
-        corners[i].tangent, corners[i].radius = 0.0, 0.0
-        if (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0):
-            tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, path[i, 2], wx, wy)
-            corners[i].tangent, corners[i].radius = tangent, radius
+        some = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
+        _measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
     for i, asked in ((0, data.start_course), (last, data.destination_course)):
-        corners[i].tangent, corners[i].radius = 0.0, 0.0
-        if not math.isnan(asked) and legs[min(i, last - 1)].run > 0.0:
-            ux, uy, vx, vy = courses_at(data, legs, i)
-            tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, path[i, 2], wx, wy)
-            corners[i].tangent, corners[i].radius = tangent, radius
+        ux, uy, vx, vy = courses_at(data, legs, i)
+        some = not math.isnan(asked) and legs[min(i, last - 1)].run > 0.0
+        _measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
+
+
+@inlined
+def _measure_corner(
+    aircraft: PerformanceTable,
+    tracking: Record,
+    wind: Wind,
+    some: bool,
+    ux: float,
+    uy: float,
+    vx: float,
+    vy: float,
+    amsl: float,
+    corner: Record,
+) -> None:  # pragma: no cover - compiled
+    """Fill the `CORNER` record of a turn between the unit courses u and v; of none where there is no such turn."""
+    tangent, radius, excursion = 0.0, 0.0, 0.0
+    if some:
+        tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, amsl, wind[0], wind[1])
+    before, after = tangent, tangent
+    if tracking.strays and 0.0 < tangent < math.inf:
+        turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
+        # The highest ground speed on the way, which the arc's radius is of.
+        speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank) + faster_by(tracking, amsl)
+        excursion, room_before, room_after = corner_room(tracking, turn, speed)
+        before, after = max(tangent, room_before), max(tangent, room_after)
+    corner.tangent, corner.radius = tangent, radius
+    corner.before, corner.after, corner.excursion = before, after, excursion
 
 
 @compiled_views
@@ -83,14 +109,14 @@ def settling_length(need: float, run: float) -> float:  # pragma: no cover - com
 def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
     """Length of leg i that its two turns use, m: of a fly-over only the one at its beginning, on the way back to it."""
     if not fly_over:
-        need: float = corners[i].tangent + corners[i + 1].tangent
+        need: float = corners[i].after + corners[i + 1].before
         return need
     if corners[i].tangent <= 0.0:
         return 0.0
     if math.isinf(corners[i].tangent):
         return math.inf
     back: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
-    return back
+    return max(back, corners[i].after) if corners[i].excursion > 0.0 else back
 
 
 @compiled

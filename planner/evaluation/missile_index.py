@@ -92,10 +92,13 @@ def kill_density(
     bz: float,
     first: float,
     last: float,
+    below: float,
+    above: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """Mean kill density over the segment a-b, radii grown by the margin, and distances to the nearest such sphere, m.
 
     first, last: lengths (m) at a and at b: the distances are from there, and right if they are less than `within`.
+    below, above: how far below and above the segment a flight may be, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -106,16 +109,13 @@ def kill_density(
         kind = index.classes[number]
         per_metre, columns, rows = kind.cells_per_metre, kind.columns, kind.rows
         # A hair more, for what rounding would leave out.
-        radius = kind.largest_radius + margin + within + 1e-6
-        side = 1.0 / per_metre
+        radius, side = kind.largest_radius + margin + within + 1e-6, 1.0 / per_metre
         lowest = _cell((min(ay, by) - radius - kind.south) * per_metre, rows)
         highest = _cell((max(ay, by) + radius - kind.south) * per_metre, rows)
         for row in range(max(0, lowest), min(rows, highest + 1)):
             # The part of the segment from which something in this row of cells may be near.
             north = kind.south + row * side - ay
-            f, g = (north - radius) * slant, (north + side + radius) * slant
-            f, g = (f, g) if f < g else (g, f)
-            f, g = (f if f > 0.0 else 0.0, g if g < 1.0 else 1.0) if slant != 0.0 else (0.0, 1.0)
+            f, g = _part((north - radius) * slant, (north + side + radius) * slant) if slant != 0.0 else (0.0, 1.0)
             x, x2 = ax + f * dx - kind.west, ax + g * dx - kind.west
             x, x2 = (x, x2) if x < x2 else (x2, x)
             left, right = _cell((x - radius) * per_metre, columns), _cell((x2 + radius) * per_metre, columns)
@@ -126,6 +126,8 @@ def kill_density(
                 missile = missiles[np.uintp(entry)]
                 x, y, z = ax - missile.east, ay - missile.north, az - missile.up
                 grown = missile.radius + margin
+                if below > 0.0 or above > 0.0:
+                    z = _nearer(z, dz * min(1.0, max(0.0, -(dx * x + dy * y + dz * z) * inverse)), below, above)
                 along, start2 = dx * x + dy * y + dz * z, x * x + y * y + z * z
                 closest2 = _closest2(-along * inverse, 0.0, 1.0, along, start2, length2)
                 if closest2 < (grown + within) * (grown + within):
@@ -137,6 +139,24 @@ def kill_density(
                     if closest2 < grown * grown:
                         dose += _dose(along, start2, length2, grown, missile.scale)
     return dose, near_a, near_b
+
+
+@inlined
+def _part(f: float, g: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Fractions of a line in order, and within it."""
+    f, g = (f, g) if f < g else (g, f)
+    return f if f > 0.0 else 0.0, g if g < 1.0 else 1.0
+
+
+@inlined
+def _nearer(z: float, rise: float, below: float, above: float) -> float:  # pragma: no cover - compiled
+    """Height of a segment's beginning over a missile, m, where its nearest place comes as near as the flight may.
+
+    rise: of the segment up to that place.
+    """
+    over = z + rise
+    shift = min(over, below) if over > 0.0 else max(over, -above)
+    return z - shift
 
 
 @inlined

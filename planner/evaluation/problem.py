@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.path_limits import Limits, derated
+from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
+from aircraft.tracking import no_tracking
 from planner.evaluation.encoding import Space
 from planner.evaluation.missile_index import make_missile_index
 from planner.evaluation.problem_arrays import ProblemArrays, SlopeBounds, sphere_records, threat_records
@@ -66,14 +67,18 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
             allowed = 'a plan keeps 0.5 inside it; allowed: above 0.5, or "aircraft"'
             raise ScenarioError(f"{scenario.name}: limits.{name}_deg: {math.degrees(value):g}: {allowed}")
     certified = _certified_arrays(scenario, limits, terrain)
-    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER
+    across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.strays else (0.0, 0.0)
+    # What the ground rises across the way comes on top; the certificate looks at the ground there.
+    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up + across * certified.slope_bounds.steepest
     search = _inset(
         certified._replace(
             buffer=buffer,
-            kill_margin=SEARCH_KILL_MARGIN,
+            kill_margin=SEARCH_KILL_MARGIN + across,
             start_buffer=_end_buffer(terrain, limits, scenario.start, buffer),
             destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer),
-        )
+        ),
+        MAP_MARGIN,
+        HEIGHT_MARGIN,
     )
     return Problem(scenario, limits, search, certified, _space(scenario, search))
 
@@ -82,13 +87,14 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     """Arrays with the margins of the certificate."""
     units = threat_records(scenario.threats)
     radius = np.maximum(scenario.threats.kill_radius, scenario.threats.detection_radius)
-    buffer, share = CERTIFIED_BUFFER, CERTIFIED_END_SHARE
-    return ProblemArrays(
+    tracking = no_tracking() if limits.tracking is None else limits.tracking.record
+    buffer, share = CERTIFIED_BUFFER + float(tracking.up), CERTIFIED_END_SHARE
+    arrays = ProblemArrays(
         heights=terrain.heights,
         to_pixel=terrain.to_pixel.record,
         threats=units,
         spheres=sphere_records(units),
-        aircraft=derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence]),
+        aircraft=_performance(scenario, limits),
         **_edges(scenario.bounds),
         start=scenario.start,
         destination=scenario.destination,
@@ -111,7 +117,17 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         threat_cells=make_threat_cells(scenario.threats.position, radius, scenario.bounds),
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
+        tracking=tracking,
     )
+    return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.strays else arrays
+
+
+def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
+    """What the aircraft can do, of which turbulence leaves a plan a share, and no more than its autopilot asks for."""
+    whole = limits.performance()
+    if limits.tracking is not None:
+        whole = within_rates(whole, limits.tracking.climb_rate, limits.tracking.sink_rate)
+    return derated(whole, TURBULENCE_SHARE[scenario.wind.turbulence])
 
 
 def _edges(bounds: Floats) -> dict[str, float]:
@@ -142,17 +158,17 @@ def _slope_bounds(terrain: Terrain) -> SlopeBounds:
     return SlopeBounds(steepest, around, TILE * terrain.spacing)
 
 
-def _inset(data: ProblemArrays) -> ProblemArrays:
-    """Arrays with the map and the heights shrunk by the margins, or by what the ends leave of them."""
+def _inset(data: ProblemArrays, beside: float, height: float) -> ProblemArrays:
+    """Arrays with the map and the heights shrunk by these margins (m), or by what the ends leave of them."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
     return data._replace(
-        west=min(data.west + MAP_MARGIN, max(data.west, float(low[0]))),
-        south=min(data.south + MAP_MARGIN, max(data.south, float(low[1]))),
-        east=max(data.east - MAP_MARGIN, min(data.east, float(high[0]))),
-        north=max(data.north - MAP_MARGIN, min(data.north, float(high[1]))),
-        floor=min(data.floor + HEIGHT_MARGIN, max(data.floor, float(low[2]))),
-        ceiling=max(data.ceiling - HEIGHT_MARGIN, min(data.ceiling, float(high[2]))),
+        west=min(data.west + beside, max(data.west, float(low[0]))),
+        south=min(data.south + beside, max(data.south, float(low[1]))),
+        east=max(data.east - beside, min(data.east, float(high[0]))),
+        north=max(data.north - beside, min(data.north, float(high[1]))),
+        floor=min(data.floor + height, max(data.floor, float(low[2]))),
+        ceiling=max(data.ceiling - height, min(data.ceiling, float(high[2]))),
     )
 
 

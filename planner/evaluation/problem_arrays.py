@@ -10,7 +10,7 @@ from planner.evaluation.missile_index import MissileIndex
 from planner.evaluation.threat_grid import ThreatCells
 from planner.plan import Objective, Violation
 from world.frames import PolyMapRecord
-from world.kernels import Records
+from world.kernels import Record, Records
 from world.threats import Threats
 
 Floats = NDArray[np.float64]
@@ -71,6 +71,7 @@ class ProblemArrays(NamedTuple):
     threat_cells: the threats by the points that they may reach.
     missiles: the missiles by where they stand.
     slope_bounds: of the ground.
+    tracking: a record of `aircraft.tracking.TRACKING`: how far the autopilot strays from its legs.
     """
 
     heights: Heights
@@ -103,6 +104,7 @@ class ProblemArrays(NamedTuple):
     threat_cells: ThreatCells
     missiles: MissileIndex
     slope_bounds: SlopeBounds
+    tracking: Record
 
 
 def threat_records(threats: Threats) -> Records:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
+from planner.evaluation.height_lags import below_at
 from planner.evaluation.problem_arrays import SlopeBounds
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Records, compiled_views, inlined
@@ -56,13 +57,15 @@ def _sample(
     row: float,
     up: float,
     need: float,
+    later: float,
     run: float,
     rise: float,
     pitch: float,
 ) -> tuple[float, float]:  # pragma: no cover - compiled
     """Height above the required clearance at a point of a line, and the share of the line to the next sample.
 
-    tiles, tile_side: of `SlopeBounds`.  growth: of `RequiredClearance`.  need: required clearance, m.
+    tiles, tile_side: of `SlopeBounds`.  growth: of `RequiredClearance`.  need: required clearance; later: how much more
+    may be required elsewhere on the line, m.
     run, rise: of the whole line, m.  pitch: share from one sample to the next where the ground is near.
     """
     ground = pixel_height(heights, column, row)
@@ -70,7 +73,7 @@ def _sample(
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
     # Fastest loss of height above ground, m for the whole line.
     fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9
-    ahead, known = (gap - NEAR_GROUND) / fall, tile_side / (run + 1e-9)
+    ahead, known = (gap - later - NEAR_GROUND) / fall, tile_side / (run + 1e-9)
     ahead = ahead if ahead < known else known
     return gap, ahead if ahead > pitch else pitch
 
@@ -80,6 +83,7 @@ def terrain_excess(
     heights: Heights,
     slope_bounds: SlopeBounds,
     required: RequiredClearance,
+    more: float,
     ends: Pixels,
     ax: float,
     ay: float,
@@ -90,7 +94,7 @@ def terrain_excess(
 ) -> float:  # pragma: no cover - compiled
     """Depth below the required clearance along a-b, summed over samples (m x km).
 
-    ends: columns and rows of a and b.
+    more: m, required here beside that.  ends: columns and rows of a and b.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
@@ -98,13 +102,13 @@ def terrain_excess(
     run = math.sqrt((bx - ax) * (bx - ax) + (by - ay) * (by - ay))
     pitch = 1.0 / max(1.0, math.ceil(run / required.sample_pitch))
     tiles, tile_side, growth = slope_bounds.tiles, slope_bounds.tile_side, required.growth
-    need = required.clearance + required.buffer
+    need = required.clearance + required.buffer + more
     depth, f = 0.0, 0.0
     while True:
         if not required.same_everywhere:
-            need = clearance_at(required, ax + f * (bx - ax), ay + f * (by - ay))
+            need = clearance_at(required, ax + f * (bx - ax), ay + f * (by - ay)) + more
         x, y, up = column + f * column_step, row + f * row_step, az + f * rise
-        gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up, need, run, rise, pitch)
+        gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up, need, 0.0, run, rise, pitch)
         depth -= gap if gap < 0.0 else 0.0
         if f >= 1.0:
             break
@@ -144,12 +148,14 @@ def sample_terrain(
     path: Floats,
     legs: Records,
     extents: Floats,
+    lags: Records,
     terrain_legs: Records,
     unfinished: Ints,
 ) -> None:  # pragma: no cover - compiled
     """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance, and least heights.
 
-    extents: (w,) how far from each waypoint a place is near an end, m.  unfinished: (w - 1,) scratch.
+    extents: (w,) how far from each waypoint a place is near an end, m.  lags: `HEIGHT_LAG` records (w - 1,), by which a
+    flight is below its legs.  unfinished: (w - 1,) scratch.
 
     The least heights are right up to `NEAR_GROUND`; above that they say no more than "at least that".  In rounds, a
     sample of each leg: the next one of the same leg would wait for what this one finds.
@@ -171,7 +177,13 @@ def sample_terrain(
                 dx, dy = path[k + np.uintp(1), 0] - path[k, 0], path[k + np.uintp(1), 1] - path[k, 1]
                 need = clearance_at(required, path[k, 0] + f * dx, path[k, 1] + f * dy)
             x, y = leg.column + f * leg.column_step, leg.row + f * leg.row_step
-            gap, ahead = _sample(heights, tiles, tile_side, growth, x, y, up + f * rise, need, legs[k].run, rise, pitch)
+            below, later = 0.0, 0.0
+            if lags[k].most > 0.0:
+                below = max(0.0, below_at(lags[k], f))
+                later = lags[k].most - below
+            gap, ahead = _sample(
+                heights, tiles, tile_side, growth, x, y, up + f * rise, need + below, later, legs[k].run, rise, pitch
+            )
             leg.depth -= gap if gap < 0.0 else 0.0
             here, there = gap if f <= leg.beginning else math.inf, gap if f >= leg.ending else math.inf
             leg.height_at_beginning = here if here < leg.height_at_beginning else leg.height_at_beginning

@@ -17,16 +17,8 @@ from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
-from planner.search.score_table import (
-    CONSTRAINTS,
-    DETECTION,
-    HEIGHT,
-    KILL,
-    LENGTH,
-    best_first,
-    no_scores,
-    safe,
-)
+from planner.search.limits_for import limits_for
+from planner.search.score_table import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, best_first, no_scores, safe
 from planner.search.search_state import Archive, Improved, Search, SearchProgress, StopCondition
 from planner.seeding.first_samples import bridge_basis, first_samples
 from planner.seeding.grid_routes import GridRoute, grid_routes
@@ -54,6 +46,8 @@ SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
 QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
+# Of the airspeed: in more wind no path is searched for.
+MOST_WIND = 0.8
 # Numbers a population may hold.
 MOST_NUMBERS = 30_000_000
 
@@ -81,8 +75,7 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
     progress: called with generations done, generations in all, and a short text.
-    stop: asked between generations; a text such as "interrupted" ends the search with the best path yet, and stands in
-    the plan.
+    stop: asked between generations; a text ("interrupted") ends the search with the best path yet, and stands in it.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path of the same ends and number of waypoints to start from.
@@ -90,8 +83,8 @@ def plan_path(
     No feasible path is a plan that says so.  Raises ScenarioError for options that cannot work.
     """
     chosen = find_algorithm(algorithm or scenario.planner.algorithm, scenario.name)
-    _check_options(scenario)
-    problem = make_problem(scenario, limits)
+    _check_options(scenario, limits.airspeed)
+    problem = make_problem(scenario, limits_for(chosen, limits))
     encoding = ENCODINGS[chosen.encoding](problem.space, scenario.planner.waypoints)
     # No path is further from a missile's sphere than its own ends are.
     ends = min(kill_distance(problem.certified, np.stack([end, end])) for end in (scenario.start, scenario.destination))
@@ -132,7 +125,12 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
     return best
 
 
-def _check_options(scenario: Scenario) -> None:
+def _check_options(scenario: Scenario, airspeed: float) -> None:
+    if scenario.wind.speed > MOST_WIND * airspeed:
+        raise ScenarioError(
+            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: a path is searched for in at most"
+            f" {MOST_WIND:.0%} of the airspeed {airspeed:g}, to make way on every course"
+        )
     table = scenario.planner
     if table.population * 3 * table.waypoints > MOST_NUMBERS:
         raise ScenarioError(

@@ -10,6 +10,8 @@ from aircraft.path_limits import Limits
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
+from planner.search.algorithms import find_algorithm
+from planner.search.limits_for import limits_for
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
 from world.errors import MissionError
@@ -65,7 +67,8 @@ def replan(
     ahead = replace(scenario, start=rest[0], start_course=course, planner=table)
     made = plan_path(ahead, limits, seed=seed, algorithm=algorithm, progress=progress, stop=stop, previous=rest)
     waypoints = np.concatenate([old.waypoints[:leg], made.waypoints])
-    counts, objectives = paper_scores(make_problem(scenario, limits).certified, waypoints[None])
+    within = limits_for(find_algorithm(made.algorithm, scenario.name), limits)
+    counts, objectives = paper_scores(make_problem(scenario, within).certified, waypoints[None])
     return replace(
         made, scenario=scenario, waypoints=waypoints, violations=counts[0], objectives=objectives[0], flown_legs=leg
     )

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.encoding import Encoding, RotatedFrame, rotated_frame
+from planner.evaluation.height_lags import lag_length
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
 from planner.evaluation.missile_index import kill_density
 from planner.evaluation.problem_arrays import ProblemArrays
@@ -34,12 +35,36 @@ def leg_cost(
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 0.0)
     steep = slope_excess(data, limits, ux, uy, run, a[2], b[2])
     ends = segment_pixels(data.to_pixel, a[0], a[1], b[0], b[1])
-    depth = terrain_excess(data.heights, data.slope_bounds, limits.required, ends, a[0], a[1], a[2], b[0], b[1], b[2])
+    below = _below(data, limits, ux, uy, run, a[2], b[2]) if data.tracking.strays else 0.0
+    depth = terrain_excess(
+        data.heights, data.slope_bounds, limits.required, max(0.0, below), ends, a[0], a[1], a[2], b[0], b[1], b[2]
+    )
     total = length + SLOPE_COST * steep + DEPTH_COST * depth
-    kill, _, _ = kill_density(data.missiles, data.kill_margin, 0.0, a[0], a[1], a[2], b[0], b[1], b[2], 0.0, 0.0)
+    kill, _, _ = kill_density(
+        data.missiles,
+        data.kill_margin,
+        0.0,
+        *(a[0], a[1], a[2]),
+        *(b[0], b[1], b[2]),
+        *(0.0, 0.0),
+        max(0.0, below),
+        max(0.0, -below),
+    )
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
     return total
+
+
+@compiled
+def _below(
+    data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
+) -> float:  # pragma: no cover - compiled
+    """How far an autopilot is below a leg at most that is long, m; negative above.  east, north: its unit course."""
+    rise = high - low
+    if abs(rise) < data.tracking.step:
+        return -rise
+    length = lag_length(data.tracking, data.aircraft, east, north, low, limits.wind)
+    return length * rise / max(run, 1e-6)
 
 
 @compiled

@@ -1,7 +1,8 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
-``python -m tests.bench [chain] [planner] [peers] [flight] [aircraft] [--runs N] [--seconds S] [--seeds N]``: parts to
-measure (default: all), seeds of each whole planner run (15), what OMPL is given (10 s), and seeds of flights (20).
+``python -m tests.bench [chain] [planner] [peers] [flight] [aircraft] [autopilot] [--runs N] [--seconds S]
+[--seeds N]``: parts to measure (default: all), seeds of each whole planner run (15), what OMPL is given (10 s), and
+seeds of flights (20).
 """
 
 import argparse
@@ -14,7 +15,7 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = ("chain", "planner", "peers", "flight", "aircraft")
+PARTS = ("chain", "planner", "peers", "flight", "aircraft", "autopilot")
 TARGET = Path("runs") / "bench.json"
 
 
@@ -29,7 +30,7 @@ def main() -> None:
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f"{', '.join(sorted(unknown))}: not a part")
     # Imported here: the setting above must come first.
-    from tests.bench import aircraft, chain, flight, peers, planner
+    from tests.bench import aircraft, autopilot, chain, flight, peers, planner
 
     TARGET.parent.mkdir(exist_ok=True)
     kept = json.loads(TARGET.read_text(encoding="utf-8")) if TARGET.exists() else {}
@@ -41,6 +42,7 @@ def main() -> None:
         "peers": lambda: peers.measure(args.seconds),
         "flight": lambda: flight.run(args.seeds),
         "aircraft": aircraft.run,
+        "autopilot": autopilot.run,
     }
     for part in args.parts or PARTS:
         record[part] = work[part]()

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.airframe import load_airframe
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.optimisers.preference import NO_GOAL, Level, ranks
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from tests.bench.reference import brute_scores, numpy_scores, ranks_by_definition
-from tests.bench.task import PROBLEMS, Task, best_known, graded_scores, make_task
+from tests.bench.task import PROBLEMS, Task, best_known, exact_airframe, graded_scores, make_task
 from tests.bench.timing import best_cpu
 from world.scenario import Scenario, from_spec, load_scenario
 
@@ -135,7 +134,7 @@ def scale() -> dict[str, Any]:
     micro: dict[str, dict[int, float]] = {"paper": {}, "graded": {}}
     for threats in (60, MANY):
         scenario = scaled(threats)
-        airframe = load_airframe(scenario)
+        airframe = exact_airframe(scenario)
         data = make_problem(scenario, airframe.limits).search
         for name, evaluate in (("paper", paper_scores), ("graded", graded_scores)):
             evaluate(data, paths)

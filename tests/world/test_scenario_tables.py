@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.world.small_file import SMALL, THREAT, refused, with_fault
+from tests.world.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario_file import check_scenario, parse_scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile
@@ -25,6 +25,7 @@ def test_every_default() -> None:
             "max_climb_deg": "aircraft",
             "max_dive_deg": "aircraft",
             "min_clearance_m": 30.0,
+            "corridor_m": None,
         },
         "planner": {
             "algorithm": None,

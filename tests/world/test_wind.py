@@ -40,3 +40,10 @@ def test_gradient_counts_from_the_reference_and_never_turns_the_wind() -> None:
     assert wind.at(300.0)[0] == pytest.approx(6.0)
     assert wind.at(700.0)[0] == pytest.approx(10.0)
     assert wind.at(-400.0)[0] == 0.0
+
+
+@pytest.mark.parametrize("from_deg", [0.0, 75.0, 200.0])
+def test_it_blows_to_the_other_side(from_deg: float) -> None:
+    wind = Wind(6.0, math.radians(from_deg))
+    east, north = wind.at(500.0)
+    assert (6.0 * math.sin(wind.to_course), 6.0 * math.cos(wind.to_course)) == pytest.approx((east, north))

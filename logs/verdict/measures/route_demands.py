@@ -1,12 +1,13 @@
 """What a route asks of the aircraft and what the aircraft's limits are: the planned side of every finding."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import BLEND_ACCELERATION, Limits, PerformanceTable, aircraft_slopes, ground_speed_on
+from flight.ardupilot.pilot import true_by_equivalent
 from flight.guidance.fly_by_path import FlyByPath, path_polyline
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
@@ -36,6 +37,8 @@ class PlannedPath:
 class RouteDemands:
     """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
 
+    route: the setup's, with true airspeeds where an autopilot takes those that are commanded for equivalent ones.
+
     For w waypoints:
 
     points: (w, 3) m.
@@ -43,14 +46,15 @@ class RouteDemands:
     courses, slopes: (w - 1,) rad.
     turns, tightest, radius, before, after, reversal: as of `TurnDemands`.
     blend: (w,) m of leg beyond each turn on which the slope still changes.
-    blend_deviation: (w,) m by which such a blend may pass above or below its corner.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
     turn_limit: (w,) rad, as `TurnDemands.limit`; inf where the envelope is left out.
     climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
     ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
+    envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
     """
 
     setup: FlightSetup
+    route: Route
     points: Floats
     runs: Floats
     courses: Floats
@@ -62,13 +66,13 @@ class RouteDemands:
     after: Floats
     reversal: Floats
     blend: Floats
-    blend_deviation: Floats
     fly_by_offset: Floats
     turn_limit: Floats
     climb: Floats
     dive: Floats
     ground_speed: Floats
     path: PlannedPath
+    envelope: bool
 
     @property
     def limits(self) -> Limits:
@@ -107,7 +111,7 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
 
     envelope: False leaves the aircraft's limits out, for flown evidence alone.
     """
-    route, limits = setup.route, setup.limits
+    route, limits = true_route(setup), setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     tables = performance_tables(route, limits)
     turning = turn_demands(route, tables)
@@ -115,9 +119,9 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
-    blend, deviation = _blends(setup, points, runs, turning)
     return RouteDemands(
         setup=setup,
+        route=route,
         points=points,
         runs=runs,
         courses=courses,
@@ -128,15 +132,34 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         before=turning.before,
         after=turning.after,
         reversal=turning.reversal,
-        blend=blend,
-        blend_deviation=deviation,
+        blend=_blends(setup, route, points, runs, turning),
         fly_by_offset=_fly_by_offsets(route, turning),
         turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
         climb=climb,
         dive=dive,
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
+        envelope=envelope,
     )
+
+
+def true_route(setup: FlightSetup) -> Route:
+    """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height.
+
+    >>> from flight.ardupilot.parameters import default_parameters
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> true_route(setup) is setup.route
+    True
+    >>> faster = true_route(replace(setup, parameters=default_parameters()))
+    >>> bool((faster.airspeed > setup.route.airspeed).all())
+    True
+    """
+    route = setup.route
+    if setup.parameters is None:
+        return route
+    middle = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
+    return replace(route, airspeed=route.airspeed * [float(true_by_equivalent(up)) for up in middle])
 
 
 def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
@@ -171,14 +194,14 @@ def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
     return out
 
 
-def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDemands) -> tuple[Floats, Floats]:
-    """Length of leg beside each turn on which the slope still changes, and its distance from the corner, (w,) m.
+def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnDemands) -> Floats:
+    """Length of leg beside each turn on which the slope still changes, (w,) m.
 
     A parabola about each end of the arc, or about the waypoint where there is none.
     """
     rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
-    blend, deviation = np.zeros(len(points)), np.zeros(len(points))
-    speed = float(setup.route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
+    blend = np.zeros(len(points))
+    speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
     for i in range(1, len(points) - 1):
         steps = [abs(rise[i] - rise[i - 1])]
         arc = turning.radius[i] * abs(turning.turns[i])
@@ -187,5 +210,4 @@ def _blends(setup: FlightSetup, points: Floats, runs: Floats, turning: TurnDeman
             on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc
             steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
         blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
-        deviation[i] = 0.25 * max(steps) * blend[i]
-    return blend, deviation
+    return blend

@@ -120,7 +120,7 @@ def _height_error(demands: RouteDemands, leg: int, position: Floats) -> tuple[fl
 def steady_rows(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> slice:
     """Rows of a leg after the aircraft has had time to take up its commanded speed; empty for a leg as short."""
     rows = aligned.leg_rows(leg)
-    speeds = demands.setup.route.airspeed
+    speeds = demands.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
     start = float(aligned.track.time[rows.start]) + change / ACCELERATION
     return slice(max(rows.start, int(np.searchsorted(aligned.track.time, start))), rows.stop)
@@ -134,7 +134,7 @@ def _saturation(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple
         return 0.0, 0.0, 0.0, 0.0
     tick = aligned.tick()
     full, idle = _at_limits(demands, aligned, rows)
-    commanded = float(demands.setup.route.airspeed[leg])
+    commanded = float(demands.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
     steady = _speed_in_mean_wind(demands, aligned, rows) - commanded
@@ -182,7 +182,7 @@ def measure_ability(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> A
     air = velocity - track.wind[rows]
     push = np.gradient(velocity, track.time[rows], axis=0)
     rate = (air[:, 2] + (air * push).sum(axis=1) / GRAVITY)[use]
-    commanded, up = float(demands.setup.route.airspeed[leg]), track.position[rows, 2][use]
+    commanded, up = float(demands.route.airspeed[leg]), track.position[rows, 2][use]
     top = float(up.max())
     faster = np.sqrt((air[use] ** 2).sum(axis=1)) - commanded
     fit = _plane_at_origin(rate, faster, 0.01 * (up - top), seconds / INDEPENDENT)

@@ -63,5 +63,5 @@ def steep_arc(demands: RouteDemands, leg: int) -> SteepArc | None:
     limits = (demands.climb if tangent > 0.0 else demands.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
-    limit, speed = float(np.tan(limits).mean()), float(demands.setup.route.airspeed[leg])
+    limit, speed = float(np.tan(limits).mean()), float(demands.route.airspeed[leg])
     return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > OFF_SPEED else None

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
+from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MOST_PLAUSIBLE
@@ -89,7 +90,9 @@ def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     apexes = demands.apexes()
     rows, distance = _assign(clean, apexes)
     last = len(clean) - 1
-    passed = (rows < last) | (distance <= demands.fly_by_offset + ARRIVED)
+    off = np.hypot(*(clean.position[rows, :2] - apexes[:, :2]).T)
+    arrived = [max(float(offset) + ARRIVED, reach(demands, i).radius) for i, offset in enumerate(demands.fly_by_offset)]
+    passed = (rows < last) | (off <= arrived)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))

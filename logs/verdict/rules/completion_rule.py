@@ -3,11 +3,10 @@
 import numpy as np
 
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.leg_fits import straight_span
 from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.measures.track_alignment import AlignedTrack, along_across
+from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.tolerances import CLEAR_OF_TURN, CONTRADICTION, CORRIDOR, GAP_STEPS, LONGEST_GAP
+from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP
 
 
 def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool) -> list[Finding]:
@@ -27,7 +26,6 @@ def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, end
         legs = int(aligned.passed[1:].sum())
         if legs < demands.legs:
             faults.append(message(f"{legs} of {demands.legs} legs flown"))
-        faults += _strays(demands, aligned)
         faults += _record_faults(aligned)
     notes = "; ".join(demands.setup.route.notes)
     reason = reason_of(faults) if faults else f"all {demands.legs} legs flown"
@@ -48,22 +46,6 @@ def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, end
             method="waypoints passed in order",
         )
     ]
-
-
-def _strays(demands: RouteDemands, aligned: AlignedTrack) -> list[Message]:
-    """Legs that the track left between their turns."""
-    out = []
-    for leg in range(demands.legs):
-        if not aligned.flew(leg):
-            continue
-        rows = aligned.leg_rows(leg)
-        along, across = along_across(demands, leg, aligned.track.position[rows])
-        low, high = straight_span(demands, leg, CLEAR_OF_TURN)
-        off = np.where((along >= low) & (along <= high), np.abs(across), 0.0)
-        k = int(np.argmax(off))
-        if off[k] > CORRIDOR:
-            out.append(message(f"left leg {leg} by {off[k]:.0f} m at {aligned.track.time[rows.start + k]:.1f} s"))
-    return out
 
 
 def _record_faults(aligned: AlignedTrack) -> list[Message]:

@@ -5,18 +5,20 @@ import math
 import numpy as np
 
 from aircraft.envelope import ground_speed
-from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.route_demands import RouteDemands
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import RESERVE
 
 
 def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
-    """One finding: the energy used against the battery less its reserve."""
+    """One finding: the energy used against the battery less its reserve; a jump without end needs more than any."""
     setup = demands.setup
     usable = (1.0 - RESERVE) * setup.battery
     predicted, peak = predicted_energy(demands)
+    faults = [_never_ends(demands, usable)] if setup.route.endless >= 0 else []
     used, current = predicted, peak
     if not geometric:
         used = math.nan if aligned is None else float(aligned.track.energy.max())
@@ -33,8 +35,9 @@ def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
         make_finding(
             "energy",
             FLIGHT,
-            ok=None if math.isnan(used) else used <= usable,
-            reason=reason,
+            ok=False if faults else None if math.isnan(used) else used <= usable,
+            reason=reason_of(faults, [reason]),
+            faults=faults,
             planned=predicted,
             flown=None if geometric else used,
             limit=usable,
@@ -45,6 +48,21 @@ def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
             method="power of steady flight on each leg over its time" if geometric else "power over time",
         )
     ]
+
+
+def _never_ends(demands: RouteDemands, usable: float) -> Message:
+    """That a jump without end is flown until nothing is left, and how many of its rounds the usable energy lasts."""
+    route = demands.setup.route
+    last = len(route.items) - 1
+    begin = last
+    while begin > 0 and route.items[begin] == route.items[last]:
+        begin -= 1
+    # Where the round that ends the route began: at the item that it ends at.
+    while begin > 0 and route.items[begin] != route.items[last]:
+        begin -= 1
+    one = sum(leg_energies(demands)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
+    lasts = f": the energy lasts for {usable / one:.0f} rounds" if one > 0.0 else ""
+    return message(f"the jump of item {route.endless} has no end{lasts}")
 
 
 def _used_text(demands: RouteDemands, used: float, current: float) -> str:
@@ -63,17 +81,34 @@ def predicted_energy(demands: RouteDemands) -> tuple[float, float]:
     Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
     and gusts take beside that is a few per cent.
     """
-    envelope, route = demands.setup.envelope, demands.setup.route
+    volts = demands.setup.envelope.volts
+    energies, most = leg_energies(demands)
+    return float(sum(energies)), most / volts if volts else math.nan
+
+
+def needed_energy(setup: FlightSetup) -> float:
+    """Energy (Wh) of steady flight along a setup's route, NaN where the envelope knows no power.
+
+    >>> from logs.recording.example_log import example_log
+    >>> needed_energy(example_log().setup)
+    nan
+    """
+    return predicted_energy(route_demands(setup))[0]
+
+
+def leg_energies(demands: RouteDemands) -> tuple[list[float], float]:
+    """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
+    envelope, route = demands.setup.envelope, demands.route
     if not np.isfinite(demands.ground_speed).all():
-        return math.nan, math.nan
-    total, most = 0.0, 0.0
+        return [math.nan] * demands.legs, math.nan
+    energies, most = [], 0.0
     seconds_on = np.bincount(demands.path.legs, weights=np.diff(demands.path.times), minlength=demands.legs)
     for leg, seconds in enumerate(seconds_on):
         speed, up = float(route.airspeed[leg]), float(0.5 * (demands.points[leg, 2] + demands.points[leg + 1, 2]))
         power = envelope.power(speed, up, air_angle(demands, leg, speed, up))
-        total += power * float(seconds) / 3600.0
+        energies.append(power * float(seconds) / 3600.0)
         most = max(most, power) if math.isfinite(power) else math.nan
-    return total, most / envelope.volts if envelope.volts else math.nan
+    return energies, most
 
 
 def air_angle(demands: RouteDemands, leg: int, speed: float, up: float) -> float:

@@ -80,7 +80,7 @@ def fold_loiters(
         if at:
             found[found.index(at[0])] = _loiter(demands, aligned, circle, at)
             found = [item for item in found if not any(item is other for other in at[1:])]
-        for rule in ("slope", "speed", "clearance"):
+        for rule in ("slope", "speed", "clearance", "corridor"):
             mine = [item for item in found if item.rule == rule and item.place in legs]
             if len(mine) > 1:
                 worst = min(mine, key=_badness)
@@ -138,7 +138,7 @@ def _too_small(demands: RouteDemands, circle: Circle, tightest: float) -> list[M
     """What is wrong with a circle smaller than the bank limit's (m)."""
     if circle.radius >= tightest - RADIUS_TOLERANCE:
         return []
-    speed, bank = float(demands.setup.route.airspeed[circle.first]), math.degrees(demands.limits.max_bank)
+    speed, bank = float(demands.route.airspeed[circle.first]), math.degrees(demands.limits.max_bank)
     needs = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {tightest:.0f} m"
     if not math.isfinite(tightest):
         needs = f"at {speed:.0f} m/s the wind leaves no way around it"

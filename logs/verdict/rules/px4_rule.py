@@ -1,9 +1,10 @@
 """The mission rule: what PX4's feasibility checker would refuse, by the names of its checks.
 
 After `FeasibilityChecker` and `MissionFeasibilityChecker` of PX4's navigator for a fixed wing, with the default
-parameters: NAV_ACC_RAD 10 m, FW_LND_ANG 5 degrees, MIS_DIST_1WP 10 km, MIS_TKO_LAND_REQ 0.  Where PX4 only warns, and
-where it refuses what ArduPilot flies, the finding says so and does not fail.  Latitude, longitude, frames and counts
-that are none were refused when the file was read.
+parameters: NAV_ACC_RAD 10 m, FW_LND_ANG 5 degrees, MIS_DIST_1WP 10 km, MIS_TKO_LAND_REQ 0.  These are PX4's own limits
+and say nothing of the aircraft: what PX4 alone refuses is named and does not fail.  What does fail is what no autopilot
+flies: a command that neither PX4 nor ArduPlane takes, and a route beyond the mission's own fence.  Latitude, longitude,
+frames and counts that are none were refused when the file was read.
 """
 
 import itertools
@@ -70,12 +71,13 @@ def mission_findings(setup: FlightSetup) -> list[Finding]:
     return [_finding(name, list(remarks)) for name, remarks in checks]
 
 
-# What a check remarks: the verdict on it, the item (None: the whole mission), and why.
+# What a check remarks: the verdict on it, the item (None: the whole mission), and why.  PX4's refusal is none.
+REFUSED = None
 _Remark = tuple[bool | None, int | None, str | Message]
 
 
 def _finding(check: str, remarks: list[_Remark]) -> Finding:
-    # A failure comes first, then what could not be decided, then what is only remarked.
+    # A failure comes first, then what PX4 refuses, then what is only remarked.
     remarks.sort(key=lambda one: {False: 0, None: 1, True: 2}[one[0]])
     ok, item, why = remarks[0] if remarks else (True, None, "nothing to object to")
     first = why if isinstance(why, Message) else message(why)
@@ -102,23 +104,24 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
         name = command_name(item.command)
         if item.command not in _PX4:
             known = item.command in _ARDUPLANE
-            yield None if known else False, item.seq, f"unsupported command {name}" + ("; ArduPlane takes it" * known)
+            taken = "ArduPlane takes it" if known else "nor does ArduPlane take it"
+            yield REFUSED if known else False, item.seq, f"unsupported command {name}; {taken}"
         elif item.frame in OVER_TERRAIN and item.command in PLACES | TAKEOFFS | LANDINGS:
             yield (
-                None,
+                REFUSED,
                 item.seq,
                 f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
             )
         elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MOST_SERVO:
-            yield False, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MOST_SERVO}"
+            yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MOST_SERVO}"
         elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MOST_PWM:
             yield (
-                False,
+                REFUSED,
                 item.seq,
                 f"actuator value {item.params[1]:g} is out of bounds -{PX4_MOST_PWM:g}..{PX4_MOST_PWM:g}",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
-        yield False, mission.items[0].seq, "starts with landing"
+        yield REFUSED, mission.items[0].seq, "starts with landing"
 
 
 def _over_home(mission: Mission, item: MissionItem) -> float:
@@ -135,9 +138,9 @@ def _takeoff(mission: Mission) -> Iterator[_Remark]:
             height = _over_home(mission, item)
             if height - PX4_TAKEOFF_BUFFER < PX4_ACCEPTANCE:
                 least = PX4_ACCEPTANCE + PX4_TAKEOFF_BUFFER
-                yield False, item.seq, f"takeoff altitude {height:.1f} m too low: at least {least:.0f} m"
+                yield REFUSED, item.seq, f"takeoff altitude {height:.1f} m too low: at least {least:.0f} m"
             if placed:
-                yield False, item.seq, "takeoff is not the first waypoint item"
+                yield REFUSED, item.seq, "takeoff is not the first waypoint item"
         placed = placed or item.command in PLACES | TAKEOFFS | LANDINGS | {C.NAV_RETURN_TO_LAUNCH}
 
 
@@ -147,14 +150,14 @@ def _landing(mission: Mission) -> Iterator[_Remark]:
     lands = [k for k, command in enumerate(commands) if command in LANDINGS]
     seq = [item.seq for item in mission.items]
     if len(starts) > 1:
-        yield False, seq[starts[1]], "more than one land start command"
+        yield REFUSED, seq[starts[1]], "more than one land start command"
     if lands and lands[0] == 0:
-        yield False, seq[0], "starts with landing"
+        yield REFUSED, seq[0], "starts with landing"
     for k, command in enumerate(commands):
         if command == C.NAV_RETURN_TO_LAUNCH and starts and starts[0] < k:
-            yield False, seq[k], "land start item before RTL item is not possible"
+            yield REFUSED, seq[k], "land start item before RTL item is not possible"
     if starts and not any(land > starts[0] for land in lands):
-        yield False, seq[starts[0]], "invalid land start: no landing follows"
+        yield REFUSED, seq[starts[0]], "invalid land start: no landing follows"
 
 
 def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
@@ -166,22 +169,22 @@ def _approach(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
             yield None, item.seq, "the heights of landing and approach are not known over one another"
             continue
         if rise <= 0.0:
-            yield False, item.seq, "the approach waypoint must be above the landing point"
+            yield REFUSED, item.seq, "the approach waypoint must be above the landing point"
             continue
         run = _apart(before, item, origin)
         if before.command == C.NAV_LOITER_TO_ALT:
             radius = 0.0 if math.isnan(before.params[1]) else abs(before.params[1])
             if run <= radius:
-                yield False, item.seq, "the landing point must be outside the orbit radius"
+                yield REFUSED, item.seq, "the landing point must be outside the orbit radius"
                 continue
             run = math.sqrt(run * run - radius * radius)
         elif before.command != C.NAV_WAYPOINT:
-            yield False, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
+            yield REFUSED, item.seq, "unsupported landing approach entrance: only LOITER_TO_ALT or WAYPOINT"
             continue
         angle = math.atan2(rise, run)
         if angle > PX4_STEEPEST_LANDING:
             steep = f"the landing glide slope {math.degrees(angle):.1f}° is steeper than {PX4_LANDING_ANGLE_DEG:.1f}°"
-            yield False, item.seq, steep
+            yield REFUSED, item.seq, steep
 
 
 def _available(mission: Mission) -> Iterator[_Remark]:
@@ -205,7 +208,7 @@ def _first_distance(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     away = _apart(home, places[0], origin)
     if not away < PX4_FIRST_WAYPOINT:
         yield (
-            False,
+            REFUSED,
             places[0].seq,
             f"first waypoint too far away: {away:.0f} m from home, maximum {PX4_FIRST_WAYPOINT:.0f} m",
         )
@@ -221,7 +224,7 @@ def _gates(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:
     for before, after in itertools.pairwise(places):
         gates = C.CONDITION_GATE in (before.command, after.command)
         if gates and _apart(before, after, origin) < PX4_GATE_APART:
-            yield False, after.seq, "distance between waypoint and gate too close"
+            yield REFUSED, after.seq, "distance between waypoint and gate too close"
 
 
 def _distances(mission: Mission, origin: GeoOrigin) -> Iterator[_Remark]:

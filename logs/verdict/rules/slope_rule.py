@@ -2,7 +2,8 @@
 
 import math
 
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.jogs import step
 from logs.verdict.measures.leg_fits import LegFit
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
@@ -45,14 +46,24 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
     if abs(planned) <= LEVEL and not _in_envelope(demands, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL)
-    faults = [_too_steep(demands, leg, limit, source)] if abs(planned) > limit + PLAN_TOLERANCE else []
+    faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
+    if abs(planned) > limit + PLAN_TOLERANCE:
+        rise = step(demands, leg)
+        if rise is None:
+            faults.append(_too_steep(demands, leg, limit, source))
+        else:
+            facts.append(f"a step of {rise:.1f} m, beyond {math.degrees(limit):.1f}°, flown within its own height")
     faults += _steep_arc(demands, leg)
-    facts = [f"slope {math.degrees(planned):+.2f}°"]
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
         facts += _flown_facts(measure)
-        faults += _flown_faults(demands, leg, measure, limit)
+        weak = _too_weak(demands, leg, measure)
+        shown = _shown(demands, leg, measure, limit, weak)
+        # Where the aircraft's limits count they judge, and what it showed that it cannot; how closely it kept to the
+        # leg is told beside.
+        facts += [one.brief for one in shown] if demands.envelope else []
+        faults += weak if demands.envelope else [*shown, *weak]
         fit = measure.slope
         method = "not flown"
         if fit is not None:
@@ -77,6 +88,7 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
         margin=math.degrees(limit - sign * judged),
         unit="deg",
         method=method,
+        facts=_measured(demands, leg, measure),
     )
 
 
@@ -102,7 +114,7 @@ def _steep_arc(demands: RouteDemands, leg: int) -> list[Message]:
 
 def _in_envelope(demands: RouteDemands, leg: int) -> bool:
     low, high = demands.setup.envelope.level_speeds(float(demands.points[leg, 2]))
-    return low <= float(demands.setup.route.airspeed[leg]) <= high
+    return low <= float(demands.route.airspeed[leg]) <= high
 
 
 def _too_steep(demands: RouteDemands, leg: int, limit: float, source: str) -> Message:
@@ -120,7 +132,7 @@ def _allowed(demands: RouteDemands, leg: int, limit: float, source: str) -> str:
     """The limit on a leg's slope, in words, and what the wind has to do with it."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
-    speed = float(demands.setup.route.airspeed[leg])
+    speed = float(demands.route.airspeed[leg])
     up = float(max(demands.points[leg, 2], demands.points[leg + 1, 2]))
     at = f"at {speed:.0f} m/s and {up:.0f} m"
     if limit <= 0.0:
@@ -157,8 +169,21 @@ def _flown_facts(measure: SlopeMeasure) -> list[str]:
     return facts
 
 
-def _flown_faults(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit: float) -> list[Message]:
-    """What of the leg as flown is not good enough."""
+def _measured(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
+    """How the leg was flown, in numbers."""
+    if measure is None:
+        return []
+    facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
+    if measure.slope is not None:
+        off = math.degrees(measure.slope.value - float(demands.slopes[leg]))
+        facts.append(Fact("slope error", off, "deg"))
+    for name, held, off, way in _throttle_times(measure):
+        facts += [Fact(f"throttle at {name}", held, "s"), Fact(f"too {way}", off, "m/s")] if held > 0.0 else []
+    return facts
+
+
+def _shown(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]) -> list[Message]:
+    """How the leg as flown differs from the leg as planned.  weak: what it shows that the aircraft cannot."""
     faults = []
     planned = float(demands.slopes[leg])
     sign = 1.0 if planned >= 0.0 else -1.0
@@ -174,8 +199,6 @@ def _flown_faults(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit:
         if off > (OFF_HEIGHT_SHORT if measure.short else OFF_HEIGHT):
             side = "above" if measure.height_error > 0.0 else "below"
             faults.append(message(f"{off:.0f} m {side} the leg"))
-    weak = _too_weak(demands, leg, measure)
-    faults += weak
     covered = not weak and measure.ability is not None and measure.ability.covers(planned)
     most = OFF_SPEED + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
     for name, held, off, way in _throttle_times(measure):
@@ -198,7 +221,7 @@ def _too_weak(demands: RouteDemands, leg: int, measure: SlopeMeasure) -> list[Me
     if ability.slope - abs(planned) >= -SHOWN_TOLERANCE - SURE * ability.error:
         return []
     verb = "climb" if planned >= 0.0 else "sink"
-    speed = float(demands.setup.route.airspeed[leg])
+    speed = float(demands.route.airspeed[leg])
     return [
         message(
             f"in {ability.seconds:.0f} s at {_throttle(planned)} throttle the aircraft showed that it can {verb}"

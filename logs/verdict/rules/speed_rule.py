@@ -1,15 +1,17 @@
-"""The speed rule: each leg's commanded airspeed in the envelope, and the flown one near the command."""
+"""The speed rule: each leg's commanded airspeed in the envelope, room to take it up, and what was flown."""
 
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.tolerances import (
+    ACCELERATION,
     GUST_SHARE,
     GUST_SIGMAS,
     GUST_TIME,
@@ -22,52 +24,91 @@ from logs.verdict.tolerances import (
 )
 from world.wind import W20
 
+Floats = NDArray[np.float64]
+
 
 def speed_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
-    """Judge each leg's speed: the commanded airspeed in the envelope, and the flown one near the command."""
+    """Judge each leg's commanded airspeed by the envelope, and say what was flown."""
     return [_speed(demands, aligned, leg, geometric) for leg in range(demands.legs)]
 
 
 def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    commanded = float(demands.setup.route.airspeed[leg])
+    commanded = float(demands.route.airspeed[leg])
     slowest, fastest, faults = _commanded(demands, leg, commanded)
-    reason = f"{commanded:.1f} m/s commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"
+    asked = float(demands.setup.route.airspeed[leg])
+    true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
+    said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
+    said += _no_room(demands, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
-    source, method, mean, tolerance = "aircraft", "envelope", math.nan, 0.0
-    unflown = False
-    if not geometric:
-        measured = _measured(demands, aligned, leg) if aligned is not None else None
+    mean, tolerance, facts = math.nan, 0.0, []
+    unflown = not geometric and (aligned is None or not aligned.flew(leg))
+    if unflown:
+        said.append("the leg was not flown")
+    elif not geometric and aligned is not None:
+        measured = _measured(demands, aligned, leg)
         if measured is None:
-            unflown = True
-            reason += "; too little was flown to judge"
+            mean = _reached(aligned, leg, commanded)
+            said.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
         else:
             mean, tolerance, least = measured
-            reason += f"; flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second"
             off = abs(mean - commanded)
-            if not faults:
-                limit, margin = commanded + math.copysign(OFF_MEAN, mean - commanded), OFF_MEAN - off
-                source, method = "check", "mean airspeed, once taken up"
+            said.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
             if off > OFF_MEAN + tolerance and not _by_the_air(demands, aligned, leg, mean - commanded):
-                faults.append(
-                    message(f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s")
-                )
+                text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
+                said += [text] if demands.envelope else []
+                faults += [] if demands.envelope else [message(text)]
+        facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     return make_finding(
         "speed",
         Place("leg", leg),
         ok=None if ok and unflown else ok,
-        reason=reason_of(faults, [reason]),
+        reason=reason_of(faults, said),
         faults=faults,
         planned=commanded,
         flown=mean,
         limit=limit,
-        source=source,
+        source="aircraft",
         tolerance=tolerance,
         margin=margin,
         unit="m/s",
-        method=method,
+        method="commanded airspeed in the envelope",
+        facts=facts,
     )
+
+
+def _no_room(demands: RouteDemands, leg: int, commanded: float) -> list[str]:
+    """What a leg has no room for: to take up its speed at `ACCELERATION` from that of the leg before."""
+    before = float(demands.route.airspeed[leg - 1]) if leg else commanded
+    change, run = commanded - before, float(demands.runs[leg])
+    seconds = abs(change) / ACCELERATION
+    # Along the ground at the mean of both speeds, in the wind along the leg.
+    start = float(demands.ground_speed[leg]) - change
+    needs = seconds * (start + 0.5 * change)
+    if not needs > run or not start > 0.0:
+        return []
+    # start t + a t^2 / 2 = run
+    rate = math.copysign(ACCELERATION, change)
+    end = math.sqrt(max(0.0, start * start + 2.0 * rate * run)) - start + before
+    return [
+        f"from {before:.1f} to {commanded:.1f} m/s takes about {seconds:.0f} s and {needs:.0f} m, and the leg has"
+        f" {run:.0f} m: about {end:.1f} m/s are reached on it"
+    ]
+
+
+def _reached(aligned: AlignedTrack, leg: int, commanded: float) -> float:
+    """The mean airspeed over a second of a leg, or over all of a shorter one, that came nearest to its command, m/s."""
+    means = _second_means(aligned, aligned.leg_rows(leg))
+    return float(means[np.argmin(np.abs(means - commanded))])
+
+
+def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
+    """Mean airspeeds over each second of some rows, or over all of fewer, m/s."""
+    speed = aligned.track.airspeed[rows].astype(np.float64)
+    width = max(1, min(speed.size, round(1.0 / aligned.tick())))
+    total = np.concatenate([[0.0], np.cumsum(speed)])
+    return np.asarray((total[width:] - total[:-width]) / width)
 
 
 def _by_the_air(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, off: float) -> bool:
@@ -107,9 +148,7 @@ def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[f
     speed = aligned.track.airspeed[rows].astype(np.float64)
     lasts = float(time[-1] - time[0])
     gust = GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
-    width = max(1, min(speed.size, round(1.0 / aligned.tick())))
-    total = np.concatenate([[0.0], np.cumsum(speed)])
-    least = float(((total[width:] - total[:-width]) / width).min())
+    least = float(_second_means(aligned, rows).min())
     spread = GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
     steepened = leg > 0 and abs(float(demands.slopes[leg] - demands.slopes[leg - 1])) > LEVEL
     return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least

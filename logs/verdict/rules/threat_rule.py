@@ -7,12 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import Fact, Finding, make_finding
+from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.path_sweeps import SphereVisits, path_spheres
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
-from world.threats import Threats
+from world.threats import Threats, threat_label
 
 Floats = NDArray[np.float64]
 Side = Literal["missile", "radar"]
@@ -28,7 +29,7 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
         return [make_finding("threat", FLIGHT, ok=None, reason=reason, unit="s")]
     threats = scenario.threats
     touched: list[Finding] = []
-    nearest = math.inf
+    nearest, name = math.inf, ""
     for side in ("missile", "radar"):
         radii, scales = _spheres(threats, side)
         plan = path_spheres(demands.path.points, demands.path.times, threats.position, radii, scales)
@@ -40,13 +41,16 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
                 continue
             if side == "missile":
                 judged = plan if geometric or track is None else track
-                nearest = min(nearest, float(judged.closest[m] - radii[m]))
+                away = float(judged.closest[m] - radii[m])
+                if away < nearest:
+                    nearest, name = away, threat_label(table.name or "", m)
             if plan.closest[m] <= radii[m] or (track is not None and track.closest[m] <= radii[m]):
                 visit = None if geometric else _visit(track, m)
                 place = Place(side, m, name=table.name or "")
                 touched.append(_touched(place, _visit(plan, m), visit, float(radii[m])))
     if not any(item.place.kind == "missile" for item in touched):
-        touched.insert(0, _untouched(len(threats), nearest, aligned is not None or geometric))
+        error = position_error(demands.setup)
+        touched.insert(0, _untouched(len(threats), nearest, name, error, aligned is not None or geometric))
     return touched
 
 
@@ -74,10 +78,16 @@ def _visit(visits: SphereVisits | None, m: int) -> _Visit:
     return _Visit(*(float(column[m]) for column in columns))
 
 
-def _untouched(count: int, nearest: float, judged: bool) -> Finding:
+def _untouched(count: int, nearest: float, name: str, error: float, judged: bool) -> Finding:
+    """No sphere is entered.  nearest: m outside that of the threat of this name.  error: of navigation, m."""
     reason = f"no missile sphere of {count} threats is entered" if count else "the scenario has no threats"
+    facts = []
     if math.isfinite(nearest):
-        reason += f"; the nearest stays {nearest:.0f} m away"
+        facts.append(Fact("nearest", nearest, "m"))
+        reason += f"; the nearest, {name}, stays {nearest:.{0 if nearest >= 100.0 else 1}f} m away"
+        if error > 0.0:
+            facts.append(Fact("navigation error", error, "m"))
+            reason += f", {nearest - error:.1f} m less the {error:.1f} m that navigation may be off"
     return make_finding(
         "threat",
         FLIGHT,
@@ -91,6 +101,7 @@ def _untouched(count: int, nearest: float, judged: bool) -> Finding:
         margin=0.0,
         unit="s",
         method=_METHOD,
+        facts=facts if judged else (),
     )
 
 

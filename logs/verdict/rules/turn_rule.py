@@ -4,7 +4,8 @@ import math
 
 from flight.guidance.fly_by_path import SHARPEST
 from flight.guidance.navigation_error import ERRORS
-from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
+from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
+from logs.verdict.measures.jogs import jog
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.tighter_limits import turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -41,15 +42,25 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
     if demands.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
         reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
         return make_finding("turn", demands.waypoint(i), ok=None, reason=reason, unit="deg")
-    faults = [_too_sharp(demands, i, planned, limit, source)] if planned > limit + PLAN_TOLERANCE else []
-    facts = [
-        f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")
-    ]
+    faults, facts = (
+        [],
+        [f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")],
+    )
+    if planned > limit + PLAN_TOLERANCE:
+        beside = jog(demands, i)
+        if beside is None:
+            faults.append(_too_sharp(demands, i, planned, limit, source))
+        else:
+            facts.append(f"a jog: the way without it passes it at {beside:.1f} m and can be flown")
+    facts += _flown_over(demands, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
         facts += _flown_facts(demands, i, measure)
-        faults += _flown_faults(demands, i, measure, limit)
+        shown = _shown(demands, i, measure, limit)
+        # Where the aircraft's limits count they judge; what the flight showed of them is told beside.
+        facts += [one.brief for one in shown] if demands.envelope else []
+        faults += [] if demands.envelope else shown
         method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"
         if angle is None:
             method = "not flown"
@@ -71,14 +82,30 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
         margin=math.degrees(limit - (planned if angle is None else angle)),
         unit="deg",
         method=method,
+        facts=_measured(measure),
     )
+
+
+def _flown_over(demands: RouteDemands, i: int, turn: float) -> list[str]:
+    """That a waypoint is flown over because its arc would miss its acceptance, and what that takes."""
+    radius, acceptance = float(demands.radius[i]), float(demands.setup.route.acceptance[i])
+    if not demands.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
+        return []
+    offset = fly_by_offset(turn, radius)
+    if offset <= acceptance:
+        return []
+    beside = radius * (1.0 - math.cos(turn))
+    return [
+        f"flown over, because its arc would pass at {offset:.0f} m and its acceptance is {acceptance:.0f} m;"
+        f" that leads up to {beside:.0f} m beside the next leg"
+    ]
 
 
 def _too_sharp(demands: RouteDemands, i: int, planned: float, limit: float, source: str) -> Message:
     sharp = f"turns {math.degrees(planned):.1f}°"
     if source == "scenario":
         return message(f"{sharp}, beyond the scenario's {math.degrees(limit):.1f}°")
-    speed, bank = float(max(demands.setup.route.airspeed[i - 1 : i + 1])), math.degrees(demands.limits.max_bank)
+    speed, bank = float(max(demands.route.airspeed[i - 1 : i + 1])), math.degrees(demands.limits.max_bank)
     radius = float(demands.radius[i])
     if not math.isfinite(radius):
         return message(f"{sharp} where the wind leaves no way along a leg at {speed:.0f} m/s")
@@ -116,8 +143,22 @@ def _flown_facts(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[st
     return facts
 
 
-def _flown_faults(demands: RouteDemands, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
-    """What of the turn as flown is not good enough."""
+def _measured(measure: TurnMeasure | None) -> list[Fact]:
+    """How the turn was flown, in numbers."""
+    if measure is None:
+        return []
+    bank = None if measure.held_bank is None else math.degrees(measure.held_bank)
+    numbers = (
+        ("overshoot", measure.overshoot, "m"),
+        ("settled", measure.settled if measure.over else None, "m"),
+        ("bank", bank, "deg"),
+        ("radius", measure.radius, "m"),
+    )
+    return [Fact(what, value, unit) for what, value, unit in numbers if value is not None]
+
+
+def _shown(demands: RouteDemands, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
+    """What the turn as flown shows of a limit: more angle or bank than allowed, a tighter arc, a turn gone wide."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)

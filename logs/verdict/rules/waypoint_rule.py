@@ -1,39 +1,85 @@
-"""The waypoint rule: how close the track came to each waypoint."""
+"""The waypoint rule: was each waypoint reached, by the radius that mission or autopilot has for it.
+
+ArduPlane also takes a waypoint as reached, and turns to the next leg, when it is past the line across the leg at its
+end, however far to the side; flown by its law, that counts where it is within the corridor.  Height has no part in the
+rule: what a height off the plan can harm is judged where it harms.
+"""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-from logs.verdict.findings import Finding, make_finding
+from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
+from logs.verdict.measures.acceptance import Reach, reach
 from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.measures.track_alignment import AlignedTrack, approaches
-from logs.verdict.tolerances import EQUALLY_CLOSE, PASS, PASS_HEIGHT
+from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
+from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
 
 Floats = NDArray[np.float64]
 
 
-def waypoint_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> list[Finding]:
-    """Judge how close the track came to each waypoint."""
+def waypoint_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge how close the track came to each waypoint; ``geometric``: how close the planned path passes."""
+    if geometric:
+        return [_planned(demands, i) for i in range(len(demands.points))]
     apexes = demands.apexes()
-    return [_waypoint(demands, aligned, i, apexes) for i in range(len(demands.points))]
+    return [_flown(demands, aligned, i, apexes) for i in range(len(demands.points))]
 
 
-def _waypoint(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    offset = float(demands.fly_by_offset[i])
-    limit = offset + PASS
-    away, off, reason = math.nan, math.nan, "missed: nothing was flown"
+def _planned(demands: RouteDemands, i: int) -> Finding:
+    """Whether the fly-by arc at a waypoint passes it within what counts as reached."""
+    near, offset = reach(demands, i), float(demands.fly_by_offset[i])
+    faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
+    if demands.setup.route.fly_over[i]:
+        fact = "flown over"
+    elif demands.setup.parameters is not None:
+        fact = f"ArduPlane turns to the next leg {near.radius:.0f} m before it, or where it is past it"
+    elif offset > near.radius + ROUNDING:
+        turn, radius = math.degrees(abs(float(demands.turns[i]))), float(demands.radius[i])
+        faults.append(
+            message(
+                f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
+                f" (radius {radius:.0f} m), and {near.radius:.0f} m count as reached",
+            )
+        )
+    return make_finding(
+        "waypoint",
+        demands.waypoint(i),
+        ok=not faults,
+        reason=reason_of(faults) if faults else fact,
+        faults=faults,
+        planned=offset,
+        limit=near.radius,
+        source=near.source,
+        tolerance=ROUNDING,
+        margin=near.radius - offset if demands.setup.parameters is None else None,
+        unit="m",
+        method="the fly-by arc",
+    )
+
+
+def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
+    near, setup = reach(demands, i), demands.setup
+    offset, most = float(demands.fly_by_offset[i]), near.radius + near.tolerance
+    away, ok, reason = math.nan, False, "missed: nothing was flown"
+    facts: tuple[Fact, ...] = ()
     if aligned is not None:
         away, off = _closest(demands, aligned, i, float(apexes[i, 2]))
+        facts = (Fact("height error", off, "m"),)
+        ok = away <= most
+        beside = math.inf if ok or setup.parameters is None else _beside(demands, aligned, i)
+        if beside <= setup.corridor:
+            ok = True
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
         if offset >= 1.0:
             reason += f" (the fly-by path passes at {offset:.0f} m)"
-    height = PASS_HEIGHT + float(demands.blend_deviation[i])
-    ok = aligned is not None and away <= limit and abs(off) <= height
-    if aligned is not None and not ok:
-        reason = f"missed: {reason}; at most {limit:.0f} m and {height:.0f} m of height count as passed"
+        if math.isfinite(beside):
+            reason += f"; the line across the leg there crossed {beside:.0f} m beside it"
         if i > 0 and not aligned.passed[i]:
-            reason = f"missed: the flight ended {math.hypot(away, off):.0f} m away"
+            ok, reason = False, f"missed: the flight ended {math.hypot(away, off):.0f} m away"
+        elif not ok:
+            reason = f"missed: {reason}; {_counts(near)}"
     return make_finding(
         "waypoint",
         demands.waypoint(i),
@@ -41,13 +87,32 @@ def _waypoint(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexe
         reason=reason,
         planned=offset,
         flown=away,
-        limit=limit,
-        source="fly-over" if demands.setup.route.fly_over[i] else "fly-by path",
-        tolerance=0.0,
-        margin=limit - away,
+        limit=near.radius,
+        source=near.source,
+        tolerance=near.tolerance,
+        # Past the line beside it counts as reached whatever its distance.
+        margin=near.radius - away if ok is (away <= most) else None,
         unit="m",
         method="closest approach, horizontal",
+        facts=facts,
     )
+
+
+def _beside(demands: RouteDemands, aligned: AlignedTrack, i: int) -> float:
+    """How far (m) beside a waypoint the track crossed the line across the leg before it; inf where it did not."""
+    if i == 0:
+        return math.inf
+    last = int(aligned.rows[i + 1]) if i + 1 < len(demands.points) else len(aligned.track) - 1
+    along, across = along_across(demands, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1])
+    past = np.flatnonzero(along >= demands.runs[i - 1])
+    return abs(float(across[past[0]])) if past.size else math.inf
+
+
+def _counts(near: Reach) -> str:
+    """What counts as reached, in words."""
+    whose = {"mission": "the mission's", "autopilot": "the autopilot's"}.get(near.source, "the path's")
+    error = f", and {near.tolerance:.1f} m for navigation and gusts," if near.tolerance else ""
+    return f"{near.radius:.0f} m{error} count as reached ({whose})"
 
 
 def _closest(demands: RouteDemands, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:

@@ -7,7 +7,8 @@ import numpy as np
 from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, GUIDANCE_MEMORY, L1, VECTOR_FIELD
 from flight.simulation.simulate import LAWS
 from world.kernels import Record, field_names
-from world.scenario_tables import FlightTable, Guidance
+from world.scenario_tables import FlightTable
+from world.scenario_types import Guidance
 
 
 def test_every_law_of_a_scenario_has_its_number() -> None:

@@ -1,18 +1,24 @@
 """Plans as missions: waypoints come back from either file form, and corners have their acceptance radius."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from aircraft.catalog import load_aircraft
+from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
+from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import item_problem
 from flight.mission.routing import make_route
 from flight.mission_files.formats import mission_text, parse_mission
+from flight.simulation.flight_setup import make_limits
 from tests.mission_lines import a_plan
 from world.scenario import load_scenario
+from world.scenario_variants import with_wind
 
 
 @settings(max_examples=40, deadline=None)
@@ -49,3 +55,36 @@ def test_a_corner_has_its_fly_by_offset_as_acceptance() -> None:
     terrain = load_scenario("jacksboro").terrain
     assert terrain is not None
     assert exported.home.alt == pytest.approx(float(terrain.height(0.0, 0.0)), abs=0.001)
+
+
+@pytest.mark.parametrize("turbulence", ["none", "moderate"])
+@pytest.mark.parametrize("turn_deg", [20.0, 90.0, 140.0, 149.0, 151.0, 170.0])
+def test_no_arc_of_the_flight_misses_the_radius_that_is_exported(turn_deg: float, turbulence: str) -> None:
+    turn = math.radians(turn_deg)
+    corner = [(0.0, 0.0, 700.0), (0.0, 5000.0, 700.0), (5000 * math.sin(turn), 5000 + 5000 * math.cos(turn), 700.0)]
+    plan = a_plan(corner)
+    # The turn begins downwind, where its ground speed is highest.
+    plan = replace(plan, scenario=with_wind(plan.scenario, 8.0, math.pi, turbulence))
+    limits = make_limits(plan.scenario, load_envelope(load_aircraft("aerosonde")), 25.0, math.radians(30.0))
+    exported = plan_mission(plan, 25.0, math.radians(30.0))
+    route = make_route(exported, plan.scenario.origin, plan.scenario.terrain, 25.0, False, limits)
+    assert not route.fly_over.any()
+    # By plain sums: 25 m/s, 8 of wind, and a tenth of the 15.4 m/s (30 kn) at 6 m.
+    gust = 0.1 * 15.4 if turbulence == "moderate" else 0.0
+    radius = (25.0 + 8.0 + gust) ** 2 / (9.80665 * math.tan(math.radians(30.0)))
+    assert exported.items[2].params[1] >= radius / math.cos(turn / 2.0) - radius
+
+
+def test_a_corner_has_the_acceptance_that_its_autopilot_strays_least_with() -> None:
+    """Of a table that is 100 m a radian and 2 m for each m/s over 25: at 60 degrees, 25.8 m/s at 700 m, 106.4 m."""
+    turns, speeds = np.meshgrid(TURNS, SPEED_SHARES * 25.0, indexing="ij")
+    acceptance = 15.0 + 100.0 * turns + 2.0 * (speeds - 25.0)
+    nothing = np.zeros(turns.shape)
+    error = TrackingError(25.0, acceptance, nothing, nothing, nothing, across=0.0, up=0.0, lag=3.0, step=15.0)
+    corner = [(0.0, 0.0, 700.0), (0.0, 1000.0, 700.0), (866.0, 1500.0, 700.0)]
+    exported = plan_mission(a_plan(corner), 25.0, math.radians(30.0), tracking=error)
+    assert [item.params[1] for item in exported.items] == [25.0, 15.0, 121.0, 15.0]
+    windy = replace(a_plan(corner), scenario=with_wind(load_scenario("jacksboro"), 8.0, math.radians(240.0), None))
+    # On the second leg, at 60 degrees, the wind is from behind: 33.8 m/s.
+    blown = plan_mission(windy, 25.0, math.radians(30.0), tracking=error)
+    assert blown.items[2].params[1] == pytest.approx(15.0 + 104.7 + 2.0 * 8.85, abs=1.0)

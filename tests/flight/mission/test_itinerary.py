@@ -41,7 +41,12 @@ def test_jumps_are_followed_as_often_as_they_say() -> None:
     assert route(*corners, "2 177 1 0 0 0 0 0 0").items.tolist() == [1, 2, 3]
     endless = route(*corners, "2 177 2 -1 0 0 0 0 0")
     assert endless.items.tolist() == [1, 2, 3, 2, 3]
-    assert endless.notes == ("item 4: DO_JUMP without end: taken once",)
+    assert endless.notes == ("item 4: DO_JUMP without end: taken once; the flight ends there",)
+    assert (endless.endless, route(*corners, "2 177 2 2 0 0 0 0 0").endless) == (4, -1)
+    # What follows a jump without end is never flown.
+    beyond = route(*corners, "2 177 2 -1 0 0 0 0 0", wp(0, 0))
+    assert beyond.items.tolist() == [1, 2, 3, 2, 3]
+    assert beyond.notes[1] == "item 5: never reached"
     skipping = route(wp(0, 0), "2 177 4 1 0 0 0 0 0", wp(0, 900), wp(900, 900))
     assert skipping.items.tolist() == [1, 4]
     assert skipping.notes == ("item 3: never reached",)

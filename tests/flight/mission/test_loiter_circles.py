@@ -24,7 +24,7 @@ from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from tests.sampled_paths import sample_path
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
-from world.scenario_tables import MAP_EXTENT
+from world.scenario_types import MAP_EXTENT
 
 TURN = 2.0 * math.pi
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.simulation.tick import BANKED, COMPLETED, ENDS, FAR, GROUND, MISSED, NOT_A_NUMBER, STALLED, tick
+from flight.simulation.tick import BANKED, COMPLETED, EMPTY, ENDS, FAR, GROUND, MISSED, NOT_A_NUMBER, STALLED, tick
 from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.workspace import OUTPUT, READ_FIELDS, Workspace
 from tests.flight.simulation.hand_made import (
@@ -110,8 +110,8 @@ def test_the_last_row_shows_how_the_flight_ended() -> None:
 
 
 def test_each_end_is_told_apart_by_people() -> None:
-    assert set(ENDS) == {COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED}
-    assert len(set(ENDS.values())) == 6
+    assert set(ENDS) == {COMPLETED, NOT_A_NUMBER, GROUND, BANKED, STALLED, MISSED, EMPTY}
+    assert len(set(ENDS.values())) == 7
     assert "75 degrees" in ENDS[BANKED]
     assert f"{FAR:.0f} m" in ENDS[MISSED]
 
@@ -154,6 +154,17 @@ def test_time_and_energy_add_up_tick_by_tick() -> None:
     # 720 W are 0.2 Wh a second.
     assert space.rows["energy"][:3] == pytest.approx([0.2 * DT, 0.4 * DT, 0.6 * DT])
     assert (int(space.ticks_flown[0]), int(space.rows_filled[0])) == (3, 3)
+
+
+def test_a_flight_ends_when_all_that_it_carries_is_used() -> None:
+    # 720 W are 0.2 Wh a second: of this battery three ticks use all, and two do not.
+    space = make_workspace()
+    space.record.settings.battery = 0.2 * 2.5 * DT
+    statuses = []
+    for k in range(3):
+        read(space, north=1000.0 + k, power=720.0)
+        statuses.append(tick(space.array, space.path, level_ground()))
+    assert statuses == [0, 0, EMPTY]
 
 
 def test_readings_come_to_si_by_their_factors() -> None:

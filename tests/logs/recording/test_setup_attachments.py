@@ -15,6 +15,7 @@ from aircraft.path_limits import Limits
 from flight.ardupilot.parameters import default_parameters, parameters_of
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
@@ -34,15 +35,24 @@ def test_the_setup_comes_back_whole(tmp_path: Path, track: Track, with_plan: boo
     assert log.versions["numpy"] == np.__version__
 
 
+def test_the_real_autopilot_that_flew_comes_back(tmp_path: Path, track: Track) -> None:
+    given, changed = {"NAVL1_PERIOD": 15.0, "WP_RADIUS": 90.5}, {"NAVL1_PERIOD": 15.0}
+    program = AutopilotProgram("ArduPlane V4.6.0 (0badc0de)", "ab" * 32, given, changed, ("FOO",))
+    setup = dataclasses.replace(make_setup(), program=program)
+    log = read_log(record(tmp_path / "a.mcap", setup, track))
+    assert log.setup.program == program
+    assert read_log(record(tmp_path / "b.mcap", make_setup(), track)).setup.program is None
+
+
 def test_no_field_of_a_setup_is_left_behind() -> None:
     # A field with a default could be forgotten in silence: these are all that the log knows of.  What a setup works
-    # out of its other fields, it works out again.
+    # out of its other fields, it works out again; the room that plans keep for an autopilot is no flight's.
     kinds = (FlightSetup, Limits, Mission, Route, Envelope)
     names = {kind: [item.name for item in dataclasses.fields(kind) if item.init] for kind in kinds}
-    assert len(names[FlightSetup]) == 13
-    assert len(names[Limits]) == 8
+    assert len(names[FlightSetup]) == 14
+    assert len(names[Limits]) == 9
     assert len(names[Mission]) == 7
-    assert len(names[Route]) == 8
+    assert len(names[Route]) == 11
     assert len(names[Envelope]) == 14
     assert len(dataclasses.fields(MissionItem)) == 8
 

@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import RULES, SCHEMA, Finding, Verdict, make_finding, verdict_json
@@ -25,6 +26,17 @@ THREAT = {
     "detection_radius_m": 700.0,
     "detection_scale_m": 400.0,
 }
+
+
+def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track) -> None:
+    program = AutopilotProgram("ArduPlane V4.6.0", "ab" * 32, {"WP_RADIUS": 60.0}, {"WP_RADIUS": 60.0}, ("FOO",))
+    verdict = judge(replace(setup, program=program), track)
+    assert "\nFlown by: ArduPlane V4.6.0 (sha256 abababab...), 1 parameters set for" in verdict.summary
+    assert json.loads(verdict_json(verdict))["flown_by"] == {
+        "version": "ArduPlane V4.6.0", "sha256": "ab" * 32, "parameters": {"WP_RADIUS": 60.0},
+        "changed": {"WP_RADIUS": 60.0}, "unused": ["FOO"],
+    }  # fmt: skip
+    assert json.loads(verdict_json(judge(setup, track)))["flown_by"] is None
 
 
 def test_each_rule_names_its_places(setup: FlightSetup, track: Track) -> None:
@@ -90,10 +102,10 @@ def test_both_legs_of_a_steep_arc_are_one_suggestion() -> None:
 
 
 def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
-    slow = fly_path(setup, airspeed=lambda s: 0.0 * s - 4.0, stop=6000.0)
-    verdict = judge_flight(setup, slow, "ground contact")
+    wide = fly_path(setup, across=lambda s: 0.0 * s + 35.0, stop=6000.0)
+    verdict = judge_flight(setup, wide, "ground contact")
     written = json.loads(verdict_json(verdict))
-    assert written["schema"] == SCHEMA == "planfly.verdict/2"
+    assert written["schema"] == SCHEMA == "planfly.verdict/3"
     assert written["summary"].splitlines() == list(verdict.lines)
     for item, found in zip(verdict.findings, written["findings"], strict=True):
         assert found["place"] == asdict(item.place)
@@ -101,12 +113,16 @@ def test_a_file_holds_the_data_and_the_words(setup: FlightSetup) -> None:
         assert found["suggestions"] == [[asdict(change) for change in one] for one in item.suggestions]
         assert found["suggestion"] == suggestions_text(item.suggestions)
         assert found["reason"] == item.reason
-    assert verdict.prediction is not None
-    differences = [Disagreement("speed", leg(k), geometric=True, flown=False) for k in range(3)]
-    assert [one for one in verdict.prediction.disagreements if one.rule == "speed"] == differences
-    texts = [f"speed at leg {k} passes by geometry and fails in flight" for k in range(3)]
-    assert [text for text in written["geometric"]["disagreements"] if text in texts] == texts
-    assert len(written["geometric"]["differences"]) == len(written["geometric"]["disagreements"])
+    geometry, own = verdict.levels
+    assert (geometry.name, own.name, own.flyable, own.headline) == ("geometry", "airframe", False, verdict.headline)
+    differences = [Disagreement("corridor", leg(k), "geometry", there=True, here=False) for k in range(3)]
+    assert [one for one in geometry.disagreements if one.rule == "corridor"] == differences
+    texts = [f"corridor at leg {k} passes by geometry and fails in flight" for k in range(3)]
+    levels = written["levels"]
+    assert [level["name"] for level in levels] == ["geometry", "airframe"]
+    assert [text for text in levels[0]["disagreements"] if text in texts] == texts
+    assert len(levels[0]["differences"]) == len(levels[0]["disagreements"])
+    assert written["deciding_parameter"] is None
 
 
 def test_a_margin_that_says_the_opposite_is_left_out() -> None:

@@ -54,7 +54,7 @@ def data_of(verdict: Verdict) -> dict[str, Any]:
     return {
         "findings": [asdict(replace(item, reason="", brief="")) for item in verdict.findings],
         "whole": (verdict.flyable, verdict.complete, verdict.level),
-        "differences": None if verdict.prediction is None else verdict.prediction.disagreements,
+        "levels": [(level.name, level.flyable, level.disagreements) for level in verdict.levels],
     }
 
 

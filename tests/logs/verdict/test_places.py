@@ -23,7 +23,7 @@ def test_a_place_a_change_and_a_disagreement_cannot_be_changed() -> None:
     for thing, field in (
         (Place("leg", 1), "index"),
         (change, "wanted"),
-        (Disagreement("a", PLAN, True, False), "flown"),
+        (Disagreement("a", PLAN, "geometry", True, False), "here"),
     ):
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(thing, field, 1)

@@ -6,7 +6,7 @@ import pytest
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import Disagreement
 from tests.logs.verdict.judging import judge, leg, missile, of, suggested, waypoint
-from tests.synthetic import fly_path, make_scenario, make_setup
+from tests.synthetic import bump, fly_path, make_scenario, make_setup
 
 STEEP = [[0, 0, 300], [0, 2000, 300], [0, 3000, 600], [0, 6000, 600]]
 SHORT = [[0, 0, 300], [0, 1000, 300], [150, 1000, 300], [150, 2000, 300]]
@@ -64,18 +64,15 @@ def test_what_passes_has_no_suggestion() -> None:
     verdict = judge(setup, fly_path(setup))
     assert verdict.flyable
     assert {item.suggestions for item in verdict.findings} == {()}
-    assert verdict.prediction is not None
-    assert verdict.prediction.flyable
-    assert verdict.prediction.disagreements == ()
+    assert [(level.flyable, level.disagreements) for level in verdict.levels] == [(True, ()), (True, ())]
     assert "flight and geometry agree" in verdict.summary
 
 
 def test_where_the_levels_disagree_both_are_named() -> None:
-    """A flight that cannot keep its speed fails where the geometry sees nothing wrong."""
+    """A flight that leaves its leg fails where the geometry sees nothing wrong."""
     setup = make_setup([[0, 0, 300], [0, 4000, 300]])
-    verdict = judge(setup, fly_path(setup, airspeed=lambda s: np.full_like(s, 21.0)))
+    verdict = judge(setup, fly_path(setup, across=bump(2000.0, 40.0, 200.0)))
     assert not verdict.flyable
-    assert verdict.prediction is not None
-    assert verdict.prediction.flyable
-    assert Disagreement("speed", leg(0), geometric=True, flown=False) in verdict.prediction.disagreements
+    assert [level.flyable for level in verdict.levels] == [True, False]
+    assert Disagreement("corridor", leg(0), "geometry", there=True, here=False) in verdict.levels[0].disagreements
     assert "By geometry alone: flyable" in verdict.summary

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 from flight.ardupilot.parameters import default_parameters, parameters_of
+from flight.simulation.autopilot_program import AutopilotProgram
 from logs.verdict.findings import RULES, Finding, make_finding, message
+from logs.verdict.levels import LevelAnswer
 from logs.verdict.places import FLIGHT, Place
-from logs.verdict.summary import headline, summary_lines
-from tests.logs.made_flight import make_setup
+from logs.verdict.summary import flown_by, headline, summary_lines
 from tests.logs.verdict.judging import leg, missile, waypoint
+from tests.synthetic import make_setup
 
 
 def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
@@ -16,8 +18,10 @@ def failed(rule: str, place: Place, margin: float, **numbers: float) -> Finding:
 
 def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
     found = [failed(rule, FLIGHT, -1.0) for rule in RULES]
-    assert headline(found[-4:], False) == ("not flyable: departure (why), completion (why), speed (why), energy (why)")
-    assert headline(found, False).endswith(", +8 more")
+    assert headline(found[-4:], False) == (
+        "not flyable: departure (why), completion (why), landing (why), energy (why)"
+    )
+    assert headline(found, False).endswith(", +12 more")
     assert headline(found, False).startswith("not flyable: departure (why), completion (why), mission (why), slope (")
 
 
@@ -55,16 +59,36 @@ def test_terrain_that_was_not_judged_is_named_where_all_else_passes() -> None:
     assert headline([unknown], True) == "flyable; terrain not judged"
 
 
+def test_a_take_off_or_a_landing_that_was_not_judged_is_named_too() -> None:
+    terrain = make_finding("clearance", leg(0), ok=None, reason="")
+    ends = [make_finding(rule, waypoint(0), ok=None, reason="") for rule in ("takeoff", "landing")]
+    assert headline([ends[0]], True) == "flyable; take-off not judged"
+    assert headline([terrain, *ends], True) == "flyable; terrain not judged; take-off not judged; landing not judged"
+    assert headline([make_finding("takeoff", waypoint(1), ok=True, reason="")], True) == "flyable"
+
+
+def test_a_real_autopilot_is_named_by_its_version_its_digest_and_what_was_changed() -> None:
+    setup, given = make_setup([[0, 0, 300], [0, 2000, 300]]), {f"P{k}": float(k) for k in range(40)}
+    program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0826d539" + "e" * 56, given, {"P1": 1.0, "P2": 2.5})
+    assert flown_by(replace(setup, program=program)) == (
+        "ArduPlane V4.6.0-dev (7fbc1660) (sha256 0826d539...), 40 parameters set for aerosonde, changed: P1 1, P2 2.5"
+    )
+    assert flown_by(replace(setup, program=replace(program, changed={}))).endswith("changed: none")
+    # No more than eight by name.
+    assert flown_by(replace(setup, program=replace(program, changed=given))).endswith("P6 6, P7 7, +32 more")
+
+
 def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
-    setup = replace(make_setup(), nav="gnss")
-    lines = summary_lines([], True, replace(setup, parameters=default_parameters()), "flown")
+    setup = replace(make_setup([[0, 0, 300], [0, 2000, 300]]), nav="gnss")
+    levels = (LevelAnswer("autopilot", True, "flyable"),)
+    lines = summary_lines([], replace(setup, parameters=default_parameters()), "flown", levels)
     assert (
         "Flown by: ArduPlane's law with its default parameters (WP_RADIUS 90 m, NAVL1_PERIOD 17 s,"
         " TECS_HDEM_TCONST 3 s); navigation with GNSS's error (1.5 m on each axis)"
     ) in lines
     assert not [line for line in lines if line.startswith("Parameters")]
     mine = parameters_of("WP_RADIUS 50\n" + "".join(f"FOO{k} 1\n" for k in range(6)), "mine.parm")
-    lines = summary_lines([], True, replace(setup, parameters=mine), "flown")
+    lines = summary_lines([], replace(setup, parameters=mine), "flown", levels)
     assert any("with the parameters of mine.parm (WP_RADIUS 50 m" in line for line in lines)
     known = len(mine.values) - 1
     assert (

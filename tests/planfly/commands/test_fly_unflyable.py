@@ -26,9 +26,13 @@ def test_a_dive_into_the_ground(capsys: pytest.CaptureFixture[str]) -> None:
 def test_a_start_under_the_terrain(capsys: pytest.CaptureFixture[str]) -> None:
     write_scenario()
     write_mission(-5.0, 800.0, 800.0)
-    assert fly() == 2
-    error = capsys.readouterr().err.splitlines()[-1]
-    assert "m.waypoints: start at -5 m AMSL: not above the terrain, which is at 0 m" in error
+    assert fly() == 4
+    text = capsys.readouterr().out
+    assert text.startswith(
+        "not flyable: completion (not started: start at -5 m AMSL: not above the terrain, which is at 0 m"
+    )
+    assert "log       none: nothing was flown" in text
+    assert not Path("f.mcap").exists()
 
 
 # ln(4 - t) is minus infinity from the fourth second on, and no number soon after.

@@ -49,7 +49,12 @@ def test_the_verdict_file_has_findings_of_every_rule(demo: Path) -> None:
     verdict = json.loads((demo / "verdict.json").read_text(encoding="utf-8"))
     assert verdict["flyable"] is True
     assert verdict["complete"] is True
-    assert {finding["rule"] for finding in verdict["findings"]} == set(RULES) - {"mission", "loiter"}
+    assert {finding["rule"] for finding in verdict["findings"]} == set(RULES) - {
+        "mission",
+        "loiter",
+        "takeoff",
+        "landing",
+    }
     numbers = ["planned", "flown", "limit", "tolerance", "margin", "unit"]
     words, data = ["where", "reason", "brief", "suggestion"], ["place", "placed", "suggestions", "check"]
     keys = ["rule", *numbers, "limit_source", "method", "ok", *words, *data]

@@ -62,7 +62,7 @@ def test_kill_density_is_that_of_all_missiles(seed: int, many: tuple[int, float]
         a, b = line_of(rng, kind)
         length = float(np.linalg.norm(b - a))
         first, last, within = rng.uniform(0.0, 400.0, 3) * [1.0, 1.0, 0.1]
-        dose, near_a, near_b = kill_density(missiles, MARGIN, within, *a, *b, first, last)
+        dose, near_a, near_b = kill_density(missiles, MARGIN, within, *a, *b, first, last, 0.0, 0.0)
         inside = nearest(a, b - a) < 1.0
         expected = sum(
             segment_exposure(a, b, centre, unit["kill_radius"] + MARGIN, unit["kill_scale"])[1]
@@ -78,4 +78,24 @@ def test_kill_density_is_that_of_all_missiles(seed: int, many: tuple[int, float]
 
 def test_no_missiles_at_all() -> None:
     missiles = make_missile_index(np.zeros(0, dtype=THREAT))
-    assert kill_density(missiles, MARGIN, 30.0, *np.zeros(3), *np.ones(3), 1.0, 1.0) == (0.0, math.inf, math.inf)
+    assert kill_density(missiles, MARGIN, 30.0, *np.zeros(3), *np.ones(3), 1.0, 1.0, 0.0, 0.0) == (
+        0.0,
+        math.inf,
+        math.inf,
+    )
+
+
+@pytest.mark.parametrize("over", [300.0, -300.0])
+def test_a_flight_below_or_above_its_leg_comes_nearer(over: float) -> None:
+    """A level leg 400 m beside a missile of 480 m and 300 m over or under it keeps 500 - 480 = 20 m."""
+    unit = np.zeros(1, dtype=THREAT)
+    unit["kill_radius"], unit["kill_scale"] = 480.0, 100.0
+    missiles = make_missile_index(unit)
+    line = (-2000.0, 400.0, over, 2000.0, 400.0, over)
+    # 24 m lower (higher) it is math.hypot(400, 276) = 486 m away, 27 m so 484.4; the margin takes 5 m.
+    for shift, hit in ((24.0, False), (27.0, True)):
+        toward = (shift, 0.0) if over > 0.0 else (0.0, shift)
+        assert (kill_density(missiles, 5.0, 0.0, *line, 0.0, 0.0, *toward)[0] > 0.0) == hit
+        assert kill_density(missiles, 5.0, 0.0, *line, 0.0, 0.0, *toward[::-1])[0] == 0.0
+    # A leg that may be flown as low as the missile comes no nearer than that.
+    assert kill_density(missiles, -85.0, 0.0, *line, 0.0, 0.0, 2000.0, 2000.0)[0] == 0.0

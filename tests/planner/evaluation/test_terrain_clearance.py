@@ -78,9 +78,13 @@ def test_steps_over_the_ground_leave_nothing_out(scenario: Scenario, limits: Lim
         step = slopes.max() * required.sample_pitch + abs(rise) / run * required.sample_pitch
         for off in (0.5, -step):
             height = wanted + off
-            depth = terrain_excess(
-                rough, data.slope_bounds, required, tuple(ends), a[0], a[1], height, b[0], b[1], height + rise
-            )
+            line = a[0], a[1], height, b[0], b[1], height + rise
+            depth = terrain_excess(rough, data.slope_bounds, required, 0.0, tuple(ends), *line)
             assert (depth > 0.0) == (off < 0.0)
+            # With more wanted by what it is clear, or less by what it is deep and a step between samples.
+            more = terrain_excess(
+                rough, data.slope_bounds, required, step if off > 0.0 else -step - 0.5, tuple(ends), *line
+            )
+            assert (more > 0.0) == (off > 0.0)
             both[int(depth > 0.0)] += 1
     assert both.min() > 100

@@ -110,6 +110,17 @@ def test_options_that_cannot_work_are_refused(
     assert "\n" not in str(caught.value)
 
 
+def test_a_wind_of_more_than_eighty_percent_of_the_airspeed_is_refused(
+    make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]
+) -> None:
+    flight = {"airspeed_mps": 25.0}
+    scenario = small(wind={"speed_mps": 20.1}, flight=flight)
+    with pytest.raises(ScenarioError, match=r"small: wind\.speed_mps: 20\.1: .* at most 80% of the airspeed 25"):
+        plan_path(scenario, make_limits(scenario), seed=1)
+    strong = small(wind={"speed_mps": 20.0}, flight=flight, planner={"waypoints": 4, "population": 4, "generations": 1})
+    assert plan_path(strong, make_limits(strong), seed=1).waypoints.shape == (4, 3)
+
+
 def test_limit_below_what_plans_keep_is_refused(
     make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]
 ) -> None:

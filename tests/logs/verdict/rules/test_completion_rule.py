@@ -60,7 +60,7 @@ def test_a_circle_beside_a_leg_is_not_the_leg(setup: FlightSetup, track: Track) 
     late["time"] += ticks / 60.0
     first = {name: column[:k] for name, column in columns.items()}
     looped = join_tracks([Track(**first), Track(**circle), Track(**late)])
-    assert "left leg 1 by 220 m" in of(judge(setup, looped), "completion").reason
+    assert "220 m off the legs" in of(judge(setup, looped), "corridor", leg(1)).reason
 
 
 def test_one_moved_row_is_a_contradiction(setup: FlightSetup, track: Track) -> None:

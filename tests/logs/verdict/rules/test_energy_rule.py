@@ -18,7 +18,7 @@ from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.places import FLIGHT
 from logs.verdict.rules.energy_rule import air_angle, predicted_energy
 from tests.logs.verdict.judging import failing, judge, of
-from tests.synthetic import fly_path, make_scenario, make_setup
+from tests.synthetic import bank_radius, fly_path, make_scenario, make_setup
 from world.scenario import Scenario
 
 AEROSONDE = load_aircraft("aerosonde")
@@ -83,6 +83,27 @@ def test_what_is_not_known_is_not_judged() -> None:
     assert of(judge_geometry(make_setup(ROUTE)), "energy").ok is None
     fast = replace(real_setup(), route=replace(real_setup().route, airspeed=np.full(3, 60.0)))
     assert of(judge_geometry(fast), "energy").ok is None
+
+
+def test_a_jump_without_end_needs_more_than_any_battery() -> None:
+    """A square of 2 km flown 1, 2, 3, 4, 2, 3, 4: its round goes from 4 to 2, 3 and 4 again."""
+    square = [[0, 0, 500], [0, 2000, 500], [2000, 2000, 500], [2000, 0, 500]]
+    setup = make_setup([*square, *square[1:]], table=load_envelope(AEROSONDE))
+    items = np.array([1, 2, 3, 4, 2, 3, 4])
+    endless = replace(setup, route=replace(setup.route, items=items, endless=5), battery=1000.0)
+    bounded = replace(setup, route=replace(setup.route, items=items), battery=1000.0)
+    assert of(judge_geometry(bounded), "energy").ok
+    item = of(judge_geometry(endless), "energy", FLIGHT)
+    assert item.ok is False
+    # Its legs are 2000 sqrt 2, 2000 and 2000 m, less what arcs of radius R cut off, 2 R tan(turn / 2) - R turn: of the
+    # 135 degrees at 4, where it begins, half, of those at 2 and of the 90 at 3 all.
+    radius, sharp, right = bank_radius(), math.radians(135.0), math.radians(90.0)
+    cut = 1.5 * (2.0 * math.tan(sharp / 2.0) - sharp) + 2.0 * math.tan(right / 2.0) - right
+    power = endless.envelope.power(25.0, 500.0, 0.0)
+    rounds = 800.0 / (power * (2000.0 * math.sqrt(2.0) + 4000.0 - cut * radius) / 25.0 / 3600.0)
+    said = int(item.reason.split("lasts for ")[1].split(" rounds")[0])
+    assert said == pytest.approx(rounds, abs=0.6)
+    assert item.brief.startswith("the jump of item 5 has no end")
 
 
 def test_an_aircraft_that_burns_fuel_has_no_current() -> None:

@@ -1,4 +1,4 @@
-"""What PX4's feasibility checker refuses, found by the names of its checks."""
+"""What PX4's feasibility checker refuses, found by the names of its checks, and which of it no autopilot flies."""
 
 import pytest
 
@@ -21,6 +21,7 @@ def of(check: str, *lines: str, home: str = "36.5 -84.2 300") -> Finding:
     return found[0]
 
 
+NOBODY = ("unsupported", "spline")  # of these: what ArduPlane does not take either
 REFUSED = {
     "gate": (
         "checkDistancesBetweenWaypoints",
@@ -84,14 +85,24 @@ REFUSED = {
 def test_px4_refuses(case: str) -> None:
     check, lines, item, words = REFUSED[case]
     finding = of(check, *lines)
-    assert finding.ok is False
+    assert finding.ok is (False if case in NOBODY else None)
     assert finding.place == Place("mission", item=item)
     assert words in finding.reason
 
 
+@pytest.mark.parametrize("case", sorted(REFUSED))
+def test_px4s_own_limits_are_named_and_are_no_verdict_on_the_aircraft(case: str) -> None:
+    check, lines, _, _ = REFUSED[case]
+    verdict = judge_geometry(setup_of(*lines))
+    named = [line for line in verdict.lines if line.startswith("PX4 would not take it: ") and check in line]
+    assert len(named) == (0 if case in NOBODY else 1), verdict.lines
+    assert not [item for item in verdict.findings if item.rule == "mission" and item.ok is False] or case in NOBODY
+
+
 def test_first_waypoint_too_far() -> None:
     finding = of("checkDistanceToFirstWaypoint", wp(0, 500), wp(0, 1500), home=HOME_FAR)
-    assert finding.ok is False
+    assert finding.ok is None
+    assert judge_geometry(setup_of(wp(0, 500), wp(0, 1500), home=HOME_FAR)).flyable
     assert "first waypoint too far away: 179" in finding.reason
 
 

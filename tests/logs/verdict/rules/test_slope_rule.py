@@ -161,3 +161,70 @@ def test_a_narrower_envelope_is_not_the_scenario(setup: FlightSetup) -> None:
     weak = replace(setup, limits=replace(setup.limits, envelope=envelope(climb_deg=1.5)))
     item = of(judge(weak, fly_path(weak)), "slope", leg(1))
     assert (item.ok, item.limit_source) == (False, "aircraft")
+
+
+def stairs(rise: float, run: float, count: int = 1, between: float = 5.0) -> np.ndarray:
+    """Level, then so many steps of a rise over a run with level pieces between them, then level."""
+    points = [[0.0, 0.0, 300.0], [0.0, 1500.0, 300.0]]
+    for k in range(count):
+        _, north, up = points[-1]
+        points.append([0.0, north + run, up + rise])
+        if k + 1 < count:
+            points.append([0.0, north + run + between, up + rise])
+    return np.array([*points, [0.0, points[-1][1] + 1500.0, points[-1][2]]])
+
+
+@pytest.mark.parametrize(("rise", "ok"), [(6.0, True), (9.9, True), (-9.9, True), (10.1, False), (-10.1, False)])
+def test_a_step_is_flown_within_its_own_height(rise: float, ok: bool) -> None:
+    setup = make_setup(stairs(rise, 12.0))
+    item = of(judge_geometry(setup), "slope", leg(1))
+    assert item.ok is ok
+    assert item.planned is not None
+    assert abs(item.planned) > 25.0
+    assert (f"a step of {abs(rise):.1f} m" in item.reason) is ok
+    assert of(judge(setup, fly_path(setup)), "slope", leg(1)).ok is ok
+
+
+def test_a_staircase_is_as_high_as_its_stairs_together() -> None:
+    # Two steps of 6 m within 29 m climb 22 degrees; 200 m apart, 3 degrees.
+    assert failing(judge_geometry(make_setup(stairs(6.0, 12.0, 2)))) == {("slope", leg(1)), ("slope", leg(3))}
+    assert judge_geometry(make_setup(stairs(6.0, 12.0, 2, between=200.0))).flyable
+
+
+@pytest.mark.parametrize(("high", "short"), [(10.4, False), (-9.6, True)])
+def test_a_height_off_the_leg_is_told_and_no_fault(high: float, short: bool) -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300], [0, 4000, 300]])
+    track = fly_path(setup, up=lambda s: high * np.exp(-0.5 * ((s - 3000.0) / 300.0) ** 2))
+    item = of(judge(setup, track), "slope", leg(1))
+    assert item.ok
+    assert {fact.what: fact.value for fact in item.facts}["height error"] == pytest.approx(high, abs=0.01)
+    assert f"height within {abs(high):.1f} m of the leg" in item.reason
+    # Without the aircraft's limits it shows one: 10 m.
+    assert of(judge(setup, track, envelope=False), "slope", leg(1)).ok is short
+
+
+@pytest.mark.parametrize(("off", "ok"), [(0.55, True), (0.75, False)])
+def test_a_slope_off_the_plan_is_told(off: float, ok: bool) -> None:
+    """Half a degree, and 0.1 degrees of what a fit in calm air cannot resolve."""
+    setup = make_setup(hill(6.0))
+    lost = math.tan(math.radians(6.0)) - math.tan(math.radians(6.0 - off))
+    track = fly_path(setup, up=lambda s: -lost * (np.clip(s - 1000.0, 0.0, 2000.0) - 1000.0))
+    item = of(judge(setup, track), "slope", leg(1))
+    assert item.ok
+    assert {fact.what: fact.value for fact in item.facts}["slope error"] == pytest.approx(-off, abs=0.02)
+    bare = of(judge(setup, track, envelope=False), "slope", leg(1))
+    assert ("instead of" not in bare.reason) is ok
+
+
+def test_throttle_at_a_limit_is_told() -> None:
+    setup = make_setup(hill(6.0))
+
+    def there(s: np.ndarray) -> np.ndarray:
+        return (s > 1400.0) & (s < 2900.0)
+
+    track = fly_path(setup, throttle=lambda s: 0.5 * there(s), airspeed=lambda s: -2.0 * there(s))
+    item = of(judge(setup, track), "slope", leg(1))
+    facts = {fact.what: fact.value for fact in item.facts}
+    # 1,500 m at 23 m/s.
+    assert facts["throttle at full"] == pytest.approx(1500.0 / 23.0, abs=0.5)
+    assert facts["too slow"] == pytest.approx(2.0, abs=0.1)

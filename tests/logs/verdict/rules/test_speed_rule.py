@@ -1,7 +1,11 @@
-"""Airspeed: commanded within the envelope, and flown near the command."""
+"""Airspeed: commanded within the envelope; what was flown, and what a leg has no room for, is told."""
+
+import math
+from dataclasses import replace
 
 import pytest
 
+from flight.ardupilot.parameters import default_parameters
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
@@ -10,16 +14,72 @@ from tests.synthetic import (
     make_setup,
 )
 
+STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
 
-def test_speed(setup: FlightSetup) -> None:
-    assert of(judge(setup, fly_path(setup, airspeed=lambda s: 0.0 * s + 0.8)), "speed", leg(0)).ok
-    verdict = judge(setup, fly_path(setup, airspeed=lambda s: 0.0 * s + 1.4))
-    assert {("speed", leg(k)) for k in range(4)} <= failing(verdict)
-    fast = make_setup(ROUTE, airspeed=33.0)
-    item = of(judge_geometry(fast), "speed", leg(0))
-    assert (item.ok, item.limit, item.limit_source) == (False, 32.0, "aircraft")
+
+@pytest.mark.parametrize(
+    ("speed", "ok", "limit"), [(31.9, True, 32.0), (32.1, False, 32.0), (16.1, True, 16.0), (15.9, False, 16.0)]
+)
+def test_the_commanded_speed_is_within_level_flight(speed: float, ok: bool, limit: float) -> None:
+    setup = make_setup(STRAIGHT, airspeed=speed)
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        item = of(verdict, "speed", leg(0))
+        assert (item.ok, item.limit, item.limit_source) == (ok, limit, "aircraft")
+        assert item.margin == pytest.approx(min(speed - 16.0, 32.0 - speed))
+
+
+@pytest.mark.parametrize(("off", "shown"), [(0.9, False), (-0.9, False), (1.1, True), (-1.1, True)])
+def test_a_speed_off_its_command_is_told_and_no_fault(off: float, shown: bool) -> None:
+    setup = make_setup(STRAIGHT)
+    track = fly_path(setup, airspeed=lambda s: 0.0 * s + off)
+    item = of(judge(setup, track), "speed", leg(0))
+    assert item.ok
+    assert item.flown == pytest.approx(25.0 + off, abs=0.01)
+    assert [(fact.what, fact.unit) for fact in item.facts] == [("speed error", "m/s")]
+    assert item.facts[0].value == pytest.approx(off, abs=0.01)
+    assert ("off the commanded 25.0 m/s" in item.reason) is shown
+    # It shows a limit only where the aircraft's are left out.
+    assert (("speed", leg(0)) in failing(judge(setup, track, envelope=False))) is shown
+
+
+def test_arduplane_takes_a_command_for_equivalent_airspeed() -> None:
+    """At 1,000 m, 1.225 by 1.112 kg/m^3 (US Standard Atmosphere, 1976): 31 m/s are 32.5, above the fastest 32."""
+    for up, ok in ((0.0, True), (1000.0, False)):
+        points = [[e, n, up] for e, n, _ in STRAIGHT]
+        made = make_setup(points, airspeed=31.0, terrain={"kind": "flat", "amsl_m": -400.0})
+        setup = replace(made, parameters=default_parameters())
+        item = of(judge_geometry(setup), "speed", leg(0))
+        true = 31.0 * math.sqrt(1.225 / (1.225 if up == 0.0 else 1.112))
+        assert (item.ok, item.planned) == (ok, pytest.approx(true, rel=1e-3))
+        assert of(judge_geometry(made), "speed", leg(0)).ok
+        assert (f"31.0 m/s of equivalent airspeed, {true:.1f} m/s of true airspeed," in item.reason) is not ok
+
+
+def test_each_leg_has_its_own() -> None:
     changed = make_setup(ROUTE, speeds=[25.0, 20.0, 25.0, 25.0])
     assert of(judge(changed, fly_path(changed)), "speed", leg(1)).flown == pytest.approx(20.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("run", "room"), [(638.0, True), (636.0, False), (300.0, False)])
+def test_a_speed_that_the_leg_has_no_room_for_is_told(run: float, room: bool) -> None:
+    """From 18 to 31 m/s at 0.5 m/s^2 takes 26 s, at 24.5 m/s on average 637 m; after 300 m, sqrt(18^2 + 300) m/s."""
+    setup = make_setup([[0, 0, 300], [0, 1000, 300], [0, 1000 + run, 300], [0, 3000, 300]], speeds=[18.0, 31.0, 31.0])
+    track = fly_path(setup, airspeed=lambda s: -1.3 * ((s > 1000.0) & (s < 1000.0 + run)))
+    for verdict in (judge_geometry(setup), judge(setup, track)):
+        item = of(verdict, "speed", leg(1))
+        assert item.ok
+        assert ("takes about 26 s and 637 m, and the leg has" in item.reason) is not room
+        if run == 300.0:
+            assert "about 25.0 m/s are reached on it" in item.reason
+    if run == 300.0:
+        flown = of(judge(setup, track), "speed", leg(1))
+        assert flown.flown == pytest.approx(29.7, abs=0.05)
+        assert "29.7 m/s reached; the leg is too short to hold it" in flown.reason
+
+
+def test_a_leg_that_was_not_flown_is_not_judged(setup: FlightSetup) -> None:
+    verdict = judge(setup, fly_path(setup, stop=3000.0))
+    assert [of(verdict, "speed", leg(k)).ok for k in range(4)] == [True, True, None, None]
 
 
 def test_wind_that_leaves_no_way() -> None:

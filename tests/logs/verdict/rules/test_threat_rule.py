@@ -1,6 +1,8 @@
 """Time and exposure inside missiles and radars, exact at any rate of rows."""
 
 import math
+from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -56,3 +58,26 @@ def test_a_flight_into_a_sphere_that_the_plan_avoids_fails() -> None:
     assert judge_geometry(setup).flyable
     verdict = judge(setup, fly_path(setup, across=bump(1000.0, 14.0, 60.0)))
     assert ("threat", missile("Alfa")) in failing(verdict)
+
+
+@pytest.mark.parametrize(("nav", "away", "luck"), [("gnss", 4.4, True), ("gnss", 4.6, False), ("perfect", 0.4, False)])
+def test_a_sphere_missed_by_less_than_navigation_may_be_off_is_luck(nav: Any, away: float, luck: bool) -> None:
+    """Three standard deviations of 1.5 m."""
+    made = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": 500.0 + away}])
+    setup = replace(made, nav=nav)
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        assert verdict.flyable
+        assert (f"a missile missed by {away:.1f} m, less than the navigation error" in verdict.headline) is luck
+        item = of(verdict, "threat", FLIGHT)
+        facts = {fact.what: fact.value for fact in item.facts}
+        assert facts["nearest"] == pytest.approx(away, abs=1e-3)
+        assert facts.get("navigation error") == (4.5 if nav == "gnss" else None)
+        assert f"the nearest, Alfa, stays {away:.1f} m away" in item.reason
+        assert (f"{away - 4.5:.1f} m less the 4.5 m that navigation may be off" in item.reason) is (nav == "gnss")
+
+
+@pytest.mark.parametrize(("aside", "ok"), [(499.9, False), (500.1, True)])
+def test_a_sphere_is_as_large_as_it_is(aside: float, ok: bool) -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]], threats=[MISSILE | {"east_m": aside}])
+    for verdict in (judge_geometry(setup), judge(setup, fly_path(setup))):
+        assert verdict.flyable is ok

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.measures.track_alignment import lay_track
@@ -74,13 +75,22 @@ def test_flown_evidence_alone_fails_a_turn() -> None:
     assert of(verdict, "turn", waypoint(2)).limit_source == "none"
 
 
-@pytest.mark.parametrize(("height", "ok"), [(-3.0, True), (-12.0, False), (8.0, True)])
+def fact(item: Finding, what: str) -> float:
+    (found,) = [one.value for one in item.facts if one.what == what]
+    return found
+
+
+@pytest.mark.parametrize(("height", "ok"), [(-4.8, True), (-5.2, False), (8.0, True)])
 def test_overshoot(setup: FlightSetup, height: float, ok: bool) -> None:
+    """Told, and no fault; it shows a limit only where those of the aircraft are left out."""
     # Waypoint 1 turns right, so its outside is the left; 60 m after its arc, long before the next turn.
     after = float(waypoint_stations(setup)[1]) + bank_radius() * math.pi / 8 + 60.0
     track = fly_path(setup, across=bump(after, height, 25.0))
     item = of(judge(setup, track), "turn", waypoint(1))
-    assert item.ok is ok
+    assert item.ok
+    assert fact(item, "overshoot") == pytest.approx(max(0.0, -height), abs=0.1)
+    assert f"overshoot {max(0.0, -height):.1f} m" in item.reason
+    assert of(judge(setup, track, envelope=False), "turn", waypoint(1)).ok is ok
     demands = route_demands(setup)
     flown = lay_track(demands, track)
     assert flown is not None
@@ -90,20 +100,48 @@ def test_overshoot(setup: FlightSetup, height: float, ok: bool) -> None:
 def test_an_overshoot_within_the_arc_is_seen(setup: FlightSetup) -> None:
     middle = float(waypoint_stations(setup)[3])
     verdict = judge(setup, fly_path(setup, across=bump(middle, -8.0, 25.0)))
+    assert of(verdict, "turn", waypoint(3)).ok
     assert "overshoots its arc by 8 m" in of(verdict, "turn", waypoint(3)).reason
 
 
-@pytest.mark.parametrize(("offset", "ok"), [(0.6, True), (-0.6, True), (1.6, False), (-1.6, False)])
+@pytest.mark.parametrize(("offset", "ok"), [(0.9, True), (-0.9, True), (1.15, False), (-1.15, False)])
 def test_a_turn_is_settled_before_the_next(setup: FlightSetup, offset: float, ok: bool) -> None:
     next_turn = float(waypoint_stations(setup)[2]) - bank_radius() * math.pi / 8
     track = fly_path(setup, across=bump(next_turn - 12.0, offset, 200.0))
-    assert of(judge(setup, track), "turn", waypoint(1)).ok is ok
+    item = of(judge(setup, track), "turn", waypoint(1))
+    assert item.ok
+    assert fact(item, "settled") == pytest.approx(abs(offset), abs=0.05)
+    assert of(judge(setup, track, envelope=False), "turn", waypoint(1)).ok is ok
     gusty = make_setup(ROUTE, wind={"turbulence": "moderate"})
     # A standard deviation of the gusts, 1.54 m/s, widens the arcs that are planned in them.
     wide = bank_radius(26.54)
     next_turn = float(waypoint_stations(gusty, wide)[2]) - wide * math.pi / 8
     track = fly_path(gusty, radius=wide, across=bump(next_turn - 12.0, offset, 200.0))
-    assert of(judge(gusty, track), "turn", waypoint(1)).ok
+    assert of(judge(gusty, track, envelope=False), "turn", waypoint(1)).ok
+
+
+def sidestep(aside: float) -> list[list[float]]:
+    """Right angles to the right and back, this far apart, in a straight line of 2 km."""
+    return [[0, 0, 300], [0, 1000, 300], [aside, 1000, 300], [aside, 2000, 300]]
+
+
+@pytest.mark.parametrize(
+    ("aside", "corridor", "ok"),
+    # The straight way past both passes them by half the sidestep; a quarter of the corridor is near enough.
+    [(5.0, 30.0, True), (14.9, 30.0, True), (15.2, 30.0, False), (39.5, 80.0, True), (40.5, 80.0, False)],
+)
+def test_a_jog_that_the_corridor_has_room_for(aside: float, corridor: float, ok: bool) -> None:
+    setup = make_setup(sidestep(aside), limits={"corridor_m": corridor})
+    verdict = judge_geometry(setup)
+    assert [of(verdict, "turn", waypoint(k)).ok for k in (1, 2)] == [ok, ok]
+    if ok:
+        assert "a jog: the way without it passes it at" in of(verdict, "turn", waypoint(1)).reason
+
+
+def test_a_corner_between_short_legs_is_no_jog_where_the_way_without_it_turns_as_sharply() -> None:
+    # A hairpin 5 m wide: without either of its right angles the way turns back on itself at the other.
+    setup = make_setup([[0, 0, 300], [0, 1000, 300], [5, 1000, 300], [5, 20, 300]])
+    assert ("turn", waypoint(1)) in failing(judge_geometry(setup))
 
 
 def test_short_legs_name_their_method() -> None:

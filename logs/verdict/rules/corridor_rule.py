@@ -1,0 +1,57 @@
+"""The corridor rule: the greatest distance of the flight from the legs, its turns included."""
+
+import math
+
+from logs.verdict.findings import Finding, make_finding, message, reason_of
+from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import Place
+from logs.verdict.tolerances import ROUNDING
+
+
+def corridor_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge how far from the legs the flight of each leg got; ``geometric``: how far its planned turns lead."""
+    return [_corridor(demands, aligned, leg, geometric) for leg in range(demands.legs)]
+
+
+def _corridor(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+    limit, source = corridor_limit(demands, leg)
+    planned, flown, ok = float(corner_depths(demands)[leg : leg + 2].max()), math.nan, None
+    faults, facts = [], []
+    if geometric:
+        ok = planned <= limit + ROUNDING
+        facts.append(f"its turns are planned within {planned:.1f} m of the legs")
+        if not ok:
+            faults.append(message(f"its turns lead {planned:.0f} m off the legs", f"; the corridor is {limit:.0f} m"))
+    elif aligned is None or not aligned.flew(leg):
+        facts.append("the leg was not flown")
+    else:
+        rows = aligned.leg_rows(leg)
+        near = slice(max(0, leg - 1), min(demands.legs, leg + 2) + 1)
+        flown, row = farthest_from_legs(aligned.track.position[rows], demands.points[near])
+        ok = flown <= limit
+        where = _when_and_where(aligned, rows.start + row)
+        facts.append(f"within {flown:.1f} m of the legs, the farthest {where}")
+        if not ok:
+            faults.append(message(f"{flown:.0f} m off the legs {where}", f"; the corridor is {limit:.0f} m"))
+    return make_finding(
+        "corridor",
+        Place("leg", leg),
+        ok=ok,
+        reason=reason_of(faults) if faults else reason_of([], facts),
+        faults=faults,
+        planned=planned,
+        flown=flown,
+        limit=limit,
+        source=source,
+        tolerance=ROUNDING if geometric else 0.0,
+        margin=limit - (planned if geometric else flown),
+        unit="m",
+        method="the turns' own arcs" if geometric else "greatest distance from the leg and its neighbours, each row",
+    )
+
+
+def _when_and_where(aligned: AlignedTrack, row: int) -> str:
+    east, north, _ = aligned.track.position[row]
+    return f"at {aligned.track.time[row]:.1f} s, east {east:.0f} m, north {north:.0f} m"

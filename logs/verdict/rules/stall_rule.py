@@ -1,0 +1,129 @@
+"""The stall rule: airspeed against the stall in a bank, which the load factor raises.
+
+A level turn with bank b takes a lift of n = 1 / cos b weights, and the slowest speed that carries it is the slowest of
+level flight times the root of n (Beard and McLain, *Small Unmanned Aircraft*, section 5.1; any text on the level turn).
+All speeds are true airspeeds at the height where they are flown, as those of the envelope are: that the air is thinner
+there is in them, and an autopilot's equivalent airspeeds are taken to true ones first.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from aircraft.path_limits import ROLL_TIME
+from flight.simulation.track import ROLL
+from logs.verdict.findings import Finding, make_finding, message
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT
+from logs.verdict.tolerances import GUST_SHARE, STALL_MEAN, STALL_TOLERANCE
+from world.wind import W20
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Margin:
+    """An airspeed, the stall in this bank (rad) and in level flight; m/s true."""
+
+    speed: float
+    stall: float
+    level: float
+    bank: float
+
+    @property
+    def left(self) -> float:
+        """How far above the stall, m/s."""
+        return self.speed - self.stall
+
+
+def stall_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """One finding: the least margin of airspeed over the stall in a bank; none for a route without a turn."""
+    if geometric:
+        return _planned(demands)
+    return [] if aligned is None else _flown(demands, aligned)
+
+
+def _planned(demands: RouteDemands) -> list[Finding]:
+    worst: tuple[float, int, _Margin] | None = None
+    for i in range(1, demands.legs):
+        for speed in demands.route.airspeed[i - 1 : i + 1].tolist():
+            bank, level = planned_bank(demands, i, speed), level_stall(demands, float(demands.points[i, 2]))
+            found = _Margin(speed, level / math.sqrt(math.cos(bank)), level, bank)
+            if bank > 0.0 and math.isfinite(level) and (worst is None or found.left < worst[0]):
+                worst = found.left, i, found
+    if worst is None:
+        return []
+    _, i, found = worst
+    return [_finding(found, f"at waypoint {i}", 0.0, geometric=True)]
+
+
+def planned_bank(demands: RouteDemands, i: int, speed: float) -> float:
+    """Bank (rad) that the turn at a waypoint takes at an airspeed (m/s) of its two legs, at most the bank limit.
+
+    On an arc of radius R it is atan(v^2 / (g R)) at the highest ground speed v on the way, and a turn that is over
+    before the aircraft has rolled into it takes no more than it can roll to.
+    """
+    turn, radius, limit = abs(float(demands.turns[i])), float(demands.radius[i]), demands.limits.max_bank
+    if turn <= 0.0 or not math.isfinite(radius):
+        return 0.0
+    # The bank limit's radius is that of the faster leg's ground speed.
+    fastest = math.sqrt(float(demands.tightest[i]) * GRAVITY * math.tan(limit))
+    slower = max(demands.route.airspeed[i - 1 : i + 1]) - speed
+    bank = math.atan(max(0.0, fastest - slower) ** 2 / (GRAVITY * radius))
+    # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
+    rolled = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))
+    return min(bank, rolled, limit)
+
+
+def level_stall(demands: RouteDemands, up: float) -> float:
+    """Slowest level flight at a height (m AMSL), m/s true: the elevator is at its stop there."""
+    return demands.setup.envelope.level_speeds(up)[0]
+
+
+def _flown(demands: RouteDemands, aligned: AlignedTrack) -> list[Finding]:
+    track = aligned.track
+    width = max(1, min(len(track), round(STALL_MEAN / aligned.tick())))
+    speed, load = _means(track.airspeed, width), _means(track.load_factor, width)
+    bank = _means(np.abs(track.attitude[:, ROLL]), width)
+    up = _means(track.position[:, 2], width)
+    envelope = demands.setup.envelope
+    level = np.interp(up, envelope.amsl, envelope.level_speed_min)
+    # What the wing carried, or what it had to carry for the height to be held in a turn within the bank limit.
+    carried = np.maximum(load, 1.0 / np.cos(np.minimum(bank, demands.limits.max_bank)))
+    stall = level * np.sqrt(np.maximum(carried, 0.0))
+    if not np.isfinite(stall).any():
+        return []
+    k = int(np.nanargmin(speed - stall))
+    tolerance = STALL_TOLERANCE + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
+    found = _Margin(float(speed[k]), float(stall[k]), float(level[k]), float(bank[k]))
+    return [_finding(found, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
+
+
+def _means(values: NDArray[np.floating], width: int) -> Floats:
+    """Mean over each window of so many rows."""
+    total = np.concatenate([[0.0], np.cumsum(values.astype(np.float64))])
+    return np.asarray((total[width:] - total[:-width]) / width)
+
+
+def _finding(found: _Margin, where: str, tolerance: float, *, geometric: bool) -> Finding:
+    stall = f"{found.speed:.1f} m/s {where}, stall {found.stall:.1f} m/s in {math.degrees(found.bank):.0f}° of bank"
+    fault = message(stall, f" (level {found.level:.1f} m/s; true airspeeds)")
+    return make_finding(
+        "stall",
+        FLIGHT,
+        ok=found.left >= -tolerance,
+        reason=fault.text,
+        faults=[fault],
+        planned=found.speed if geometric else None,
+        flown=None if geometric else found.speed,
+        limit=found.stall,
+        source="aircraft",
+        tolerance=tolerance,
+        margin=found.left,
+        unit="m/s",
+        method="slowest level flight times the root of the load factor",
+    )

@@ -1,0 +1,53 @@
+"""The flights beside an autopilot's: of the aircraft by planfly's guidance, and with other parameters."""
+
+from dataclasses import replace
+
+from aircraft.catalog import Aircraft
+from flight.ardupilot.parameters import ArduPilotParameters
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.simulate import simulate
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.levels import AirframeAnswer, DecidingParameter
+from logs.verdict.measures.route_demands import true_route
+from logs.verdict.places import FLIGHT
+from planfly.deciding_parameter import deciding_parameter
+from world.errors import StartError
+
+
+def airframe_answer(setup: FlightSetup, aircraft: Aircraft) -> AirframeAnswer:
+    """Fly a setup by planfly's guidance, which knows exactly where it is, and judge that flight.
+
+    It flies the same true airspeeds: those that ArduPlane takes for equivalent ones are higher the higher it flies.
+    """
+    same = true_route(setup)
+    ideal = replace(setup, parameters=None, program=None, guidance="path", nav="perfect", route=same)
+    try:
+        flown = simulate(ideal, aircraft)
+    except StartError as error:
+        return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
+    verdict = judge_flight(ideal, flown.track, flown.ended)
+    failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
+    return AirframeAnswer(verdict.flyable, verdict.headline, failed)
+
+
+def find_deciding_parameter(setup: FlightSetup, aircraft: Aircraft, verdict: Verdict) -> DecidingParameter | None:
+    """The parameter with another value of which a flight that failed passes; None where there is none.
+
+    verdict: on the flight with the setup's own parameters.  Takes about ten flights, by ArduPlane's law: what they show
+    of a real autopilot's flight is not known, and nothing is looked for.
+    """
+    if setup.parameters is None or setup.program is not None or verdict.flyable:
+        return None
+    # The corridor is as wide as it was, whatever radius is tried.
+    scenario = setup.scenario
+    limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
+    spec = scenario.spec.model_copy(update={"limits": limits})
+    same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
+
+    def passes(parameters: ArduPilotParameters) -> bool:
+        changed = replace(same, parameters=parameters)
+        flown = simulate(changed, aircraft)
+        return judge_flight(changed, flown.track, flown.ended).flyable
+
+    return deciding_parameter(setup.parameters, verdict.findings, passes)

@@ -1,0 +1,67 @@
+"""Options that several commands take."""
+
+import argparse
+
+from planfly.terminal.argument_types import positive, wind
+
+
+def overwrite_option(parser: argparse.ArgumentParser) -> None:
+    """Whether results may replace files."""
+    parser.add_argument("--overwrite", action="store_true", help="replace named targets that exist")
+
+
+def world_options(parser: argparse.ArgumentParser) -> None:
+    """What a mission is judged in."""
+    parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
+    parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
+
+
+def flown_by_options(parser: argparse.ArgumentParser) -> None:
+    """What flies it, in which wind."""
+    parser.add_argument("--aircraft", metavar="A", help="the aircraft, in place of the scenario's (default: aerosonde)")
+    parser.add_argument(
+        "--airspeed", metavar="M/S", type=positive, help="until the mission sets one (default: the aircraft's cruise)"
+    )
+    parser.add_argument("--wind", metavar="SPEED,FROM", type=wind, help="steady wind, m/s and degrees it blows from")
+    parser.add_argument("--turbulence", choices=("none", "light", "moderate"), help="in place of the scenario's")
+
+
+def pilot_options(parser: argparse.ArgumentParser) -> None:
+    """Who flies it."""
+    parser.add_argument(
+        "--params", metavar="FILE", help="ArduPlane flies, with these parameters: as a ground station writes them"
+    )
+    parser.add_argument(
+        "--guidance",
+        choices=("path", "l1", "vector-field"),
+        help="planfly's guidance flies: its own law (path), L1 along the legs, or Beard and McLain's vector field",
+    )
+
+
+def steering_options(parser: argparse.ArgumentParser) -> None:
+    """Who flies it, and how well it knows where it is."""
+    pilot_options(parser)
+    parser.add_argument(
+        "--nav",
+        choices=("perfect", "rtk", "gnss"),
+        help="how well it knows where it is: errors of 0, 0.05 or 1.5 m on each axis (default: gnss for ArduPlane, "
+        "perfect for planfly's guidance)",
+    )
+
+
+def program_option(parser: argparse.ArgumentParser) -> None:
+    """Which real autopilot flies it."""
+    parser.add_argument(
+        "--autopilot",
+        metavar="PATH",
+        help="a real ArduPlane flies in our physics: its program, as built for software in the loop",
+    )
+
+
+def own_link_options(parser: argparse.ArgumentParser, *, bind: str) -> None:
+    """Where and with whom a vehicle speaks MAVLink."""
+    parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
+    parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
+    parser.add_argument(
+        "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
+    )

@@ -1,0 +1,17 @@
+"""How far from its waypoint an arc is taken to pass at most."""
+
+import math
+
+import pytest
+
+from logs.verdict.measures.route_demands import route_demands
+from tests.synthetic import bank_radius, make_setup
+
+
+@pytest.mark.parametrize(("turn", "radii"), [(175.9, None), (178.0, 30.0)])
+def test_a_fly_by_passes_its_waypoint_at_thirty_radii_at_most(turn: float, radii: float | None) -> None:
+    """R (1 / cos(turn / 2) - 1) up to about 176 degrees."""
+    angle = math.radians(turn)
+    points = [[0, 0, 300], [0, 9000, 300], [9000 * math.sin(angle), 9000 + 9000 * math.cos(angle), 300]]
+    expected = radii or 1.0 / math.cos(0.5 * angle) - 1.0
+    assert route_demands(make_setup(points)).fly_by_offset[1] == pytest.approx(expected * bank_radius(), rel=1e-6)

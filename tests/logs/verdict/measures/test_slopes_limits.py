@@ -1,0 +1,175 @@
+"""Which throttle counts as a limit, how long an ability takes to be seen, and how sure it is."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.measures.route_demands import RouteDemands, route_demands
+from logs.verdict.measures.slopes import (
+    Ability,
+    SlopeMeasure,
+    lifted_speed,
+    measure_ability,
+    measure_slope,
+    steady_rows,
+)
+from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from tests.synthetic import edited, fly_path, make_setup
+
+LEVEL = [[0, 0, 300], [0, 1000, 300], [0, 3000, 300], [0, 4000, 300]]
+FALLING = [[0, 0, 600], [0, 1000, 600], [0, 3000, 500], [0, 4000, 500]]
+# Where the throttle is moved, m along the path.
+THERE = 1500.0
+GRAVITY = 9.80665
+
+
+def laid(setup: FlightSetup, track: Track) -> tuple[RouteDemands, AlignedTrack]:
+    demands = route_demands(setup)
+    aligned = lay_track(demands, track)
+    assert aligned is not None
+    return demands, aligned
+
+
+def held(points: list[list[float]], throttle: float, power: float = 300.0) -> SlopeMeasure:
+    """The middle leg with 20 s at this throttle."""
+
+    def pushed(s: np.ndarray) -> np.ndarray:
+        return (throttle - 0.6) * ((s > THERE) & (s < THERE + 500.0))
+
+    setup = make_setup(points)
+    return measure_slope(*laid(setup, fly_path(setup, throttle=pushed, power=power)), 1)
+
+
+@pytest.mark.parametrize(("throttle", "seconds"), [(0.988, 0.0), (0.992, 20.0)])
+def test_the_throttle_is_full_from_ninety_nine_hundredths_on(throttle: float, seconds: float) -> None:
+    assert held(LEVEL, throttle).at_full == pytest.approx(seconds, abs=0.1)
+
+
+@pytest.mark.parametrize(("throttle", "seconds"), [(0.012, 0.0), (0.009, 20.0)])
+def test_the_throttle_is_idle_up_to_a_hundredth(throttle: float, seconds: float) -> None:
+    assert held(FALLING, throttle).at_idle == pytest.approx(seconds, abs=0.1)
+
+
+@pytest.mark.parametrize(("amperes", "idle"), [(0.022, False), (0.018, True)])
+def test_a_motor_without_current_is_idle(amperes: float, idle: bool) -> None:
+    assert (held(FALLING, 0.6, power=44.4 * amperes).at_idle > 10.0) is idle
+
+
+def ability(
+    seconds: float, *, throttle: float = 1.0, swing: float = 1.0, heave: float = 0.0
+) -> tuple[Ability | None, float]:
+    """What a level leg shows with so many seconds at a throttle, and the acceleration meanwhile (m/s^2).
+
+    The airspeed rises evenly from ``swing`` below the command to as much above it.  heave: m/s of air that rises and
+    sinks by turns, a row each.
+    """
+    run = 25.0 * seconds
+
+    def there(s: np.ndarray) -> np.ndarray:
+        return (s > THERE) & (s < THERE + run)
+
+    setup = make_setup(LEVEL)
+    track = fly_path(
+        setup,
+        throttle=lambda s: (throttle - 0.6) * there(s),
+        airspeed=lambda s: swing * np.clip(2.0 * (s - THERE) / run - 1.0, -1.0, 1.0),
+    )
+    wind = track.wind.copy()
+    wind[:, 2] = heave * np.where(np.arange(len(track)) % 2, 1.0, -1.0)
+    return measure_ability(*laid(setup, edited(track, wind=wind)), 1), 25.0 * 2.0 * swing / run
+
+
+@pytest.mark.parametrize(("throttle", "seen"), [(0.9985, False), (0.9995, True)])
+def test_an_ability_is_seen_at_the_whole_throttle(throttle: float, seen: bool) -> None:
+    assert (ability(10.0, throttle=throttle)[0] is not None) is seen
+
+
+@pytest.mark.parametrize(("seconds", "seen"), [(0.5 + 1.4, False), (0.5 + 1.65, True)])
+def test_an_ability_is_seen_over_a_second_and_a_half(seconds: float, seen: bool) -> None:
+    """Half a second after the throttle came to its limit."""
+    assert (ability(seconds)[0] is not None) is seen
+
+
+def test_an_ability_has_the_standard_error_of_independent_half_seconds() -> None:
+    """Its rate lies on a line over airspeed, so that all it is unsure of is the 0.02 m/s that rates are known to."""
+    found, push = ability(10.0)
+    assert found is not None
+    assert found.seconds == pytest.approx(9.5, abs=0.06)
+    # The command is a twentieth off the middle of the speeds seen, whose variance is a third: 1 + 0.05^2 / 0.3.
+    error = 0.02 * math.sqrt((1.0 + 0.05**2 / 0.3) / (9.5 / 0.5)) / 25.0
+    assert found.error == pytest.approx(error, rel=0.06)
+    assert found.slope == pytest.approx(math.asin(push / GRAVITY), rel=0.02)
+
+
+@pytest.mark.parametrize(("degrees", "sure"), [(0.27, True), (0.33, False)])
+def test_an_ability_with_a_large_error_says_nothing(degrees: float, sure: bool) -> None:
+    """Of 2.5 s, one is known to be 5 independent ones: heave of w has a standard error of w over root 5."""
+    heave = 25.0 * math.sin(math.radians(degrees)) * math.sqrt(5.0)
+    found, _ = ability(3.0, heave=heave)
+    assert (found is not None) is sure
+    if found is not None:
+        assert math.degrees(found.error) == pytest.approx(degrees, rel=0.1)
+
+
+@pytest.mark.parametrize(("swing", "seen"), [(1e-2, True), (1e-4, False)])
+def test_a_speed_that_hardly_changes_says_nothing_of_other_speeds(swing: float, seen: bool) -> None:
+    """The variance of speed is a third of the swing's square: 3e4 or 3e8 is the moments' condition."""
+    assert (ability(10.0, swing=swing)[0] is not None) is seen
+
+
+@pytest.mark.parametrize(("asked", "covered"), [(0.069, True), (0.071, False)])
+def test_an_ability_covers_a_slope_beyond_three_standard_errors(asked: float, covered: bool) -> None:
+    assert Ability(slope=0.10, error=0.01, seconds=20.0).covers(asked) is covered
+
+
+def test_a_leg_has_time_to_take_up_its_speed() -> None:
+    """5 m/s at half a metre per second squared: ten seconds."""
+    setup = make_setup(LEVEL, speeds=[20.0, 25.0, 25.0])
+    demands, aligned = laid(setup, fly_path(setup))
+    rows = steady_rows(demands, aligned, 1)
+    begun = aligned.track.time[aligned.leg_rows(1).start]
+    assert aligned.track.time[rows.start] - begun == pytest.approx(10.0, abs=0.02)
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.77, False), (0.83, True)])
+def test_a_window_with_four_fifths_at_the_limit_counts(share: float, counts: bool) -> None:
+    setup = make_setup(LEVEL)
+    # Full for a share of every 23 m, which is each second at 23 m/s, for 13 s.
+    track = fly_path(
+        setup,
+        throttle=lambda s: 0.4 * ((s - THERE) % 23.0 < 23.0 * share) * ((s > THERE) & (s < THERE + 300.0)),
+        airspeed=lambda s: 0.0 * s - 2.0,
+    )
+    measure = measure_slope(*laid(setup, track), 1)
+    assert measure.slow == pytest.approx(2.0 if counts else 0.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("seconds", "counts"), [(3.8, False), (4.2, True)])
+def test_the_window_is_five_seconds_long(seconds: float, counts: bool) -> None:
+    """Four of five seconds are four fifths."""
+    setup = make_setup(LEVEL)
+    track = fly_path(
+        setup,
+        throttle=lambda s: 0.4 * ((s > THERE) & (s < THERE + 23.0 * seconds)),
+        airspeed=lambda s: 0.0 * s - 2.0,
+    )
+    assert measure_slope(*laid(setup, track), 1).slow == pytest.approx(2.0 if counts else 0.0, abs=0.05)
+
+
+def test_speed_from_rising_air_fades_within_twelve_seconds() -> None:
+    time = np.arange(0.0, 60.0, 0.01)
+    rising = np.where(time < 5.0, 1.0, 0.0).astype(np.float32)
+    gained = lifted_speed(time, np.full(time.size, 25.0, dtype=np.float32), rising, time.size)
+    ended = int(np.argmax(gained))
+    assert gained[ended + 1200] / gained[ended] == pytest.approx(math.exp(-1.0), rel=0.01)
+
+
+@pytest.mark.parametrize("speed", [2.0, 9.0])
+def test_an_aircraft_that_has_nearly_stopped_gains_as_one_at_ten_metres_a_second(speed: float) -> None:
+    time = np.arange(0.0, 0.2, 0.01)
+    airspeed = np.full(time.size, speed, dtype=np.float32)
+    gained = lifted_speed(time, airspeed, np.ones(time.size, dtype=np.float32), time.size)
+    assert gained[-1] == pytest.approx(GRAVITY * 0.19 / 10.0, rel=0.02)

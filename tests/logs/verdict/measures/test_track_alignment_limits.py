@@ -1,0 +1,90 @@
+"""Which rows are usable, and which waypoints a flight has passed, just inside and just outside."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.track_alignment import lay_track
+from tests.synthetic import edited, fly_path, make_setup, waypoint_stations
+
+STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
+
+
+@pytest.fixture(scope="module")
+def setup() -> FlightSetup:
+    return make_setup(STRAIGHT)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "bad"),
+    [
+        ("position", 9e6, 0),
+        ("position", -1.1e7, 1),
+        ("velocity", 9e3, 0),
+        ("velocity", -1.1e4, 1),
+        ("attitude", 900.0, 0),
+        ("attitude", -1100.0, 1),
+        ("controls", 900.0, 0),
+        ("controls", 1100.0, 1),
+        ("wind", -900.0, 0),
+        ("wind", 1100.0, 1),
+        ("airspeed", 1e9, 0),
+        ("airspeed", np.inf, 1),
+        ("energy", np.nan, 1),
+    ],
+)
+def test_a_row_with_a_number_that_no_flight_has_is_bad(setup: FlightSetup, column: str, value: float, bad: int) -> None:
+    track = fly_path(setup)
+    values = np.asarray(getattr(track, column), dtype=np.float64).copy()
+    values[1000] = value
+    aligned = lay_track(route_demands(setup), edited(track, **{column: values}))
+    assert aligned is not None
+    assert aligned.bad_rows == bad
+
+
+@pytest.mark.parametrize(
+    ("acceptance", "short", "arrived"),
+    # Where the mission states no radius, and where it states a smaller or a larger one.
+    [
+        (0.0, 9.7, True),
+        (0.0, 10.3, False),
+        (3.0, 9.7, True),
+        (3.0, 10.3, False),
+        (30.0, 29.7, True),
+        (30.0, 30.3, False),
+    ],
+)
+def test_a_flight_that_ends_ten_metres_short_has_arrived(
+    setup: FlightSetup, acceptance: float, short: float, arrived: bool
+) -> None:
+    stated = replace(setup, route=replace(setup.route, acceptance=np.full(3, acceptance)))
+    aligned = lay_track(route_demands(stated), fly_path(setup, stop=6000.0 - short))
+    assert aligned is not None
+    assert aligned.passed.tolist() == [True, True, arrived]
+
+
+@pytest.mark.parametrize(("aside", "passed"), [(490.0, True), (510.0, False)])
+def test_a_waypoint_further_than_half_a_kilometre_aside_is_none_of_the_flights(
+    setup: FlightSetup, aside: float, passed: bool
+) -> None:
+    """Past the last waypoint and 3 km on, at this distance beside it."""
+    longer = make_setup([*STRAIGHT[:2], [0, 9000, 300]])
+    track = fly_path(longer, across=lambda s: aside * np.clip((s - 3200.0) / 2000.0, 0.0, 1.0))
+    aligned = lay_track(route_demands(setup), track)
+    assert aligned is not None
+    assert aligned.passed.tolist() == [True, True, passed]
+
+
+def test_a_place_passed_twice_has_each_time_the_rows_of_its_own_passage() -> None:
+    """Two rounds of a square at one height, the first 3 m aside: the rows nearest to its waypoints are the second's."""
+    square = [[0.0, 0.0, 300.0], [0.0, 1500.0, 300.0], [1500.0, 1500.0, 300.0], [1500.0, 0.0, 300.0]]
+    setup = make_setup(square + square)
+    stations = waypoint_stations(setup)
+    between = 0.5 * float(stations[3] + stations[4])
+    track = fly_path(setup, rate=20.0, across=lambda s: 3.0 * (s < between))
+    aligned = lay_track(route_demands(setup), track)
+    assert aligned is not None
+    assert aligned.track.time[aligned.rows] == pytest.approx(stations / 25.0, abs=1.0)

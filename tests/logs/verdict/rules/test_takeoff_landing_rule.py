@@ -1,0 +1,103 @@
+"""Take-off climbs and landing approaches, just within and just beyond what the aircraft or the scenario allows."""
+
+import math
+
+import pytest
+
+from flight.simulation.simulate import simulate
+from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from tests.logs.verdict.judging import of
+from tests.mission_lines import setup_of, wp
+
+HOME = "36.5 -84.2 100"
+FAR = (wp(0, 3000, 300), wp(1500, 3000, 300))
+
+
+def judged(rule: str, *lines: str, **tables: object) -> Finding:
+    return of(judge_geometry(setup_of(*lines, home=HOME, **tables)), rule)
+
+
+def landing(slope_deg: float) -> tuple[str, ...]:
+    """An approach from 100 m over home to the ground, at this slope."""
+    run = 100.0 / math.tan(math.radians(slope_deg))
+    return (wp(0, 0), wp(0, 2000), wp(0, 2000 + run, 0, command=21))
+
+
+def climb(slope_deg: float) -> tuple[str, ...]:
+    """A take-off from home to 100 m over it, at this slope, and on."""
+    return (wp(0, 100.0 / math.tan(math.radians(slope_deg)), 100, command=22), *FAR)
+
+
+@pytest.mark.parametrize(("rule", "make", "side"), [("takeoff", climb, 0), ("landing", landing, 1)])
+def test_a_slope_just_within_and_just_beyond_the_aircrafts(rule: str, make: object, side: int) -> None:
+    envelope = setup_of(*FAR).envelope
+    # In still air and at 25 m/s; of the ground at 100 m and the place at 200 m the one with less.
+    able = math.degrees(min(envelope.air_angles(25.0, amsl)[side] for amsl in (100.0, 200.0)))
+    inside, beyond = (judged(rule, *make(able + off)) for off in (-0.05, 0.05))
+    # An autopilot climbs on beyond a place that it comes to too low; a landing place is missed.
+    assert (inside.ok, beyond.ok) == (True, None if rule == "takeoff" else False)
+    assert beyond.planned == pytest.approx(able + 0.05, abs=2e-3)
+    assert beyond.limit == pytest.approx(able, abs=1e-6)
+    assert beyond.limit_source == "aircraft"
+    assert "not flown: the flight" in inside.reason
+
+
+@pytest.mark.parametrize(
+    ("rule", "make", "key"), [("takeoff", climb, "max_climb_deg"), ("landing", landing, "max_dive_deg")]
+)
+def test_a_slope_just_within_and_just_beyond_the_scenarios(rule: str, make: object, key: str) -> None:
+    for slope, ok in ((2.97, True), (3.03, None if rule == "takeoff" else False)):
+        item = judged(rule, *make(slope), limits={key: 3.0})
+        assert (item.ok, item.limit_source) == (ok, "scenario")
+
+
+def test_the_wind_makes_an_approach_steeper_from_ahead() -> None:
+    # From ahead the same descent through the air covers less ground, and is steeper over it.
+    ahead, behind = (
+        judged("landing", *landing(5.0), wind={"speed_mps": 8.0, "from_deg": from_deg}).limit
+        for from_deg in (0.0, 180.0)
+    )
+    assert ahead is not None
+    assert behind is not None
+    assert ahead > judged("landing", *landing(5.0)).limit > behind
+
+
+def test_a_climb_too_steep_is_said_in_the_first_line() -> None:
+    # 30 degrees, as QGroundControl draws a climb-out.
+    verdict = judge_geometry(setup_of(*climb(30.0), home=HOME))
+    assert verdict.headline == "flyable; take-off not judged"
+    assert any(line.startswith("Not judged: takeoff (climbs 100 m in 173 m, 30.0°; at most ") for line in verdict.lines)
+
+
+def test_a_landing_of_45_degrees_fails_in_flight_too() -> None:
+    from aircraft.catalog import load_aircraft
+
+    setup = setup_of(*landing(45.0), home=HOME)
+    flown = simulate(setup, load_aircraft("aerosonde"))
+    verdict = judge_flight(setup, flown.track, flown.ended)
+    assert flown.ended == "completed"
+    assert not verdict.flyable
+    assert "landing at waypoint 2 (item 3) (45.0° > " in verdict.headline
+
+
+def test_a_climb_over_home_is_not_judged_and_the_first_line_says_so() -> None:
+    for line in (wp(0, 0, 200, command=22), "3 22 15 0 0 0 0 0 200"):
+        verdict = judge_geometry(setup_of(line, *FAR, home=HOME))
+        assert of(verdict, "takeoff").ok is None
+        assert verdict.headline == "flyable; take-off not judged"
+
+
+def test_a_landing_without_a_place_or_a_height_is_not_judged() -> None:
+    here = judge_geometry(setup_of(wp(0, 0), wp(0, 2000), "3 21 0 0 0 0 0 0 0", home=HOME))
+    assert of(here, "landing").ok is None
+    assert here.headline == "flyable; landing not judged"
+    above_terrain = wp(0, 3000, 0, command=21, frame=10)
+    unknown = judge_geometry(setup_of(wp(0, 0, frame=0), wp(0, 2000, frame=0), above_terrain, terrain={"kind": "none"}))
+    assert of(unknown, "landing").reason == "the height of the ground there is not known"
+
+
+def test_a_take_off_in_the_air_and_a_mission_without_ends_have_no_finding() -> None:
+    for lines in (FAR, (wp(0, 0), wp(0, 1500, 100, command=22), *FAR)):
+        rules = {item.rule for item in judge_geometry(setup_of(*lines, home=HOME)).findings}
+        assert not rules & {"takeoff", "landing"}

@@ -1,0 +1,120 @@
+"""``python -m tests.mutations``: change the verdict's sources and the physics a little at a time, and see tests fail.
+
+Each mutant is tried in a copy of the sources with the tests that cover it, two at a time; the list and its order are
+the same each time.  Printed: killed and alive by room; ``runs/mutations.json`` holds every trial.  Exit code 1 where
+more than `MOST_ALIVE` of them survive, or any change of a limit.
+"""
+
+import argparse
+import json
+import shutil
+import sys
+import tempfile
+from collections import Counter
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+from queue import SimpleQueue
+
+from tests.mutations.choice import ROOMS, chosen_mutants
+from tests.mutations.covering import covering_tests, kernels_on, limits_at
+from tests.mutations.mutant import ROOT, Mutant
+from tests.mutations.workplace import Trial, Workplace
+
+TARGET = Path("runs") / "mutations.json"
+# Share of the mutants that may survive: some change nothing that anyone could see.
+MOST_ALIVE = 0.05
+
+
+def main() -> int:
+    """Try mutants out; the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutations", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--count", type=int, default=200, help="how many mutants (0: all; default 200)")
+    parser.add_argument("--room", action="append", choices=ROOMS, help="may be given more than once; default: all")
+    parser.add_argument("--match", default="", help="only mutants of files or texts with this in them")
+    parser.add_argument("--at-once", type=int, default=2, help="how many are tried at the same time (2)")
+    parser.add_argument("--limit", type=float, default=600.0, help="seconds after which a mutant counts as noticed")
+    parser.add_argument("--keep", type=Path, help="folder of the copies, kept for the next run of the same sources")
+    parser.add_argument("--list", action="store_true", help="list the mutants and try none")
+    args = parser.parse_args()
+    chosen = chosen_mutants(None if args.match else args.count or None, args.room or ROOMS)
+    mutants = [mutant for mutant in chosen if args.match in _text(mutant)][: args.count or None]
+    if args.list:
+        for mutant in mutants:
+            print(_text(mutant))
+        return 0
+    folder = args.keep or Path(tempfile.mkdtemp(prefix="planfly-mutations-"))
+    try:
+        trials = _tried(mutants, folder, args.at_once, args.limit)
+    finally:
+        if args.keep is None:
+            shutil.rmtree(folder, ignore_errors=True)
+    return _report(trials)
+
+
+def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> list[Trial]:
+    """Try all of them, each in the workplace that is free next."""
+    places = [Workplace(folder / str(k), limit) for k in range(at_once)]
+    # Looked up before the first trial, so that the repository may change meanwhile.
+    asked = {mutant: (covering_tests(mutant), kernels_on(mutant)) for mutant in mutants}
+    tests = sorted({test for covering, _ in asked.values() for test in covering})
+    free: SimpleQueue[Workplace] = SimpleQueue()
+
+    def try_out(mutant: Mutant) -> Trial:
+        place = free.get()
+        try:
+            return place.try_out(mutant, *asked[mutant])
+        finally:
+            free.put(place)
+
+    with ThreadPoolExecutor(at_once) as pool:
+        for place, failure in zip(places, pool.map(lambda place: place.warm(tests), places), strict=True):
+            if failure:
+                raise SystemExit(f"the tests fail without a mutant, so none can be tried: {failure}")
+            free.put(place)
+        trials = []
+        for number, trial in enumerate(pool.map(try_out, mutants), 1):
+            print(f"{number:4d} of {len(mutants)}  {trial.status:8} {trial.seconds:5.0f} s  {_text(trial.mutant)}")
+            sys.stdout.flush()
+            trials.append(trial)
+    return trials
+
+
+def _report(trials: list[Trial]) -> int:
+    """Print and write what became of the mutants; the exit code."""
+    alive = [trial for trial in trials if trial.status == "alive"]
+    rooms = Counter((trial.mutant.room, trial.status == "alive") for trial in trials)
+    print()
+    for room in sorted({trial.mutant.room for trial in trials}):
+        print(f"{room:10} {rooms[room, False]:4d} killed {rooms[room, True]:4d} alive")
+    for trial in alive:
+        print(f"alive: {_text(trial.mutant)}")
+    TARGET.parent.mkdir(exist_ok=True)
+    TARGET.write_text(json.dumps([_record(trial) for trial in trials], indent=1) + "\n", encoding="utf-8")
+    print(f"written to {TARGET}")
+    limits = any(trial.mutant.room == "limits" for trial in alive)
+    return int(limits or len(alive) > MOST_ALIVE * len(trials))
+
+
+def _record(trial: Trial) -> dict[str, object]:
+    return asdict(trial) | {"line": _line(trial.mutant), "seconds": round(trial.seconds, 1)}
+
+
+def _line(mutant: Mutant) -> int:
+    return mutant.line((ROOT / mutant.file).read_bytes())
+
+
+def _text(mutant: Mutant) -> str:
+    limits = f"{', '.join(limits_at(mutant))}: " if mutant.room == "limits" else ""
+    return f"{mutant.room:9}{mutant.file}:{_line(mutant)}: {limits}{_short(mutant.old)} -> {_short(mutant.new)}"
+
+
+def _short(text: str) -> str:
+    words: Iterable[str] = text.split()
+    line = " ".join(words)
+    return line if len(line) <= 70 else f"{line[:33]} … {line[-33:]}"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

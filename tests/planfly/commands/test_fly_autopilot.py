@@ -1,0 +1,136 @@
+"""``planfly fly --autopilot``: a real autopilot's flight, its log beside ours, its verdict again, and its failures."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from logs.recording.reader import read_log
+from planfly.cli import main
+from tests.autopilots import need_arduplane, write_fake
+
+ROOT = Path(__file__).parents[3]
+MISSION = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t100\t1
+1\t0\t0\t16\t0\t60\t0\t0\t46.000\t8.0\t400\t1
+2\t0\t0\t16\t0\t60\t0\t0\t46.006\t8.0\t400\t1
+3\t0\t0\t16\t0\t60\t0\t0\t46.012\t8.001\t400\t1
+"""
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Path:
+    file = tmp_path / "short.waypoints"
+    file.write_text(MISSION, encoding="utf-8")
+    return file
+
+
+def test_a_flight_is_logged_judged_and_judged_again(
+    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    params, log = tmp_path / "mine.parm", tmp_path / "f.mcap"
+    params.write_text("LIM_ROLL_CD 3500\nSERVO1_MIN 1000\nNAVL1_PERIOD 17\n", encoding="utf-8")
+    given = ["--params", str(params), "--log", str(log)]
+    code = main(["fly", str(mission), "--autopilot", str(write_fake(tmp_path)), *given])
+    printed = capsys.readouterr().out
+    assert "Flown by: ArduPlane V0.0-fake (0badc0de) (sha256 " in printed
+    assert "changed: NAVL1_PERIOD 17, ROLL_LIMIT_DEG 35" in printed
+    assert f"{tmp_path / 'f.BIN'} (the autopilot's own)" in printed
+    assert (tmp_path / "f.BIN").read_bytes() == b"\xa3\x95fake"
+    recorded = read_log(log)
+    assert recorded.ended == "completed"
+    assert recorded.setup.program is not None
+    assert recorded.setup.program.unused == ("SERVO1_MIN",)
+    assert recorded.setup.parameters is not None
+    again = tmp_path / "again.json"
+    assert main(["check", str(log), "--json", str(again)]) == code
+    assert json.loads(again.read_text(encoding="utf-8")) == recorded.recorded_verdict
+    assert recorded.recorded_verdict["flown_by"]["changed"] == {"NAVL1_PERIOD": 17.0, "ROLL_LIMIT_DEG": 35.0}
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("panic", "panicked: Failed to load defaults"),
+        ("refuses", "refused the mission at item 2 (NAV_WAYPOINT): MAV_MISSION_UNSUPPORTED"),
+        ("crash-in-air", "ended with exit code 1"),
+    ],
+)
+def test_a_program_that_fails_is_one_line_and_leaves_no_log(
+    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], fault: str, said: str
+) -> None:
+    program, log = write_fake(tmp_path, fault), tmp_path / "f.mcap"
+    assert main(["fly", str(mission), "--autopilot", str(program), "--log", str(log)]) == 2
+    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("planfly: ")]
+    assert len(errors) == 1
+    assert errors[0].startswith(f"planfly: {program}: {said}")
+    assert not log.exists()
+    assert not (tmp_path / "f.BIN").exists()
+
+
+def test_what_cannot_be_run_is_one_line_before_anything_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for command in (["fly", "no.waypoints"], ["run", "no-scenario"]):
+        assert main([*command, "--autopilot", str(tmp_path / "none")]) == 2
+        assert capsys.readouterr().err.startswith(f"planfly: {tmp_path / 'none'}: no such file; ")
+
+
+def test_a_law_of_guidance_and_a_real_autopilot_exclude_each_other(
+    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["fly", str(mission), "--autopilot", str(write_fake(tmp_path)), "--guidance", "l1"]) == 2
+    assert 'guidance: not a key of autopilot = "ardupilot"' in capsys.readouterr().err
+
+
+def test_the_autopilots_log_is_not_written_over_another(
+    mission: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "f.BIN"
+    mine.write_bytes(b"mine")
+    given = ["--autopilot", str(write_fake(tmp_path)), "--log", str(tmp_path / "f.mcap")]
+    assert main(["fly", str(mission), *given]) == 2
+    assert capsys.readouterr().err == f"planfly: {mine}: exists; --overwrite replaces it\n"
+    assert mine.read_bytes() == b"mine"
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
+    mission: Path, tmp_path: Path, number: signal.Signals
+) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    command = [sys.executable, "-m", "planfly", "fly", str(mission), "--autopilot", str(write_fake(tmp_path, "silent"))]
+    running = subprocess.Popen(
+        [*command, "--log", str(tmp_path / "f.mcap")], cwd=ROOT, env=os.environ | {"TMPDIR": str(temporary)},
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+    for _ in range(1500):
+        if list(temporary.glob("planfly-autopilot-*/logs/*.BIN")):
+            break
+        time.sleep(0.02)
+    time.sleep(0.3)
+    children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
+    running.send_signal(number)
+    running.communicate(timeout=20)
+    assert running.returncode == 130
+    assert list(temporary.glob("planfly-autopilot-*")) == []
+    assert len(children) == 1
+    assert not Path("/proc", children[0]).exists()
+
+
+@pytest.mark.client
+def test_arduplane_flies_a_mission_file(mission: Path, tmp_path: Path) -> None:
+    log = tmp_path / "f.mcap"
+    given = ["--autopilot", str(need_arduplane()), "--log", str(log), "--wind", "5,250", "--turbulence", "light"]
+    main(["fly", str(mission), *given])
+    recorded = read_log(log)
+    assert recorded.ended == "completed"
+    assert recorded.recorded_verdict["flown_by"]["version"].startswith("ArduPlane V")
+    # A dataflash log begins with the message that describes the others.
+    assert (tmp_path / "f.BIN").read_bytes()[:3] == b"\xa3\x95\x80"

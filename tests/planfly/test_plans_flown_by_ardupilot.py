@@ -1,0 +1,49 @@
+"""Plans of the default planner, flown by the autopilot that they are made for: nothing comes to harm."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from flight.mission.from_plan import plan_mission
+from planfly.airframe import load_airframe
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
+from tests.clients import ROOT, need
+
+SOAK = os.environ.get("PLANFLY_SOAK") == "1"
+# On each terrain with the law, and once with the program itself.
+NUMBERS = range(100) if SOAK else (0, 4, 11)
+REAL_NUMBERS = range(100) if SOAK else (7,)
+
+
+def fly(number: int, autopilot: Path | None) -> None:
+    """Plan, export and fly the scenario of this number with satellites' errors, in its wind and gusts."""
+    scenario = plan_scenario(number)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, number + 1)
+    assert plan.safe, plan.certificate.problems
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    assert setup.nav == "gnss"
+    flown = fly_and_judge(setup, airframe, None, autopilot=autopilot)
+    assert flown.ended == "completed"
+    harm = harm_of(scenario, plan.waypoints, flown.track)
+    assert harm.text(scenario) == ""
+    assert flown.verdict.flyable, [(found.rule, found.reason) for found in flown.verdict.findings if found.ok is False]
+
+
+@pytest.mark.parametrize("number", NUMBERS)
+def test_nothing_comes_to_harm_with_the_law(number: int) -> None:
+    fly(number, None)
+
+
+@pytest.mark.parametrize("number", REAL_NUMBERS)
+def test_nothing_comes_to_harm_with_the_program(number: int) -> None:
+    found = os.environ.get("PLANFLY_ARDUPLANE", ROOT.parent / "shared" / "autopilot" / "arduplane")
+    fly(number, Path(need(found, "ArduPlane", "software in the loop; PLANFLY_ARDUPLANE names it")))
+
+
+def test_what_is_flown_is_on_each_terrain() -> None:
+    names = {plan_scenario(number).name.split()[0] for number in (0, 4, 11)}
+    assert names == set(TERRAINS)
