@@ -164,6 +164,11 @@ def _set_circles(corners: Records, route: Route) -> None:
     out = corners["circle"] / np.cos(0.5 * turns)
     corners["centre_east"] = corners["east"] + out * np.cos(middle)
     corners["centre_north"] = corners["north"] - out * np.sin(middle)
+    # A loiter's height is that of its item, which the last of its corners has.
+    items = route.items[1:-1]
+    for i in range(len(corners) - 2, -1, -1):
+        if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and items[i] == items[i + 1]:
+            corners[i].up = corners[i + 1].up
 
 
 def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:

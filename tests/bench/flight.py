@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft, load_aircraft
+from flight.ardupilot.parameters import load_parameters
 from flight.dynamics.fdm import Fdm, Variation
 from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
@@ -199,15 +200,19 @@ class LoopCost:
 TURN = 10
 
 
-def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240) -> LoopCost:
+def loop_cost(guidance_hz: int, rounds: int = 7, seconds: int = 240, *, ardupilot: bool = False) -> LoopCost:
     """The closed loop against bare JSBSim, without set-up: the median round's ratio and factors, CPU time.
 
     Both step the same configuration at the same rate, in turns of ten seconds of flight, so that a machine that slows
     down slows both.
+
+    ardupilot: whether ArduPlane's law flies, in place of planfly's guidance.
     """
     ratios, closed, bares = [], [], []
+    parameters = load_parameters(aerosonde()) if ardupilot else None
     for _ in range(rounds):
-        flight = Flight(replace(windy(1), guidance_hz=cast("Any", guidance_hz)), aerosonde())
+        setup = replace(windy(1), guidance_hz=cast("Any", guidance_hz), parameters=parameters)
+        flight = Flight(setup, aerosonde())
         flight.block(guidance_hz)
         bare = Fdm(aerosonde(), rate_hz=FDM_HZ)
         trim = bare.start(36.5, -84.2, 600.0, 0.0, 25.0)
@@ -245,6 +250,7 @@ NEEDED = {
     "feasible missions: slopes off the plan, most, deg": (0.15, 0.1),
     "closed loop / bare JSBSim at 60 Hz": (1.40, 1.15),
     "closed loop / bare JSBSim at 30 Hz": (1.15, 1.05),
+    "ArduPlane's law / bare JSBSim at 60 Hz": (1.40, 1.15),
     "real-time factor at 60 Hz": (1300.0, 2100.0),
 }
 
@@ -278,6 +284,7 @@ def rows(seeds: int = 20) -> dict[str, float]:
         found[f"closed loop / bare JSBSim at {hz} Hz"] = cost.ratio
         found[f"real-time factor at {hz} Hz"] = cost.closed
     found["real-time factor of bare JSBSim"] = cost.bare
+    found["ArduPlane's law / bare JSBSim at 60 Hz"] = loop_cost(60, ardupilot=True).ratio
     return found
 
 

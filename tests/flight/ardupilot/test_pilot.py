@@ -20,7 +20,7 @@ from tests.bench.against_arduplane import BINARY, compare, flown_figures
 from tests.setups import MakeSetup
 from world.scenario import from_spec
 
-# What ArduPlane flew, written by `python -m tests.bench.against_arduplane --plans 3 --from 5001 --keep FILE`.
+# What ArduPlane flew, written by `python -m tests.bench.against_arduplane --plans 3 --from 1001 --keep FILE`.
 KEPT: list[dict[str, Any]] = json.loads(
     (Path(__file__).parents[2] / "authorities" / "arduplane_flights.json").read_text(encoding="utf-8")
 )
