@@ -43,7 +43,7 @@ STAGES = (
     "planfly.pipeline:make_setup",
     "flight.guidance.fly_by_path:fly_by_path",
     "flight.simulation.local_map:LocalMap.around",
-    "flight.simulation.simulate:simulate",
+    "flight.simulation.simulate:fly_to_end",
     "logs.verdict.judge_flight:judge_flight",
     "logs.verdict.judge_flight:judge_geometry",
     "logs.verdict.measures.route_demands:route_demands",
@@ -54,7 +54,9 @@ ONCE = dict.fromkeys(("load_airframe", "load_envelope", "make_limits"), 1)
 ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "lay_route", "make_setup", "fly_by_path"), 1)
 OPENED = ROUTED | {"plan_mission": 1}
 ALIGNED = dict.fromkeys(("route_demands", "lay_track"), 1)
-FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "simulate", "judge_flight"), 1)
+FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "fly_to_end", "judge_flight"), 1)
+# An autopilot's flight has the aircraft's own beside it, at true airspeeds along a path of its own.
+BESIDE = dict.fromkeys(("fly_by_path", "around", "fly_to_end", "route_demands", "lay_track", "judge_flight"), 2)
 LOG = ALIGNED | dict.fromkeys(("make_limits", "fly_by_path"), 1)
 MISSION = Path(__file__).parents[1] / "flight" / "missions" / "qgc.waypoints"
 
@@ -137,7 +139,7 @@ def test_a_replay_aligns_its_track_once(count: Count, flight: Path) -> None:
 
 def test_a_mission_that_a_person_brought_is_flown_or_judged_along_one_path(count: Count) -> None:
     flown = count("fly", str(MISSION), "--terrain", "jacksboro", code=0)
-    assert flown == {key: n for key, n in (ONCE | FLIGHT).items() if key != "plan_mission"}
+    assert flown == {key: n for key, n in (ONCE | FLIGHT | BESIDE).items() if key != "plan_mission"}
     judged = ONCE | ROUTED | {"judge_geometry": 1, "route_demands": 1}
     assert count("check", str(MISSION), "--terrain", "jacksboro", code=0) == judged
     assert count("check", str(MISSION), "--scenario", "jacksboro", code=4) == judged
@@ -167,5 +169,6 @@ def test_a_served_mission_is_prepared_once_and_flown_from_that(entered: Counter[
         pass
     link_end.send(EndFlight(quit=True))
     process.join(20.0)
-    judged = dict.fromkeys(("judge_geometry", "judge_flight", "lay_track"), 1)
-    assert dict(entered) == ROUTED | judged | {"around": 1, "route_demands": 2}
+    # The mission is judged before its flight, too.
+    judged = BESIDE | {"judge_geometry": 1, "route_demands": 3, "fly_to_end": 1}
+    assert dict(entered) == ROUTED | judged
