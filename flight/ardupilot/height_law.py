@@ -27,9 +27,10 @@ _PITCH_SPARE, _THROTTLE_SPARE = math.radians(5.0), 0.1
 _SPEED_SHARE, _THROTTLE_SHARE = 0.25, 0.5
 # Of the greatest rate of energy, what a change of speed may take.
 _SPEED_CHANGE_SHARE = 0.5
-# So near to full throttle the demand touches it now and then, by the noise of what it is made of (0.005 to 0.02 fit the
-# saturated climbs of 4 flights; with none the law climbs up to 9 m more than ArduPlane in 400).
-_NEARLY = 0.0125
+# So near to full throttle the demand touches it now and then, by the noise of what it is made of.  Climbs that take all
+# the throttle there is hang on this: five flights of ArduPlane are best met by 0.005 to 0.0125, with up to 9 m between
+# law and flight at the former, 19 m at the latter.
+_NEARLY = 0.005
 # Below this share of AIRSPEED_MIN, with the throttle all but full, speed comes before height.
 _UNDERSPEED, _ALL_BUT_FULL = 0.9, 0.95
 
