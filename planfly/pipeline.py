@@ -49,7 +49,7 @@ class PlanThenFly:
 
     >>> result = plan_then_fly("paper-07", seed=1)
     >>> len(result.plan.waypoints), len(result.mission.items), round(float(result.track.time[-1]))
-    (10, 11, 530)
+    (10, 11, 517)
     """
 
     plan: Plan

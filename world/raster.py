@@ -181,7 +181,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
 
     >>> raster = open_raster("jacksboro")
     >>> tile_bounds(raster, raster.centre).round(-2).tolist()
-    [[-14900.0, 14900.0], [-15800.0, 15800.0]]
+    [[-15000.0, 15000.0], [-15800.0, 15800.0]]
     """
     east, north = to_map(origin, raster.corners[:, 1], raster.corners[:, 0])
     middle_e, middle_n = (east.min() + east.max()) / 2, (north.min() + north.max()) / 2

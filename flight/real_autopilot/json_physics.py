@@ -86,7 +86,7 @@ def encode_motion(motion: BodyMotion | tuple[float, ...]) -> bytes:
     r"""The datagram that tells the autopilot how the aircraft moves.
 
     >>> encode_motion(BodyMotion(0.5, *[0.0] * 5, -9.81, *[0.0] * 9, 25.0))[:44]
-    b'\n{"timestamp":0.500000,"imu":{"gyro":[0.00000'
+    b'\n{"timestamp":0.500000,"imu":{"gyro":[0.0000'
     """
     return _ANSWER % motion
 

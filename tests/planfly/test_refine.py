@@ -47,7 +47,7 @@ def rounds_of(folder: Path) -> list[dict[str, object]]:
 def test_a_plan_over_the_hill_becomes_one_round_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "hill.toml").write_text(HILL.replace("@@PEAKS@@\n", RIDGE), encoding="utf-8")
     out = tmp_path / "out"
-    assert main(["run", str(tmp_path / "hill.toml"), "--out", str(out), "--refine", "3"]) == 0
+    assert main(["run", str(tmp_path / "hill.toml"), "--out", str(out), "--refine", "3", "--guidance", "path"]) == 0
     rounds = rounds_of(out)
     assert 2 <= len(rounds) <= 4
     assert rounds[0]["flyable"] is False

@@ -3,11 +3,14 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft
 from planfly.cli import main
+from world.scenario import load_scenario
+from world.scenario_variants import with_flight
 
 ROOT = Path(__file__).parents[3]
 PICTURES = ["envelope.png", "steps.png", "trims.png"]
@@ -81,7 +84,9 @@ def test_a_bad_name_or_folder_is_one_line(
 
 
 def test_the_cessna_flies_its_mission() -> None:
-    result = planfly.plan_then_fly(str(ROOT / "examples" / "c172x.toml"), seed=1)
+    result = planfly.plan_then_fly(
+        with_flight(load_scenario(str(ROOT / "examples" / "c172x.toml")), guidance="path"), seed=1
+    )
     assert result.plan.safe
     assert result.track is not None
     assert result.verdict.flyable, result.verdict.summary
@@ -89,6 +94,14 @@ def test_the_cessna_flies_its_mission() -> None:
     assert float(result.track.airspeed.max()) < 55.0
     # A quarter of a megawatt of heat, for seven minutes.
     assert 10_000.0 < float(result.track.energy[-1]) < 60_000.0
+
+
+def test_arduplane_flies_the_cessna_at_equivalent_airspeeds() -> None:
+    result = planfly.plan_then_fly(str(ROOT / "examples" / "c172x.toml"), seed=1)
+    assert result.track is not None
+    assert result.verdict.flyable, result.verdict.summary
+    # 50 m/s asked: 52 at 800 m, where the air has 0.925 of the density at the sea.
+    assert float(np.median(result.track.airspeed)) == pytest.approx(52.0, abs=1.0)
 
 
 def test_a_folder_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
