@@ -1,4 +1,4 @@
-"""The same plans, missions, tracks and verdicts as before modules were moved into their rooms, byte for byte."""
+"""The same plans, missions, tracks and verdicts as digests kept of earlier versions say, byte for byte."""
 
 import json
 from pathlib import Path
