@@ -67,7 +67,7 @@ def close_mission(seed: int, energy: Callable[[FieldMission], float], **flight: 
         case "missile":
             tables["threats"] = [_missile_beside(random, way, by)]
         case "bounds":
-            tables["area"]["east_m"][1] = round(float(way[:, 0].max()) + by, 1)
+            _set_edge(tables["area"], way, by)
         case "energy":
             needed = energy(_made(f"energy-{seed}", way, tables, "", exceeded=False))
             tables["flight"]["battery_wh"] = round(needed / (1.0 - RESERVE) * (1.0 + by), 2)
@@ -105,6 +105,18 @@ def _tables(random: np.random.Generator, way: Floats, flight: dict[str, Any]) ->
         },
         "threats": [],
     }
+
+
+def _set_edge(area: dict[str, Any], way: Floats, by: float) -> None:
+    """Draw the edge of the area beside which an inner waypoint stands out most, ``by`` m outside of that waypoint."""
+    outs = []
+    for axis, key in enumerate(("east_m", "north_m")):
+        for end, sign in enumerate((-1.0, 1.0)):
+            along = sign * way[:, axis]
+            outs.append((float(along[1:-1].max() - max(along[0], along[-1])), float(along[1:-1].max()), sign, key, end))
+    ahead, most, sign, key, end = max(outs)
+    # Start and destination stay inside.
+    area[key][end] = round(sign * (most + max(by, 1.0 - ahead)), 1)
 
 
 def _missile_beside(random: np.random.Generator, way: Floats, gap: float) -> dict[str, Any]:
