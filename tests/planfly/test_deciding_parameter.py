@@ -43,7 +43,9 @@ def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> 
 
 def test_what_failed_says_where_to_look_first() -> None:
     passes = Flights(lambda new: new.tecs_height_demand_time < 2.0 or new.navl1_period < 15.0)
-    assert deciding_parameter(default_parameters(), (LOW,), passes).name == "TECS_HDEM_TCONST"  # type: ignore[union-attr]
+    found = deciding_parameter(default_parameters(), (LOW,), passes)
+    assert found is not None
+    assert found.name == "TECS_HDEM_TCONST"
     found = deciding_parameter(default_parameters(), (WIDE,), passes)
     assert found is not None
     assert (found.name, found.passing, found.off) == ("NAVL1_PERIOD", 14.0, 210.0)

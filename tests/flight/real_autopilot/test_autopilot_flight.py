@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -116,9 +117,9 @@ def test_a_dive_into_the_ground_is_a_flight_that_ended_so(fake_autopilot: MakeFa
 
 
 @pytest.mark.parametrize("write", [lambda path: None, lambda path: path.mkdir(), lambda path: path.write_text("#!")])
-def test_what_cannot_be_run_is_one_line(tmp_path: Path, write: object) -> None:
+def test_what_cannot_be_run_is_one_line(tmp_path: Path, write: Callable[[Path], object]) -> None:
     program = tmp_path / "arduplane"
-    write(program)  # type: ignore[operator]
+    write(program)
     with pytest.raises(FlightError, match=r"arduplane: (no such file|not a file|not executable)"):
         AutopilotFlight(make_setup(), AEROSONDE, program, {})
 

@@ -49,7 +49,7 @@ class Exchange:
         self.trim = self.fdm.start(46.0, 8.0, 500.0, math.pi / 2.0, 25.0, 0.0, (-4.0, 0.0, 0.0))
         self.port, self.looks = Port(), 0
         servos = load_servo_map(AEROSONDE)
-        self.lockstep = Lockstep(self.port, servos, self.fdm, self.space, HOME, self.look)  # type: ignore[arg-type]
+        self.lockstep = Lockstep(self.port, servos, self.fdm, self.space, HOME, self.look)  # type: ignore[arg-type]  # a port by hand
 
     def look(self) -> None:
         self.looks += 1

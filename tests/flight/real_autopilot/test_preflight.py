@@ -72,7 +72,7 @@ def autopilot() -> Autopilot:
 
 
 def preflight(autopilot: Autopilot, clock: Clock) -> Preflight:
-    return Preflight(autopilot, lambda: clock.time, lambda: clock.time)  # type: ignore[arg-type]
+    return Preflight(autopilot, lambda: clock.time, lambda: clock.time)  # type: ignore[arg-type]  # a link by hand
 
 
 def test_it_is_given_the_mission_home_and_auto_in_order(autopilot: Autopilot, clock: Clock) -> None:
@@ -147,7 +147,7 @@ def test_time_that_flies_is_no_reason_to_give_up(autopilot: Autopilot) -> None:
     # A hundred times as fast as the clock: its answer comes after 2 s of its own time, 0.02 s by the clock.
     clock = Clock()
     autopilot.has, names = {"LATE": 1.0}, ["LATE"]
-    talk = Preflight(autopilot, lambda: clock.time, lambda: 0.01 * clock.time).meet(names)  # type: ignore[arg-type]
+    talk = Preflight(autopilot, lambda: clock.time, lambda: 0.01 * clock.time).meet(names)  # type: ignore[arg-type]  # a link by hand
     autopilot.has = {}
     for _ in talk:
         clock.time += 0.1

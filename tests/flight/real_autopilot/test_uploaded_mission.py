@@ -1,6 +1,7 @@
 """What an autopilot gets of a mission: places above the sea, jumps to where they lead, and one place more."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,12 +23,12 @@ C = Command
 HOME = Home(46.0, 8.0, 20.0)
 
 
-def place(seq: int, north: float, up: float = 80.0, command: int = C.NAV_WAYPOINT, **more: object) -> MissionItem:
+def place(seq: int, north: float, up: float = 80.0, command: int = C.NAV_WAYPOINT, **more: Any) -> MissionItem:
     """An item north of the map's origin, m; its height is over home."""
     lat, lon = to_geo(SCENARIO.origin, 0.0, north)
     params = more.get("params", (0.0,) * 4)
-    frame = int(more.get("frame", Frame.GLOBAL_RELATIVE_ALT))  # type: ignore[call-overload]
-    return MissionItem(seq, int(command), frame, params, float(lat), float(lon), up)  # type: ignore[arg-type]
+    frame = int(more.get("frame", Frame.GLOBAL_RELATIVE_ALT))
+    return MissionItem(seq, int(command), frame, params, float(lat), float(lon), up)
 
 
 def order(seq: int, command: int, *params: float) -> MissionItem:

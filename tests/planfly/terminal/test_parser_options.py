@@ -1,6 +1,7 @@
 """Options that several commands take, and what each refuses."""
 
 import argparse
+from collections.abc import Callable
 
 import pytest
 
@@ -8,10 +9,10 @@ from planfly.terminal.parser import build_parser
 from planfly.terminal.parser_options import flown_by_options, overwrite_option, steering_options
 
 
-def parser_with(*groups: object) -> argparse.ArgumentParser:
+def parser_with(*groups: Callable[[argparse.ArgumentParser], None]) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="test", exit_on_error=False)
     for group in groups:
-        group(parser)  # type: ignore[operator]
+        group(parser)
     return parser
 
 
