@@ -27,7 +27,7 @@ from planner.evaluation.problem_arrays import (
 )
 from planner.evaluation.terrain_clearance import TERRAIN_LEG, sample_terrain, segment_pixels, terrain_excess
 from world.frames import PolyMapRecord
-from world.kernels import Record, Records, compiled, compiled_views, inlined
+from world.kernels import Record, Records, compiled, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -189,7 +189,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
     return radius
 
 
-@compiled_views
+@inlined
 def _measure_flown(
     aircraft: PerformanceTable,
     legs_hold_turns: bool,
@@ -223,14 +223,14 @@ def _measure_flown(
         extents[i] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * blend
 
 
-@compiled_views
+@inlined
 def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
     """How far below and above the legs a flight may be about a corner, m; lag, leg: of the leg after it."""
     here, settled = below_at(lag, 0.0), below_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, here, settled), max(0.0, -here, -settled)
 
 
-@compiled_views
+@inlined
 def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints that an autopilot strays about."""
     for i in range(1, corners.shape[0] - 1):
@@ -240,7 +240,7 @@ def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:
         extents[i] = max(corners[i].before, corners[i].after)
 
 
-@compiled_views
+@inlined
 def _corner_depth(
     heights: Heights,
     slope_bounds: SlopeBounds,
@@ -259,7 +259,7 @@ def _corner_depth(
     return total
 
 
-@compiled_views
+@inlined
 def _corner_kill(
     missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled

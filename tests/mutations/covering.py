@@ -92,4 +92,4 @@ def _importers() -> dict[str, set[str]]:
 
 
 def _has_kernels(file: str) -> bool:
-    return re.search(r"^@(compiled|compiled_views|inlined)\b", _sources()[file], re.MULTILINE) is not None
+    return re.search(r"^@(compiled|inlined)\b", _sources()[file], re.MULTILINE) is not None
