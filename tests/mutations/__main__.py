@@ -78,6 +78,8 @@ def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> l
             print(f"{number:4d} of {len(mutants)}  {trial.status:8} {trial.seconds:5.0f} s  {_text(trial.mutant)}")
             sys.stdout.flush()
             trials.append(trial)
+    for place in places:
+        place.close()
     return trials
 
 
