@@ -62,10 +62,10 @@ class Workplace:
         self._cache.rename(self._warm)
         return "" if code == 0 else _failure(text) or text[-2000:]
 
-    def try_out(self, mutant: Mutant, tests: list[str], kernels: list[str]) -> Trial:
-        """Apply a mutant, run the tests that cover it, and put the source back.
+    def try_out(self, mutant: Mutant, stages: list[list[str]], kernels: list[str]) -> Trial:
+        """Apply a mutant, run the tests that cover it until one fails, and put the source back.
 
-        kernels: files whose compiled code rests on what it changes.
+        stages: tests that are run together.  kernels: files whose compiled code rests on what it changes.
         """
         target = self.copy / mutant.file
         # Numba knows a changed file by its bytes, and a remark at its end changes no line's number.
@@ -77,8 +77,11 @@ class Workplace:
         try:
             for file, data in changed.items():
                 file.write_bytes(data)
-            # A mutant of the same length within a second of the last would be taken for it by its bytecode.
-            code, text = self._run(tests, self._limit, bytecode=False)
+            for tests in stages:
+                # A mutant of the same length within a second of the last would be taken for it by its bytecode.
+                code, text = self._run(tests, self._limit, bytecode=False)
+                if code != 0:
+                    break
         finally:
             for file, (data, was) in kept.items():
                 file.write_bytes(data)
