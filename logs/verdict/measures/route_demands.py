@@ -99,7 +99,7 @@ class RouteDemands:
         for i in range(1, len(out) - 1):
             if self.fly_by_offset[i] > 0.0:
                 inward = self.leg_unit(i) - self.leg_unit(i - 1)
-                out[i, :2] += self.fly_by_offset[i] * inward / max(1e-9, math.hypot(inward[0], inward[1]))
+                out[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
                 # Halfway between the heights at the arc's ends.
                 tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
                 out[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))

@@ -45,7 +45,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     unflown = not geometric and (aligned is None or not aligned.flew(leg))
     if unflown:
         said.append("the leg was not flown")
-    elif not geometric and aligned is not None:
+    elif aligned is not None:
         measured = _measured(demands, aligned, leg)
         if measured is None:
             mean = _reached(aligned, leg, commanded)
@@ -111,9 +111,9 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
     return np.asarray((total[width:] - total[:-width]) / width)
 
 
-def _by_the_air(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, off: float) -> bool:
+def _by_the_air(demands: RouteDemands, aligned: AlignedTrack, leg: int, off: float) -> bool:
     """Whether rising or sinking air took the speed on a leg where the aircraft showed that it can more than it asks."""
-    if aligned is None or off * demands.slopes[leg] >= 0.0:
+    if off * demands.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(demands, aligned, leg)
     return ability is not None and ability.covers(float(demands.slopes[leg]))
@@ -138,9 +138,7 @@ def _commanded(demands: RouteDemands, leg: int, commanded: float) -> tuple[float
 
 
 def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
-    """Mean airspeed of a leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
-    if not aligned.flew(leg):
-        return None
+    """Mean airspeed of a flown leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
     rows = steady_rows(demands, aligned, leg)
     time = aligned.track.time[rows]
     if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(demands.runs[leg]) / SLOWEST):

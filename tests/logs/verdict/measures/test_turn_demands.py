@@ -55,3 +55,16 @@ def test_a_leg_a_little_short_of_the_roll_fails_and_one_longer_passes() -> None:
         setup = make_setup(zigzag(60.0, arcs + roll + spare, same_way=False))
         assert of(judge_geometry(setup), "turn", waypoint(1)).ok is ok
     assert judge_geometry(make_setup(zigzag(60.0, arcs + 1.0, same_way=True))).flyable
+
+
+@pytest.mark.parametrize("climb", [200.0, -200.0])
+def test_the_roll_is_measured_at_the_lower_end_of_its_leg(climb: float) -> None:
+    """Behind the leg the wind grows by 1 m/s each 50 m, from 4 m/s at the start's 500 m: 25 + 4 m/s, or 25 + 0."""
+    points = zigzag(60.0, 900.0, same_way=False, course_deg=-60.0)
+    points[2:, 2] += climb
+    wind = {"speed_mps": 4.0, "from_deg": 180.0, "gradient": 0.02}
+    demands = route_demands(make_setup(points, wind=wind))
+    lower = 500.0 + min(0.0, climb)
+    speed = 25.0 + 4.0 + 0.02 * (lower - 500.0)
+    bank = [math.atan(speed**2 / (9.80665 * float(radius))) for radius in demands.radius[1:3]]
+    assert demands.reversal[1] == pytest.approx(speed * ROLL_TIME * (sum(bank) - math.radians(30.0)), rel=1e-6)
