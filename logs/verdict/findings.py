@@ -20,6 +20,8 @@ RULES = {
     "loiter": "loiters",
     "slope": "slopes",
     "clearance": "clearance",
+    "height": "heights",
+    "fence": "zones",
     "threat": "threats",
     "bounds": "bounds",
     "waypoint": "waypoints",

@@ -26,6 +26,8 @@ from logs.verdict.rules.completion_rule import completion_findings
 from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
+from logs.verdict.rules.fence_rule import fence_findings
+from logs.verdict.rules.height_rule import height_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
@@ -110,6 +112,8 @@ def _flown_findings(
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
+        *height_findings(demands, aligned),
+        *fence_findings(demands, aligned),
         *threat_findings(demands, aligned),
         *bounds_findings(demands, aligned),
         *waypoint_findings(demands, aligned),

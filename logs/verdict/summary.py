@@ -31,7 +31,16 @@ _LEVELS = {
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 # Rules whose silence the first line tells, by what they judge.
-_UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
+_UNJUDGED = {
+    "clearance": "terrain",
+    "height": "heights above ground",
+    "fence": "airspace",
+    "speed": "airspeed",
+    "takeoff": "take-off",
+    "landing": "landing",
+}
+# Rules of which the summary says why they were not judged.
+_EXPLAINED = ("clearance", "height", "fence", "threat", "bounds", "energy", "takeoff", "landing")
 # What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
 _FIRST = ("departure", "completion", "mission", "slope")
 _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
@@ -68,7 +77,9 @@ def _not_judged(findings: Sequence[Finding], rule: str) -> str:
     silent = sum(item.ok is None for item in mine)
     if not silent:
         return ""
-    return f"{_UNJUDGED[rule]} not judged" + ("" if silent == len(mine) else f" on {silent} legs")
+    return f"{_UNJUDGED[rule]} not judged" + (
+        "" if silent == len(mine) else f" on {silent} {'zones' if rule == 'fence' else 'legs'}"
+    )
 
 
 def _by_luck(findings: Sequence[Finding]) -> list[str]:
@@ -105,6 +116,8 @@ def _phrase(item: Finding) -> str:
             # One without a name of its own is called "threat 3 (missile)".
             named = f"threat {where}" if item.place.name else where
             return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
+        case "fence" if item.place.name:
+            return f"{where} violated ({max(item.flown or 0.0, item.planned or 0.0):.1f} m beyond it)"
     if item.place.kind == "flight":
         return f"{item.rule} ({_numbers(item)})"
     return f"{item.rule} {'at' if item.place.kind == 'waypoint' else 'on'} {where} ({_numbers(item)})"
@@ -149,7 +162,16 @@ def summary_lines(
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
+        if item.ok is None and item.rule in (
+            "clearance",
+            "height",
+            "fence",
+            "threat",
+            "bounds",
+            "energy",
+            "takeoff",
+            "landing",
+        ):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
     # Limits of that autopilot's own, which say nothing of the aircraft.

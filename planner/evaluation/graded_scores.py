@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
+from planner.evaluation.airspace_scores import add_airspace_violations
 from planner.evaluation.clearance_buffer import RequiredClearance
 from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length, legs_about
 from planner.evaluation.height_lags import HEIGHT_LAG, below_at, measure_lags
@@ -144,6 +145,8 @@ def score_path(
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
             kill += _corner_kill(missiles, spare, vertices, below, above)
+    if data.airspace.zones.kept.shape[0] > 0 or data.airspace.max_height < math.inf:
+        add_airspace_violations(data, path, legs, corners, flown, lags, violations)
     objectives.length_ratio = length / limits.straight_distance
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
 

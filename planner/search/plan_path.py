@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
+from planner.airspace.airspace_arrays import is_limited
 from planner.evaluation.certify import kill_distance
 from planner.evaluation.encoding import ENCODINGS, rotated_frame, rotated_vectors
 from planner.evaluation.paper_scores import paper_scores
@@ -20,6 +21,7 @@ from planner.search.algorithms import find_algorithm
 from planner.search.limits_for import limits_for
 from planner.search.score_table import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, best_first, no_scores, safe
 from planner.search.search_state import Archive, Improved, Search, SearchProgress, StopCondition
+from planner.seeding.airspace_routes import airspace_routes
 from planner.seeding.first_samples import bridge_basis, first_samples
 from planner.seeding.grid_routes import GridRoute, grid_routes
 from planner.seeding.waypoint_fitting import QUICK, fit_waypoints
@@ -268,7 +270,8 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     found, scores = [], []
-    for route in grid_routes(data, frame, span, grids):
+    routes = airspace_routes if is_limited(data.airspace) else grid_routes
+    for route in routes(data, frame, span, grids):
         found.append(route)
         path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
         vectors = rotated_vectors(space, encoding, path[None])
