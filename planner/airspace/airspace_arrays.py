@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 
-class Airspace(NamedTuple):
+class AirspaceArrays(NamedTuple):
     """Where a path may be beside the map, its floor and its ceiling; lengths in m.
 
     zones: to keep out of, and to stay in.
@@ -30,8 +30,8 @@ class Airspace(NamedTuple):
     depths: Heights
 
 
-def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Airspace:
-    """Airspace of a scenario.
+def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> AirspaceArrays:
+    """AirspaceArrays of a scenario.
 
     buffer: kept below the greatest height, m; where a fixed end leaves less, the margins' share of that.
 
@@ -51,10 +51,10 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Ai
     if most is not None and terrain is not None:
         left = most - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
         buffers = [buffer if one >= buffer else margins.share * max(0.0, float(one)) for one in left]
-    return Airspace(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
+    return AirspaceArrays(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
 
 
-def is_limited(airspace: Airspace) -> bool:
+def is_limited(airspace: AirspaceArrays) -> bool:
     """Whether there is a zone or a greatest height.
 
     >>> from world.scenario import load_scenario

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.airspace.zones import Zone
-from world.kernels import Records, compiled, compiled_views, record_dtype
+from world.kernels import Records, compiled, record_dtype
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -91,7 +91,7 @@ def _give_way(
                     keeps.beyond = max(0.0, share * over)
 
 
-@compiled_views
+@compiled
 def first_near(zones: KeptZones, west: float) -> int:  # pragma: no cover - compiled
     """The first exclusion of those, in their order, that may reach as far east as `west` (m)."""
     low, high = zones.inclusions, zones.kept.shape[0]

@@ -14,7 +14,7 @@ from planner.airspace.kept_zones import KeptZones, first_near
 from planner.airspace.zone_reach import MapSegment, line_between, reach_of
 from world.airspace.zone_kernels import ZoneRecords, edge_distance
 from world.frames import PolyMapRecord, polymap
-from world.kernels import Record, compiled_views, inlined
+from world.kernels import Record, compiled, inlined
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -37,7 +37,7 @@ class Stretch(NamedTuple):
     highest_above_ground: float
 
 
-@compiled_views
+@compiled
 def zone_excess(
     zones: KeptZones,
     heights: Heights,
@@ -86,7 +86,7 @@ def zone_excess(
     return total
 
 
-@compiled_views
+@compiled
 def inside_depth(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -106,7 +106,7 @@ def inside_depth(
     return max(depth, 1e-9), min(1.0, max(0.0, first)), min(1.0, max(0.0, last))
 
 
-@compiled_views
+@compiled
 def _aside_excess(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> float:  # pragma: no cover - compiled
@@ -133,7 +133,7 @@ def stretch_of(up: float, to_up: float, below: float, above: float) -> Stretch: 
     return Stretch(lowest, highest, -UNKNOWN, UNKNOWN)
 
 
-@compiled_views
+@compiled
 def _sampled_stretch(
     heights: Heights,
     to_pixel: PolyMapRecord,

@@ -7,7 +7,7 @@ import math
 from typing import NamedTuple
 
 from world.airspace.zone_kernels import ZoneRecords
-from world.kernels import compiled_views, inlined
+from world.kernels import compiled, inlined
 
 
 class MapSegment(NamedTuple):
@@ -47,7 +47,7 @@ def line_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # p
     return MapSegment(ax, ay, dx / run, dy / run, run)
 
 
-@compiled_views
+@compiled
 def reach_of(records: ZoneRecords, z: int, line: MapSegment, within: float) -> ShapeView:  # pragma: no cover - compiled
     """Zone z's shape seen from a line; distances above `within` (m) do not matter."""
     zone = records.zones[z]

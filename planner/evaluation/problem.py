@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
 from aircraft.tracking import no_tracking
-from planner.airspace.airspace_arrays import Airspace, make_airspace
+from planner.airspace.airspace_arrays import AirspaceArrays, make_airspace
 from planner.airspace.kept_zones import ZoneMargins
 from planner.evaluation.encoding import Space
 from planner.evaluation.missile_index import make_missile_index
@@ -133,7 +133,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.strays else arrays
 
 
-def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> Airspace:
+def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> AirspaceArrays:
     """The airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
     margins = ZoneMargins(SEARCH_ZONE_MARGIN, buffer, 1.0)

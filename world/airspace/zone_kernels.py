@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from world.airspace.zones import Cylinder, Zone, ZoneLevel
-from world.kernels import Record, Records, compiled_views, inlined, record_dtype
+from world.kernels import Record, Records, compiled, inlined, record_dtype
 
 # One zone.  round: whether it is a cylinder, of which `centre_east`, `centre_north` and `radius` say all.  first_edge,
 # last_edge: its edges in the array of edges, the last not included.  west to north: its box on the map.  floor,
@@ -91,7 +91,7 @@ def box_distance(
     return math.sqrt(across * across + along * along)
 
 
-@compiled_views
+@compiled
 def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:  # pragma: no cover - compiled
     """Horizontal distance from a place to zone z's outline, m; negative inside its shape."""
     zone = records.zones[z]
@@ -132,7 +132,7 @@ def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no
     return below if below > above or below != below else above
 
 
-@compiled_views
+@compiled
 def inside_share(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, first: float, last: float
 ) -> float:  # pragma: no cover - compiled
@@ -187,7 +187,7 @@ def _between(
     return off_e * off_e + off_n * off_n, share
 
 
-@compiled_views
+@compiled
 def segment_distance(
     records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

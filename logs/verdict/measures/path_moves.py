@@ -15,7 +15,7 @@ from flight.guidance.path_kernels import profile
 from flight.simulation.track import Track
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from world.kernels import Record, Records, compiled_views, record_dtype
+from world.kernels import Record, Records, compiled, record_dtype
 
 Floats = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ MOVE = record_dtype(
 )
 
 
-@compiled_views
+@compiled
 def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
     """East, north and up (m) at a share of a move."""
     run = share * move.length

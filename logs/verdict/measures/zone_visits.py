@@ -14,7 +14,7 @@ from logs.verdict.measures.path_moves import move_point
 from logs.verdict.tolerances import FENCE_DEPTH, FENCE_EDGE
 from world.airspace.zone_kernels import ZoneRecords, box_distance, edge_distance, outside_band
 from world.frames import POLYMAP, PolyMapRecord, polymap
-from world.kernels import Record, Records, compiled, compiled_views, record_dtype
+from world.kernels import Record, Records, compiled, record_dtype
 from world.terrain import Terrain, ground_height
 
 Floats = NDArray[np.float64]
@@ -153,7 +153,7 @@ def _steepest(
     return math.sqrt(steepest) / pitch * (1.0 + 1e-6)
 
 
-@compiled_views
+@compiled
 def violation(
     records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
 ) -> float:  # pragma: no cover - compiled
@@ -254,7 +254,7 @@ def _part_moves(
         _add_part(move, first, last, before, after, visit)
 
 
-@compiled_views
+@compiled
 def _add_part(
     move: Record, first: float, last: float, before: float, after: float, visit: Record
 ) -> None:  # pragma: no cover - compiled
