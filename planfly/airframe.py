@@ -75,7 +75,8 @@ def load_airframe(scenario: Scenario) -> Airframe:
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
     limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
     if parameters is not None:
-        tracking = tracking_error(parameters, airspeed, table.steering.nav, fly_over=table.fly_over)
+        nav, turbulence = table.steering.nav, scenario.wind.turbulence
+        tracking = tracking_error(parameters, airspeed, nav, fly_over=table.fly_over, turbulence=turbulence)
         limits = replace(limits, tracking=tracking)
     return Airframe(aircraft, limits, battery, parameters)
 
