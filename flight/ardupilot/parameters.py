@@ -87,6 +87,8 @@ DEFINITIONS = {
     "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _CENTI)),
     "rtl_radius": Definition("RTL_RADIUS", 0.0, -32767.0, 32767.0),
 }
+# Read, and no flight of ours shows them: a return is flown as a leg to home at the last height, and ends the flight.
+NOT_FLOWN = ("RTL_ALTITUDE", "RTL_RADIUS")
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 

@@ -99,6 +99,7 @@ def judge_flight(
         notes=setup.route.notes,
         leg_ends=() if aligned is None else aligned.leg_ends(),
         program=setup.program,
+        parameters=setup.parameters,
     )
 
 

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from flight.ardupilot.parameters import NOT_FLOWN
 from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import RULES, Finding
@@ -217,6 +218,8 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     unused = list(parameters.unused[:_NAMED])
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
+    returns = [name for name in NOT_FLOWN if name in parameters.by_origin("file")]
+    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
         f" {names['default']} ArduPlane's defaults{said}"
