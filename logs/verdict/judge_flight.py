@@ -15,6 +15,7 @@ from logs.verdict.judge_geometry import (
     judge_geometry,
     judge_plan_only,
     judge_unflown,
+    unflyable_items,
 )
 from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
@@ -108,6 +109,7 @@ def _flown_findings(
 ) -> tuple[Finding, ...]:
     """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
     findings = (
+        *unflyable_items(demands.setup),
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
@@ -134,7 +136,7 @@ def _levels(
     """
     levels = []
     if demands.envelope:
-        predicted = geometric_findings(demands)
+        predicted = (*unflyable_items(demands.setup), *geometric_findings(demands))
         passes = not any(item.ok is False for item in predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))
