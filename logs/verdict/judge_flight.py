@@ -74,8 +74,7 @@ def judge_flight(
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
     >>> setup = FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1)
     >>> flown = simulate(setup, aerosonde)
-    >>> verdict = judge_flight(setup, flown.track, flown.ended)
-    >>> verdict.headline
+    >>> judge_flight(setup, flown.track, flown.ended).headline
     'flyable'
     """
     demands = route_demands(setup, envelope=envelope)
