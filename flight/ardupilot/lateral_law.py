@@ -145,17 +145,37 @@ def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - co
 
 
 @compiled
+def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:  # pragma: no cover - compiled
+    """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.  pitch: rad."""
+    level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
+    wanted = math.atan(side_acceleration / (GRAVITY * level))
+    within: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
+    return within
+
+
+@compiled
+def least_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
+    """Least airspeed that is flown in a wanted bank (rad), equivalent, m/s: AIRSPEED_MIN, for the load in the bank.
+
+    A bank of phi takes 1 / sqrt(cos phi) of the least airspeed.
+    """
+    load = math.sqrt(math.cos(min(math.radians(85.0), abs(bank)))) if parameters.stall_prevention > 0.0 else 1.0
+    least: float = parameters.airspeed_min / load
+    return least
+
+
+@compiled
 def roll_demand(
     side_acceleration: float, pitch: float, airspeed: float, parameters: Record
 ) -> float:  # pragma: no cover - compiled
     """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG and what the airspeed bears without a stall, rad.
 
-    pitch: rad.  airspeed: equivalent, m/s.  A bank of phi takes 1 / sqrt(cos phi) of the least airspeed.
+    pitch: rad.  airspeed: equivalent, m/s.
     """
-    level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
-    wanted = math.atan(side_acceleration / (GRAVITY * level))
-    limit = parameters.roll_limit
+    wanted = wanted_bank(side_acceleration, pitch, parameters)
+    if parameters.stall_prevention <= 0.0:
+        return wanted
     spare = max(1.0, airspeed / parameters.airspeed_min)
-    limit = min(limit, max(_LEAST_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare)))))
+    limit = max(_LEAST_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
     demanded: float = min(limit, max(-limit, wanted))
     return demanded

@@ -85,6 +85,7 @@ def _begin(
     own.height_limited = estimated.up
     own.height_demand = estimated.up
     own.climb_share, own.sink_share = 1.0, 1.0
+    own.airspeed_read = state.airspeed
     own.airspeed = state.airspeed
     own.airspeed_demand = state.airspeed
     # As it has flown before: what level flight here takes is known.

@@ -15,6 +15,7 @@ from logs.verdict.judge_geometry import (
     judge_geometry,
     judge_plan_only,
     judge_unflown,
+    unflyable_items,
 )
 from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
@@ -75,8 +76,7 @@ def judge_flight(
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
     >>> setup = FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1)
     >>> flown = simulate(setup, aerosonde)
-    >>> verdict = judge_flight(setup, flown.track, flown.ended)
-    >>> verdict.headline
+    >>> judge_flight(setup, flown.track, flown.ended).headline
     'flyable'
     """
     demands = route_demands(setup, envelope=envelope)
@@ -101,6 +101,7 @@ def judge_flight(
         notes=setup.route.notes,
         leg_ends=() if aligned is None else aligned.leg_ends(),
         program=setup.program,
+        parameters=setup.parameters,
     )
 
 
@@ -109,6 +110,7 @@ def _flown_findings(
 ) -> tuple[Finding, ...]:
     """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
     findings = (
+        *unflyable_items(demands.setup),
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
@@ -137,7 +139,7 @@ def _levels(
     """
     levels = []
     if demands.envelope:
-        predicted = geometric_findings(demands)
+        predicted = (*unflyable_items(demands.setup), *geometric_findings(demands))
         passes = not any(item.ok is False for item in predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))

@@ -79,6 +79,11 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
 
 
+def unflyable_items(setup: FlightSetup) -> list[Finding]:
+    """What fails of a person's mission by its items alone, whoever flies it; a plan's own are ours."""
+    return [item for item in mission_findings(setup) if item.ok is False] if setup.plan is None else []
+
+
 def flown_level(setup: FlightSetup) -> LevelName:
     """The level that a flight of a setup answers."""
     return "airframe" if setup.parameters is None else "autopilot"

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from flight.ardupilot.parameters import NOT_FLOWN
 from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import RULES, Finding
@@ -158,7 +159,7 @@ def summary_lines(
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
-    lines = [own.headline, *_whose_fault(levels, deciding, tried=setup.program is None)]
+    lines = [own.headline, *_whose_fault(levels, deciding, real=setup.program is not None)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
@@ -192,17 +193,17 @@ def summary_lines(
     return tuple(lines)
 
 
-def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, tried: bool) -> list[str]:
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, real: bool) -> list[str]:
     """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides.
 
-    tried: whether other parameters were flown.
+    real: whether a real autopilot flew; other parameters are flown by its law.
     """
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe"):
         return []
-    why = ": no single parameter that was tried would pass" if tried else ""
+    why = "" if real else ": no single parameter that was tried would pass"
     if deciding is not None:
-        why = f": {deciding_text(deciding)}"
+        why = f": {deciding_text(deciding)}{', by the flight of its law' if real else ''}"
     return [f"The aircraft can, ArduPlane with these parameters cannot{why}"]
 
 
@@ -239,6 +240,8 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     unused = list(parameters.unused[:_NAMED])
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
+    returns = [name for name in NOT_FLOWN if name in parameters.by_origin("file")]
+    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
         f" {names['default']} ArduPlane's defaults{said}"

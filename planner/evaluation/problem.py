@@ -149,10 +149,10 @@ def _most_buffer(certified: ProblemArrays) -> float:
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """What the aircraft can do, of which turbulence leaves a plan a share, and no more than its autopilot asks for."""
-    whole = limits.performance()
+    table = derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence])
     if limits.tracking is not None:
-        whole = within_rates(whole, limits.tracking.climb_rate, limits.tracking.sink_rate)
-    return derated(whole, TURBULENCE_SHARE[scenario.wind.turbulence])
+        table = within_rates(table, limits.tracking.climb_rate, limits.tracking.sink_rate)
+    return table
 
 
 def _edges(bounds: Floats) -> dict[str, float]:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.ardupilot.speed_commands import takes_speed
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
@@ -38,6 +39,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     asked = float(demands.setup.route.airspeed[leg])
     true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
+    said += _not_taken(demands, asked)
     said += _no_room(demands, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
@@ -76,6 +78,15 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
         method="commanded airspeed in the envelope",
         facts=facts,
     )
+
+
+def _not_taken(demands: RouteDemands, asked: float) -> list[str]:
+    """That ArduPlane does not take a commanded speed (m/s, equivalent)."""
+    parameters = demands.setup.parameters
+    if parameters is None or takes_speed(asked, parameters):
+        return []
+    least, most = parameters.airspeed_min, parameters.airspeed_max
+    return [f"ArduPlane takes speeds from AIRSPEED_MIN {least:g} to AIRSPEED_MAX {most:g} m/s, and ignores this one"]
 
 
 def _no_room(demands: RouteDemands, leg: int, commanded: float) -> list[str]:
