@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.world.made_scenario import SMALL, THREAT, refused, with_fault
+from tests.world.made.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario_file import check_scenario, parse_scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile

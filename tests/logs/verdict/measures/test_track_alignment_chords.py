@@ -41,20 +41,38 @@ def test_of_all_assignments_in_order_of_time_the_least_is_found(seed: int, step:
         assert capped[i] == (((rows - marks[i]) ** 2).sum(axis=1).min() >= CAPTURE**2)
 
 
-def test_a_long_tracks_table_is_thinned_to_its_size(monkeypatch: pytest.MonkeyPatch) -> None:
-    setup = make_setup([[0, 0, 300], [0, 3000, 300], [0, 6000, 300]])
-    track, seen, align = fly_path(setup), [], track_alignment._align
+@pytest.fixture
+def steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many rows a chord had, each time that rows were laid to waypoints."""
+    seen, align = [], track_alignment._align
 
     def watched(position: Any, marks: Any, step: int, capture: float) -> Any:
         seen.append(step)
         return align(position, marks, step, capture)
 
     monkeypatch.setattr(track_alignment, "_align", watched)
+    return seen
+
+
+LONG = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
+
+
+@pytest.mark.parametrize(("rate", "rows"), [(50.0, 12), (10.0, 2), (2.0, 1)])
+def test_a_chord_lasts_as_long_at_any_rate(steps: list[int], rate: float, rows: int) -> None:
+    setup = make_setup(LONG)
+    assert lay_track(route_demands(setup), fly_path(setup, rate=rate)) is not None
+    # As many whole rows as a quarter of a second has, or one.
+    assert steps == [rows]
+
+
+def test_a_long_tracks_table_is_thinned_to_its_size(steps: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+    setup = make_setup(LONG)
+    track = fly_path(setup)
     monkeypatch.setattr(track_alignment, "_CELLS", 600)
     aligned = lay_track(route_demands(setup), track)
     assert aligned is not None
     # 14,400 rows and three waypoints in 600 cells.
-    assert seen == [math.ceil(len(track) * 3 / 600)]
+    assert steps == [math.ceil(len(track) * 3 / 600)]
     assert aligned.track.time[aligned.rows] == pytest.approx([0.0, 120.0, 240.0], abs=0.02)
 
 
