@@ -31,7 +31,7 @@ class KeptAirspace(NamedTuple):
 
 
 def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> KeptAirspace:
-    """KeptAirspace of a scenario.
+    """The airspace of a scenario with what is kept from it.
 
     buffer: kept below the greatest height, m; where a fixed end leaves less, the margins' share of that.
 
