@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from world.airspace.zone_files import read_zone_files
 from world.airspace.zones import Zone
 from world.airspace.zones_on_map import check_ends, make_zones
 from world.errors import ScenarioError, TerrainError
@@ -159,6 +160,10 @@ def from_spec(
     ('tight', [[-300.0, 2900.0], [-150.0, 150.0]])
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
+    if spec.zones_file is not None:
+        # Written down with the scenario's own, so that a log without the files makes the same scenario.
+        zones = [*(spec.zones or ()), *read_zone_files(spec.zones_file, source, base)]
+        spec = spec.model_copy(update={"zones": zones, "zones_file": None})
     if terrain is not None:
         spec, base = _with_terrain(spec, terrain, source, base), None
     raster = None

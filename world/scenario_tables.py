@@ -286,6 +286,7 @@ class ScenarioFile(ScenarioTable):
     """A whole scenario file.
 
     zones: None where there are none, so that what is written of a scenario without them stays as it was.
+    zones_file: GeoJSON or KML, one or several; in a made scenario their zones stand among the others.
     """
 
     name: Name
@@ -297,6 +298,7 @@ class ScenarioFile(ScenarioTable):
     destination: EndTable
     threats: list[ThreatTable] = Field(default_factory=list, max_length=20_000)
     zones: Annotated[list[ZoneTable], Field(max_length=MOST_ZONES)] | None = None
+    zones_file: FilePath | Annotated[list[FilePath], Field(max_length=100)] | None = None
     limits: LimitsTable = LimitsTable()
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()

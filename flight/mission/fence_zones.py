@@ -2,6 +2,7 @@
 
 from flight.mission.fences import INCLUSIONS, POLYGONS, fence_shapes
 from flight.mission.items import MissionItem
+from world.airspace.ring_on_map import ring_on_map
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneKind, make_cylinder, make_polygon
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
@@ -24,12 +25,12 @@ def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str 
     shape: Polygon | Cylinder
     for corners in fence_shapes(fences, source):
         first = corners[0]
-        east, north = to_map(origin, [corner.lat_deg for corner in corners], [corner.lon_deg for corner in corners])
         try:
             if first.command in POLYGONS:
-                shape = make_polygon([list(zip(east.tolist(), north.tolist(), strict=True))])
+                shape = make_polygon([ring_on_map(origin, [(corner.lat_deg, corner.lon_deg) for corner in corners])])
             else:
-                shape = make_cylinder(float(east[0]), float(north[0]), first.params[0])
+                east, north = to_map(origin, first.lat_deg, first.lon_deg)
+                shape = make_cylinder(float(east), float(north), first.params[0])
         except ValueError as error:
             raise MissionError(f"{source}: fence item {first.seq}: {error}") from error
         kind: ZoneKind = "inclusion" if first.command in INCLUSIONS else "exclusion"

@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 
-class AirspaceArrays(NamedTuple):
+class KeptAirspace(NamedTuple):
     """Where a path may be beside the map, its floor and its ceiling; lengths in m.
 
     zones: to keep out of, and to stay in.
@@ -30,13 +30,13 @@ class AirspaceArrays(NamedTuple):
     depths: Heights
 
 
-def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> AirspaceArrays:
-    """AirspaceArrays of a scenario.
+def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> KeptAirspace:
+    """The airspace of a scenario with what is kept from it.
 
     buffer: kept below the greatest height, m; where a fixed end leaves less, the margins' share of that.
 
     >>> from world.scenario import load_scenario
-    >>> space = make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
+    >>> space = keep_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
     >>> space.max_height, len(space.zones.kept)
     (inf, 0)
     """
@@ -51,14 +51,14 @@ def make_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Ai
     if most is not None and terrain is not None:
         left = most - (ends[:, 2] - terrain.height(ends[:, 0], ends[:, 1])) - 0.01
         buffers = [buffer if one >= buffer else margins.share * max(0.0, float(one)) for one in left]
-    return AirspaceArrays(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
+    return KeptAirspace(zones, math.inf if most is None else most, buffer, buffers[0], buffers[1], depths)
 
 
-def is_limited(airspace: AirspaceArrays) -> bool:
+def is_limited(airspace: KeptAirspace) -> bool:
     """Whether there is a zone or a greatest height.
 
     >>> from world.scenario import load_scenario
-    >>> is_limited(make_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0))
+    >>> is_limited(keep_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0))
     False
     """
     return len(airspace.zones.kept) > 0 or airspace.max_height < math.inf

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
 from aircraft.tracking import no_tracking
-from planner.airspace.airspace_arrays import AirspaceArrays, make_airspace
+from planner.airspace.airspace_arrays import KeptAirspace, keep_airspace
 from planner.airspace.kept_zones import ZoneMargins
 from planner.evaluation.encoding import Space
 from planner.evaluation.missile_index import make_missile_index
@@ -128,16 +128,16 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
-        airspace=make_airspace(scenario, ZoneMargins(CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
+        airspace=keep_airspace(scenario, ZoneMargins(CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.strays else arrays
 
 
-def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> AirspaceArrays:
+def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> KeptAirspace:
     """The airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
     margins = ZoneMargins(SEARCH_ZONE_MARGIN, buffer, 1.0)
-    return make_airspace(scenario, margins, min(buffer, _most_buffer(certified)))
+    return keep_airspace(scenario, margins, min(buffer, _most_buffer(certified)))
 
 
 def _most_buffer(certified: ProblemArrays) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
-from planner.airspace.airspace_arrays import AirspaceArrays
+from planner.airspace.airspace_arrays import KeptAirspace
 from planner.evaluation.missile_index import MissileIndex
 from planner.evaluation.threat_grid import ThreatCells
 from planner.plan import Objective, Violation
@@ -107,7 +107,7 @@ class ProblemArrays(NamedTuple):
     missiles: MissileIndex
     slope_bounds: SlopeBounds
     tracking: Record
-    airspace: AirspaceArrays
+    airspace: KeptAirspace
 
 
 def threat_records(threats: Threats) -> Records:

@@ -21,6 +21,7 @@ def test_every_default() -> None:
         "origin": None,
         "threats": [],
         "zones": None,
+        "zones_file": None,
         "limits": {
             "max_turn_deg": "aircraft",
             "max_climb_deg": "aircraft",

@@ -151,3 +151,18 @@ def is_hole(ring: Ring) -> bool:
     True
     """
     return not shapely.LinearRing(ring).is_ccw
+
+
+def holes_lie_inside(rings: Sequence[Sequence[tuple[float, float]]]) -> bool:
+    """Whether all rings but the first lie within it, or one of them is no ring, which `make_polygon` refuses.
+
+    >>> square = [(0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0)]
+    >>> holes_lie_inside([square, [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]])
+    True
+    >>> holes_lie_inside([square, [(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)]])
+    False
+    """
+    if any(len(ring) < 3 for ring in rings):
+        return True
+    outline, *holes = (shapely.Polygon(ring) for ring in rings)
+    return not all(ring.is_valid for ring in (outline, *holes)) or all(outline.covers(hole) for hole in holes)

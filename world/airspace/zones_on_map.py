@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from world.airspace.ring_on_map import ring_on_map
 from world.airspace.zone_kernels import edge_distance, outside_band, zone_records
 from world.airspace.zone_tables import ZoneTable
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, make_cylinder, make_polygon
@@ -50,15 +51,7 @@ def _shape(table: ZoneTable, origin: GeoOrigin) -> Polygon | Cylinder:
     if metres is not None:
         return make_polygon([[(east, north) for east, north in ring] for ring in metres])
     degrees = (table.rings_deg or []) if table.polygon_deg is None else [table.polygon_deg]
-    return make_polygon([_on_map(ring, origin) for ring in degrees])
-
-
-def _on_map(ring: list[list[float]], origin: GeoOrigin) -> list[tuple[float, float]]:
-    if not ring:
-        return []
-    lat, lon = np.array(ring, dtype=np.float64).T
-    east, north = to_map(origin, lat, lon)
-    return list(zip(east.tolist(), north.tolist(), strict=True))
+    return make_polygon([ring_on_map(origin, ring) for ring in degrees])
 
 
 def _level(amsl: float | None, above_ground: float | None) -> ZoneLevel | None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.world.made_scenario import refused, with_fault
+from tests.world.made.made_scenario import refused, with_fault
 from world.airspace.zone_tables import ZoneTable
 
 SQUARE = "polygon_m = [[-500, 1000], [500, 1000], [500, 2000], [-500, 2000]]"

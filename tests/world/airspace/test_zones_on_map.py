@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.world.airspace.test_zone_tables import SQUARE, zone
-from tests.world.made_scenario import SMALL, made_spec, refused, with_fault
+from tests.world.made.made_scenario import SMALL, made_spec, refused, with_fault
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel
 from world.airspace.zones_on_map import zone_broken_at
 from world.errors import ScenarioError
