@@ -5,7 +5,7 @@ from typing import Literal
 
 from world.errors import ScenarioError
 
-Optimiser = Literal["umda", "emna", "chain", "differential"]
+Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,8 @@ class Algorithm:
     graded: constraints by how far they are violated, along the whole path, and kill exposure ahead of length.
     smooth: first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
-    optimiser: which of `planner.optimisers` it uses.
+    tightened: ends with moves of all waypoints of its best path at once.
+    optimiser: which of `planner.optimisers` it uses; "waypoints" is `planner.search.waypoint_generations`.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Algorithm:
     graded: bool = False
     smooth: bool = False
     seeded: bool = False
+    tightened: bool = False
     optimiser: Optimiser = "umda"
 
 
@@ -38,6 +40,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
         ),
         Algorithm(
             "umda-smooth",
@@ -46,11 +49,19 @@ ALGORITHMS: dict[str, Algorithm] = {
             smooth=True,
         ),
         Algorithm(
+            "fda",
+            "no seeds: waypoints of each interval joined to the best paths, each ranked by the best path through it",
+            graded=True,
+            tightened=True,
+            optimiser="waypoints",
+        ),
+        Algorithm(
             "emna-seeded",
             "full covariance of all variables (EMNA), started from grid routes",
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
             optimiser="emna",
         ),
         Algorithm(
@@ -62,6 +73,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
             optimiser="chain",
         ),
         Algorithm(
@@ -77,6 +89,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
             optimiser="differential",
         ),
         Algorithm(
