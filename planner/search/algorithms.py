@@ -107,7 +107,13 @@ ALGORITHMS: dict[str, Algorithm] = {
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
         Algorithm("umda", "the paper's UMDA in the rotated frame: counts on six points a leg, no seeds"),
         Algorithm("umda-cartesian", "the paper's baseline: the same UMDA on absolute waypoints", encoding="cartesian"),
-        Algorithm("umda-polar", "the paper's baseline: the same UMDA on relative polar waypoints", encoding="polar"),
+        Algorithm(
+            "umda-polar",
+            "the paper's baseline: the same UMDA on steps and turning angles of up to 180 degrees",
+            encoding="polar",
+        ),
+        Algorithm("umda-polar-45", "the same with turning angles of up to 45 degrees", encoding="polar-45"),
+        Algorithm("umda-bearing", "the same on steps and their angles from the straight line", encoding="bearing"),
     )
 }
 DEFAULT = "umda-seeded"
