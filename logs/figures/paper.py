@@ -21,15 +21,20 @@ from world.scenario import Scenario
 Floats = NDArray[np.float64]
 
 # Inches: as the map's.
-_LEFT, _MAP_WIDTH, _TOP, _BOTTOM, _LEGEND = 0.72, 7.72, 0.5, 0.55, 0.85
+_LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55
+# Height of the legend, and of one with a line pair for each encoding, inches.
+_LEGEND, _TALL_LEGEND = 0.85, 1.2
 _COLUMN = 8.72
 # One look for each algorithm of a figure, distinct without colour too.
 _LOOKS: tuple[dict[str, Any], ...] = (
     {"color": style.BLUE, "linestyle": "-"},
     {"color": style.FAIL, "linestyle": (0, (5, 1.5))},
     {"color": style.INK, "linestyle": (0, (1.2, 1.2))},
+    {"color": style.LIMIT, "linestyle": (0, (4, 1.2, 1, 1.2))},
+    {"color": style.PLANNED, "linestyle": (0, (7, 2))},
+    {"color": style.QUIET, "linestyle": (0, (2.5, 1.5))},
 )
-_MARKERS = ("o", "s", "^")
+_MARKERS = ("o", "s", "^", "D", "v", "P")
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +58,7 @@ def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -
     safe = sum(path.safe for path in paths)
     title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
     with style.clean_style():
-        figure, axes, around = _map(scenario, title)
+        figure, axes, around = _map(scenario, title, _LEGEND)
         handles: list[Any] = []
         for good, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
             chosen = [path for path in paths if path.safe == good]
@@ -83,7 +88,8 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
     'example: one path of each encoding, seed 1'
     """
     with style.clean_style():
-        figure, axes, around = _map(scenario, f"{scenario.name}: one path of each encoding, seed {seed}")
+        title = f"{scenario.name}: one path of each encoding, seed {seed}"
+        figure, axes, around = _map(scenario, title, _TALL_LEGEND)
         handles = []
         for (name, path), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
             axes.plot(
@@ -92,18 +98,18 @@ def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: in
             text = f"{name}\n{'safe' if path.safe else 'not safe'}, PLR {path.length_ratio:.3f}"
             handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
         handles += _ends(axes, scenario, [path.waypoints for path in chosen.values()])
-        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+        draw_legend(figure, handles + around, _LEFT, (_TALL_LEGEND - 0.02) / figure.get_figheight())
     return figure
 
 
-def _map(scenario: Scenario, title: str) -> tuple[Figure, Any, list[Any]]:
-    """Ground and threats; returns figure, axes and the legend's entries for them."""
+def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
+    """Ground and threats; returns figure, axes and the legend's entries for them.  legend: its height, inches."""
     low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
     padding = 0.02 * float((high - low).max())
     tall = _MAP_WIDTH * float((high[1] - low[1] + 2 * padding) / (high[0] - low[0] + 2 * padding))
-    total = _TOP + tall + _BOTTOM + _LEGEND
+    total = _TOP + tall + _BOTTOM + legend
     figure = style.new_figure(total)
-    base = (_LEGEND + _BOTTOM) / total
+    base = (legend + _BOTTOM) / total
     axes = figure.add_axes((_LEFT / style.WIDTH, base, _MAP_WIDTH / style.WIDTH, tall / total))
     axes.set(xlim=(low[0] - padding, high[0] + padding), ylim=(low[1] - padding, high[1] + padding), aspect="equal")
     kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))

@@ -1,7 +1,7 @@
 """Encodings: how a vector of numbers in a box becomes waypoints.
 
 `rotated` is the idea of Yang, Tang and Lozano (CEC 2014, section III, eq. 12); `cartesian` and `polar` are what they
-compare it with.
+compare it with, and `bearing` is a polar encoding that they do not have.
 Lengths, angles and slopes survive the rotation, so nothing outside this file works in rotated axes except the
 grids that seed a search.
 """
@@ -169,22 +169,48 @@ def cartesian(space: Space, waypoints: int) -> Encoding:
 
 
 def polar(space: Space, waypoints: int) -> Encoding:
-    """Each inner waypoint as a step from the one before: r, theta, up.
+    """Each inner waypoint as a step from the one before: r, theta, up (section III.A).
 
-    theta: angle of the step from the direction start-destination, within +-pi, positive to the left.  r: from 5 %
-    to 200 % of the straight distance over the number of legs (the paper states no range).
+    theta: "the turning angle at each waypoint", from the leg before, the first from the direction start-destination;
+    within +-180 degrees, positive to the left.  r: from 5 % to 200 % of the straight distance over the number of legs.
+    The paper states neither range; `polar-45` allows no turn beyond the paper's limit.
     """
+    return _steps("polar", space, waypoints, math.pi, turning=True)
+
+
+def polar_45(space: Space, waypoints: int) -> Encoding:
+    """As `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
+    return _steps("polar-45", space, waypoints, math.pi / 4.0, turning=True)
+
+
+def bearing(space: Space, waypoints: int) -> Encoding:
+    """As `polar`, but theta is each leg's angle from the direction start-destination, so that errors do not add up.
+
+    It is not the paper's: a change of one waypoint shifts those after it, but does not turn them.
+    """
+    return _steps("bearing", space, waypoints, math.pi, turning=False)
+
+
+def _steps(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
+    """Steps r, theta, up; theta within +-widest (rad): turning, from the step before, else from the straight line."""
     frame = rotated_frame(space.start, space.destination)
     mean = frame.length / (waypoints - 1)
-    low, high = np.array([_SHORTEST * mean, -math.pi, space.up[0]]), np.array([2.0 * mean, math.pi, space.up[1]])
+    low, high = np.array([_SHORTEST * mean, -widest, space.up[0]]), np.array([2.0 * mean, widest, space.up[1]])
 
     def decode(vectors: Floats) -> Floats:
         steps = vectors.reshape(len(vectors), waypoints - 2, 3)
-        along = np.cumsum(steps[..., 0] * np.cos(steps[..., 1]), axis=1)
-        across = np.cumsum(steps[..., 0] * np.sin(steps[..., 1]), axis=1)
+        course = np.cumsum(steps[..., 1], axis=1) if turning else steps[..., 1]
+        along = np.cumsum(steps[..., 0] * np.cos(course), axis=1)
+        across = np.cumsum(steps[..., 0] * np.sin(course), axis=1)
         return _with_ends(space, frame.restore(np.stack([along, across, steps[..., 2]], axis=-1)))
 
-    return Encoding("polar", waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
+    return Encoding(name, waypoints, np.tile(low, waypoints - 2), np.tile(high, waypoints - 2), decode)
 
 
-ENCODINGS: dict[str, Callable[[Space, int], Encoding]] = {"rotated": rotated, "cartesian": cartesian, "polar": polar}
+ENCODINGS: dict[str, Callable[[Space, int], Encoding]] = {
+    "rotated": rotated,
+    "cartesian": cartesian,
+    "polar": polar,
+    "polar-45": polar_45,
+    "bearing": bearing,
+}

@@ -49,15 +49,15 @@ def measure_corners(
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
         some = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
-        _measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
+        measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
     for i, asked in ((0, data.start_course), (last, data.destination_course)):
         ux, uy, vx, vy = courses_at(data, legs, i)
         some = not math.isnan(asked) and legs[min(i, last - 1)].run > 0.0
-        _measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
+        measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
 
 
 @inlined
-def _measure_corner(
+def measure_corner(
     aircraft: PerformanceTable,
     tracking: Record,
     wind: Wind,

@@ -5,7 +5,7 @@ from typing import Literal
 
 from world.errors import ScenarioError
 
-Optimiser = Literal["umda", "emna", "chain", "differential"]
+Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,7 +17,8 @@ class Algorithm:
     graded: constraints by how far they are violated, along the whole path, and kill exposure ahead of length.
     smooth: first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
-    optimiser: which of `planner.optimisers` it uses.
+    tightened: ends with moves of all waypoints of its best path at once.
+    optimiser: which of `planner.optimisers` it uses; "waypoints" is `planner.search.waypoint_generations`.
     """
 
     name: str
@@ -26,6 +27,7 @@ class Algorithm:
     graded: bool = False
     smooth: bool = False
     seeded: bool = False
+    tightened: bool = False
     optimiser: Optimiser = "umda"
 
 
@@ -38,6 +40,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
         ),
         Algorithm(
             "umda-smooth",
@@ -46,11 +49,19 @@ ALGORITHMS: dict[str, Algorithm] = {
             smooth=True,
         ),
         Algorithm(
+            "fda",
+            "no seeds: waypoints of each interval joined to the best paths, each ranked by the best path through it",
+            graded=True,
+            tightened=True,
+            optimiser="waypoints",
+        ),
+        Algorithm(
             "emna-seeded",
             "full covariance of all variables (EMNA), started from grid routes",
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
             optimiser="emna",
         ),
         Algorithm(
@@ -62,6 +73,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
             optimiser="chain",
         ),
         Algorithm(
@@ -77,6 +89,7 @@ ALGORITHMS: dict[str, Algorithm] = {
             graded=True,
             smooth=True,
             seeded=True,
+            tightened=True,
             optimiser="differential",
         ),
         Algorithm(
@@ -94,7 +107,13 @@ ALGORITHMS: dict[str, Algorithm] = {
         Algorithm("umda-graded", "the paper's UMDA with graded violations along the whole path", graded=True),
         Algorithm("umda", "the paper's UMDA in the rotated frame: counts on six points a leg, no seeds"),
         Algorithm("umda-cartesian", "the paper's baseline: the same UMDA on absolute waypoints", encoding="cartesian"),
-        Algorithm("umda-polar", "the paper's baseline: the same UMDA on relative polar waypoints", encoding="polar"),
+        Algorithm(
+            "umda-polar",
+            "the paper's baseline: the same UMDA on steps and turning angles of up to 180 degrees",
+            encoding="polar",
+        ),
+        Algorithm("umda-polar-45", "the same with turning angles of up to 45 degrees", encoding="polar-45"),
+        Algorithm("umda-bearing", "the same on steps and their angles from the straight line", encoding="bearing"),
     )
 }
 DEFAULT = "umda-seeded"

@@ -1,36 +1,26 @@
 """An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from planner.airspace.airspace_arrays import is_limited
 from planner.evaluation.certify import kill_distance
-from planner.evaluation.encoding import ENCODINGS, rotated_frame, rotated_vectors
+from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
-from planner.optimisers.differential_evolution import DifferentialEvolution
-from planner.optimisers.emna import Emna
-from planner.optimisers.markov_chain import MarkovChain
-from planner.optimisers.preference import NO_GOAL, Level, ranks
-from planner.optimisers.umda import Umda
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
 from planner.search.limits_for import limits_for
-from planner.search.score_table import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, best_first, no_scores, safe
+from planner.search.path_generations import path_generations
+from planner.search.score_table import no_scores
 from planner.search.search_state import Archive, Improved, Search, SearchProgress, StopCondition
-from planner.seeding.airspace_routes import airspace_routes
-from planner.seeding.first_samples import bridge_basis, first_samples
-from planner.seeding.grid_routes import GridRoute, grid_routes
-from planner.seeding.waypoint_fitting import QUICK, fit_waypoints
+from planner.search.seeds import starting_vectors, straight_line
+from planner.search.waypoint_generations import waypoint_generations
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 # Of each attempt: stages of its grids with the routes from each, and the population's growth.
 ATTEMPTS = (
@@ -38,14 +28,8 @@ ATTEMPTS = (
     (((24, 3), (52, 3), (80, 3), (110, 2)), 2),
     (((44, 3), (96, 3), (160, 2)), 3),
 )
-# A seeded search ends when this many generations have shortened its best path by less than this share of the straight
-# line: the pattern search at the end is faster at the rest.
-STALLED_GENERATIONS, LEAST_GAIN = 10, 2e-4
-# Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
-# safe path, and once it has.
-SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
-# Evaluations that a quick path, each seed, and the best path at the end are improved with by a pattern search, at most.
-QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
+# Evaluations that the best path at the end is improved with by a pattern search, at most.
+LAST_SEARCH = 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 # Of the airspeed: in more wind no path is searched for.
@@ -154,16 +138,6 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             )
 
 
-def _levels(search: Search) -> tuple[Level, ...]:
-    """Preference that ranks a population; goals are the scenario's, none by default."""
-    goals = search.problem.scenario.planner.goals
-    length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
-    kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
-    if search.algorithm.graded:
-        return CONSTRAINTS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
-    return CONSTRAINTS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
-
-
 def _retry(search: Search, number: int) -> None:
     """Take a larger clearance buffer, and evaluate again what the archive holds."""
     search.problem = make_problem(search.problem.scenario, search.problem.limits, number)
@@ -176,139 +150,27 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
     """One search from its first population to its last generation."""
     table = search.problem.scenario.planner
     grids, growth = ATTEMPTS[number]
-    population = table.population * growth
-    encoding, algorithm = search.encoding, search.algorithm
-    if algorithm.seeded and number == 0 and _straight(search):
+    population, algorithm = table.population * growth, search.algorithm
+    if algorithm.seeded and number == 0 and straight_line(search):
         search.note()
         search.report(0)
         return
-    starts = _starts(search, grids, previous)
+    starts = starting_vectors(search, grids, previous)
     if len(search.archive.scores) and (search.safe_already() or search.over()):
         search.note()
         return
-    levels, before = _levels(search), search.evaluations
-    initial = (
-        first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
-    )
-    optimiser = _make_optimiser(search, lambda scores: ranks(scores, levels), population, initial)
-    optimiser.tell(search.evaluate(optimiser.ask()))
-    search.note()
-    bests = [_best_row(optimiser.scores)]
-    whole = population + table.generations * (population // 2)
-    for generation in range(table.generations):
-        if search.over() or search.safe_already():
-            break
-        share = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
-        if algorithm.seeded and (_stagnant(bests) or search.evaluations >= before + share * whole):
-            break
-        optimiser.tell(search.evaluate(optimiser.ask()))
-        search.note()
-        bests.append(_best_row(optimiser.scores))
-        search.done += 1
-        search.report(table.generations - generation - 1)
-    if algorithm.seeded and search.ended == "completed":
+    last = None
+    if algorithm.optimiser == "waypoints":
+        waypoint_generations(search, population, table.generations)
+    else:
+        last = path_generations(search, population, table.generations, starts)
+    if algorithm.tightened and search.ended == "completed":
         # What the generations came to, tightened, may be another way than the improved seed's.
-        order = best_first(optimiser.scores)
-        search.tighten(optimiser.samples[order[0]], LAST_ROUNDS, 0.5, LAST_SEARCH)
+        if last is not None:
+            search.tighten(last, LAST_ROUNDS, 0.5, LAST_SEARCH)
         for scale in LAST_MOVES:
             if search.over():
                 break
             search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
         search.note()
         search.report(0)
-
-
-def _straight(search: Search) -> bool:
-    """Whether the straight line is a safe path: no path is shorter, and there is nothing to search for."""
-    encoding, space = search.encoding, search.problem.space
-    if encoding.name != "rotated":
-        return False
-    edges = encoding.lower[0::3], encoding.upper[0::3]
-    share = 0.5 * (edges[0] + edges[1]) / edges[1][-1]
-    path = space.start + np.concatenate([[0.0], share, [1.0]])[:, None] * (space.destination - space.start)
-    vectors = rotated_vectors(space, encoding, path[None])
-    scores = search.score(vectors)
-    if not safe(scores[0]):
-        return False
-    search.evaluate(vectors)
-    return search.finished(search.best_certified()[1])
-
-
-def _starts(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats | None) -> Floats:
-    """Vectors (n, d) that a search starts from: the seed that comes out best when improved, and the older path.
-
-    Marginals over several routes at once fit none of them: one leads.  It leads as it was: improved it stands so close
-    to every limit that hardly a sample near it keeps them.
-    """
-    encoding, space, waypoints = search.encoding, search.problem.space, search.encoding.waypoints
-    if encoding.name != "rotated" or (not search.algorithm.seeded and previous is None):
-        return np.empty((0, encoding.lower.size))
-    frame, starts = rotated_frame(space.start, space.destination), list(search.archive.vectors[:1])
-    older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
-    starts += older
-    improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
-    for route in _routes(search, grids) if search.algorithm.seeded else ():
-        if search.over() or search.safe_already():
-            break
-        path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
-        starts.append(rotated_vectors(space, encoding, path[None])[0])
-        improved_scores.append(search.improve(starts[-1], SEED_SEARCH))
-    if not starts:
-        return np.empty((0, encoding.lower.size))
-    order = best_first(np.array(improved_scores))
-    return np.array([starts[order[0]], *older])
-
-
-def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRoute]:
-    """The grids' routes; the archive takes a path that is quickly fitted to each as soon as it is found.
-
-    Those with the best such paths come first.
-    """
-    encoding, space, data = search.encoding, search.problem.space, search.problem.search
-    if search.progress is not None:
-        search.progress(search.done, search.done + search.problem.scenario.planner.generations, "grid routes")
-    frame = rotated_frame(space.start, space.destination)
-    span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
-    found, scores = [], []
-    routes = airspace_routes if is_limited(data.airspace) else grid_routes
-    for route in routes(data, frame, span, grids):
-        found.append(route)
-        path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
-        vectors = rotated_vectors(space, encoding, path[None])
-        scores.append(search.evaluate(vectors)[0])
-        if not search.safe_already():
-            scores[-1] = search.improve(vectors[0], QUICK_SEARCH)
-        if search.over() or search.safe_already():
-            break
-    if not found:
-        return []
-    return [found[k] for k in best_first(np.array(scores))]
-
-
-def _best_row(scores: Floats) -> Floats:
-    """Best of the scores (n, 8), in the archive's order."""
-    return np.asarray(scores[best_first(scores)[0]])
-
-
-def _make_optimiser(
-    search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
-) -> Umda | DifferentialEvolution:
-    """The optimiser that the algorithm names."""
-    lower, upper = search.encoding.lower, search.encoding.upper
-    if search.algorithm.optimiser == "differential":
-        return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)
-    if search.algorithm.optimiser == "emna":
-        return Emna(lower, upper, rank, population, search.rng, initial=initial)
-    if search.algorithm.optimiser == "chain":
-        return MarkovChain(lower, upper, rank, population, search.rng, initial=initial)
-    basis = bridge_basis(search.encoding.waypoints - 2) if search.algorithm.smooth else None
-    return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
-
-
-def _stagnant(bests: list[Floats]) -> bool:
-    """Whether the last generations have gained next to nothing."""
-    if len(bests) <= STALLED_GENERATIONS:
-        return False
-    before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
-    same = np.array_equal(before[:LENGTH], after[:LENGTH]) and before[KILL] == after[KILL]
-    return bool(same and before[LENGTH] - after[LENGTH] < LEAST_GAIN)

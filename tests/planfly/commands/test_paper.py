@@ -11,6 +11,7 @@ from planfly.cli import main
 from planfly.paper.files import file_names
 from planfly.terminal.targets import prepare_folder
 
+ROWS = ["umda", "umda-strip", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing"]
 STABLE = ("table.csv", "runs.csv", "runs.json", "paths-07.png", "encodings-07.png", "convergence.png")
 
 
@@ -26,7 +27,7 @@ def test_every_file_is_there_and_the_table_agrees_with_the_runs(folder: Path) ->
     assert sorted(path.name for path in folder.iterdir()) == sorted(file_names([7]))
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in folder.glob("*.png"))
     data = json.loads((folder / "runs.json").read_text(encoding="utf-8"))
-    assert [row["algorithm"] for row in data["table"]] == ["umda", "umda-cartesian", "umda-polar"]
+    assert [row["algorithm"] for row in data["table"]] == ROWS
     for row in data["table"]:
         mine = [run for run in data["runs"] if run["algorithm"] == row["algorithm"]]
         assert [run["seed"] for run in mine] == [1, 2]

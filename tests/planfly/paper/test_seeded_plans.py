@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from planfly.paper.seeded_plans import exposure_probability, plan_section, problem_name, table
+from planfly.paper.seeded_plans import (
+    PROBLEMS,
+    STRIP,
+    STRIP_ACROSS,
+    exposure_probability,
+    plan_once,
+    plan_section,
+    problem_name,
+    table,
+)
 from tests.planfly.paper.made_plans import made_plan
 from tests.setups import small_scenario
 from world.scenario import load_scenario
@@ -38,5 +47,21 @@ def test_probability_of_one_unit_by_hand() -> None:
 
 def test_runs_of_another_algorithm_stand_beside_the_baselines() -> None:
     done = plan_section([7], 1, "umda-polar", jobs=1)
-    assert [item.algorithm for item in done] == ["umda-polar", "umda-cartesian"]
-    assert load_scenario(problem_name(7)).planner.algorithm == "umda"
+    assert [item.algorithm for item in done] == [
+        "umda-polar",
+        "umda-strip",
+        "umda-cartesian",
+        "umda-polar-45",
+        "umda-bearing",
+    ]
+
+
+@pytest.mark.parametrize("threats", PROBLEMS)
+def test_only_the_strip_has_a_strip(threats: int) -> None:
+    scenario = load_scenario(problem_name(threats))
+    assert scenario.planner.algorithm == "umda"
+    assert scenario.planner.across_m is None
+    start, span = scenario.start[:2], (scenario.destination - scenario.start)[:2]
+    aside = plan_once(threats, STRIP, 1).waypoints[:, :2] - start
+    across = np.abs(span[0] * aside[:, 1] - span[1] * aside[:, 0]) / np.hypot(*span)
+    assert across.max() <= STRIP_ACROSS[threats] + 1e-6

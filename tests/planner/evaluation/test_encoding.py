@@ -7,7 +7,16 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from planner.evaluation.encoding import ENCODINGS, Space, polar, rotated, rotated_frame, rotated_vectors
+from planner.evaluation.encoding import (
+    ENCODINGS,
+    Space,
+    bearing,
+    polar,
+    polar_45,
+    rotated,
+    rotated_frame,
+    rotated_vectors,
+)
 from world.geometry import leg_slopes, path_length, turning_angles
 
 coordinate = st.floats(-20_000, 20_000)
@@ -88,6 +97,28 @@ def test_polar_step_of_the_straight_line() -> None:
     encoding = polar(space(), 6)
     path = encoding.decode(np.tile([2000.0, 0.0, 500.0], 4)[None])[0]
     np.testing.assert_allclose(path[1:5, :2], np.outer(np.arange(1, 5), [1600.0, 1200.0]), atol=1e-9)
+
+
+def test_polar_angles_turn_from_the_leg_before_and_bearings_from_the_line() -> None:
+    turns = np.radians([10.0, 20.0, -40.0, 15.0])
+    vector = np.column_stack([np.full(4, 1000.0), turns, np.full(4, 500.0)]).ravel()[None]
+    line = np.arctan2(space().destination[1], space().destination[0])
+    for make, courses in (
+        (polar, [10.0, 30.0, -10.0, 5.0]),
+        (polar_45, [10.0, 30.0, -10.0, 5.0]),
+        (bearing, [10.0, 20.0, -40.0, 15.0]),
+    ):
+        steps = np.diff(make(space(), 6).decode(vector)[0, :5, :2], axis=0)
+        np.testing.assert_allclose(np.degrees(np.arctan2(steps[:, 1], steps[:, 0]) - line), courses, atol=1e-9)
+        np.testing.assert_allclose(np.hypot(*steps.T), 1000.0, atol=1e-9)
+
+
+def test_the_range_of_the_angle_is_in_the_box() -> None:
+    for make, widest in ((polar, 180.0), (polar_45, 45.0), (bearing, 180.0)):
+        encoding = make(space(), 6)
+        np.testing.assert_allclose(np.degrees(encoding.lower[1::3]), -widest)
+        np.testing.assert_allclose(np.degrees(encoding.upper[1::3]), widest)
+        assert ENCODINGS[encoding.name] is make
 
 
 def test_no_direction_without_distance() -> None:

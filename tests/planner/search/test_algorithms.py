@@ -34,7 +34,7 @@ def test_what_a_name_promises_it_does() -> None:
     for name, item in ALGORITHMS.items():
         assert item.seeded == name.endswith("-seeded"), name
     # The paper's own planner and its baselines count violations on six points a leg and know no seeds.
-    for name in ("umda", "umda-cartesian", "umda-polar", "de-paper"):
+    for name in ("umda", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing", "de-paper"):
         item = ALGORITHMS[name]
         assert (item.graded, item.smooth, item.seeded) == (False, False, False), name
 

@@ -8,7 +8,7 @@ from planner.search.limits_for import limits_for
 from world.scenario import load_scenario
 
 # That search by the paper's counts of violations.
-PAPERS = {"umda", "umda-cartesian", "umda-polar", "de-paper"}
+PAPERS = {"umda", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing", "de-paper"}
 
 
 @pytest.mark.parametrize("name", sorted(ALGORITHMS))

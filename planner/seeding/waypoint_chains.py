@@ -1,0 +1,224 @@
+"""The best path through each of many waypoints: candidates of each interval, joined by a dynamic programme over legs.
+
+A path's length and most of its violations are sums over its legs, so that the best of all combinations of candidates,
+one an interval, is found without trying them: forward from the start and backward from the destination, as messages
+along a chain (Pearl, "Probabilistic Reasoning in Intelligent Systems", 1988, section 4.3: max-product on a chain).
+Turns join two legs; each is priced where the best way so far makes it, which is near enough to choose by.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.clearance_buffer import clearance_at, required_clearance
+from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
+from planner.evaluation.leg_geometry import CORNER, measure_corner
+from planner.evaluation.missile_index import kill_density
+from planner.evaluation.problem_arrays import ProblemArrays
+from planner.seeding.waypoint_fitting import leg_cost
+from world.frames import polymap
+from world.kernels import Records, compiled
+from world.terrain import pixel_height
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+# Cost, in m of path, of a rad by which a turn is too sharp, or of 100 m that a leg is too short for it.
+TURN_COST = 2e4
+# Of a leg, what each of its two turns may take.
+TURN_SHARE = 0.475
+# A leg that is not evaluated yet.
+UNKNOWN = -1.0
+
+
+class WaypointChains(NamedTuple):
+    """What is found of candidates (w, k).
+
+    cost: of the best path through each, in m of path; inf where none is within the bound.
+    before, after: (w, k) the candidates before and after each on that path.
+    legs: how many were evaluated.
+    """
+
+    cost: Floats
+    before: Ints
+    after: Ints
+    legs: int
+
+    def path_through(self, waypoint: int, candidate: int) -> Ints:
+        """The candidates (w,) of the best path through one."""
+        out = np.empty(len(self.cost), dtype=np.int64)
+        out[waypoint] = candidate
+        for i in range(waypoint, 0, -1):
+            out[i - 1] = self.before[i, out[i]]
+        for i in range(waypoint, len(self.cost) - 1):
+            out[i + 1] = self.after[i, out[i]]
+        return out
+
+
+def waypoint_chains(data: ProblemArrays, candidates: Floats, bound: float) -> WaypointChains:
+    """Best paths through candidates (w, k, 3) world m; of the ends only the first counts.
+
+    bound: the most that a path may cost, m; what cannot be part of one is left out, which is faster.
+    """
+    count, wide, _ = candidates.shape
+    legs = np.full((count - 1, wide, wide), UNKNOWN)
+    return WaypointChains(*_chains(data, candidates, legs, bound))
+
+
+@compiled
+def _chains(
+    data: ProblemArrays, candidates: Floats, legs: Floats, bound: float
+) -> tuple[Floats, Ints, Ints, int]:  # pragma: no cover - compiled
+    """The fields of `WaypointChains`; legs: (w - 1, k, k) costs to fill in as they are asked for."""
+    count, wide, _ = candidates.shape
+    limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
+    before, after = np.zeros((count, wide), dtype=np.int64), np.zeros((count, wide), dtype=np.int64)
+    forward, backward = np.full((count, wide), np.inf), np.full((count, wide), np.inf)
+    # Of the ends only the first candidate counts.
+    forward[0][:1] = 0.0
+    backward[-1][:1] = 0.0
+    rest, evaluated = np.empty(wide), 0
+    for i in range(1, count):
+        for k in range(wide if i < count - 1 else 1):
+            rest[k] = _distance(candidates[i, k], candidates[-1][0])
+        evaluated += _extend(data, limits, candidates, i, 1, forward, before, rest, bound, legs, corners)
+    for i in range(count - 2, -1, -1):
+        rest[:] = forward[i]
+        evaluated += _extend(data, limits, candidates, i, -1, backward, after, rest, bound, legs, corners)
+    cost = forward + backward
+    for i in range(1, count - 1):
+        for k in range(wide):
+            if cost[i, k] < np.inf:
+                a, c = candidates[i - 1, before[i, k]], candidates[i + 1, after[i, k]]
+                cost[i, k] += _corner_cost(data, limits, a, candidates[i, k], c, corners)
+                cost[i, k] = cost[i, k] if cost[i, k] <= bound else np.inf
+    return cost, before, after, evaluated
+
+
+@compiled
+def _extend(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    candidates: Floats,
+    i: int,
+    step: int,
+    cost: Floats,
+    link: Ints,
+    rest: Floats,
+    bound: float,
+    legs: Floats,
+    corners: Records,
+) -> int:  # pragma: no cover - compiled
+    """Take costs (w, k) of partial paths on to the candidates of waypoint i; legs evaluated.
+
+    step: 1 for paths from the start, -1 for paths from the destination.  link: (w, k) the candidate that each partial
+    path comes from.  rest: (k,) the least that the remaining path from each candidate costs.
+    """
+    count, wide, _ = candidates.shape
+    last, evaluated = i - step, 0
+    open_ends = np.flatnonzero(cost[last] < np.inf)
+    least = np.empty(open_ends.size)
+    for k in range(wide if 0 < i < count - 1 else 1):
+        most = bound - rest[k]
+        here = candidates[i, k]
+        if not most > 0.0 or open_ends.size == 0:
+            continue
+        for m in range(open_ends.size):
+            # No leg costs less than its length.
+            least[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
+        while True:
+            # The most promising first: the first without violations ends it.
+            m = _lowest(least)
+            j, cheapest = open_ends[m], least[m]
+            if not cheapest < min(cost[i, k], most):
+                break
+            least[m] = np.inf
+            turn = 0.0
+            if 0 < last < count - 1:
+                beyond = candidates[last - step, link[last, j]]
+                if step > 0:
+                    turn = _corner_cost(data, limits, beyond, candidates[last, j], here, corners)
+                else:
+                    turn = _corner_cost(data, limits, here, candidates[last, j], beyond, corners)
+            if not cheapest + turn < min(cost[i, k], most):
+                continue
+            first, second = (j, k) if step > 0 else (k, j)
+            leg = legs[min(i, last), first, second]
+            if leg == UNKNOWN:
+                leg = leg_cost(data, limits, candidates[min(i, last), first], candidates[max(i, last), second])
+                legs[min(i, last), first, second] = leg
+                evaluated += 1
+            total = cost[last, j] + leg + turn
+            if total < min(cost[i, k], most):
+                cost[i, k], link[i, k] = total, j
+    return evaluated
+
+
+@compiled
+def _lowest(values: Floats) -> int:  # pragma: no cover - compiled
+    """Where the lowest value stands."""
+    lowest = 0
+    for k in range(1, values.size):
+        lowest = k if values[k] < values[lowest] else lowest
+    return lowest
+
+
+@compiled
+def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+    return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+
+
+@compiled
+def _corner_cost(
+    data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
+) -> float:  # pragma: no cover - compiled
+    """Cost of the turn at b between a and c: of what it exceeds the limit by, and of what its legs are too short by.
+
+    corners: scratch, one record.
+    """
+    ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], c[0] - b[0], c[1] - b[1]
+    run, onward = math.sqrt(ux * ux + uy * uy), math.sqrt(vx * vx + vy * vy)
+    if run == 0.0 or onward == 0.0:
+        return TURN_COST
+    turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
+    over = max(0.0, turn - data.max_turn)
+    if data.legs_hold_turns:
+        corner = corners[0]
+        measure_corner(
+            data.aircraft, data.tracking, limits.wind, True,
+            ux / run, uy / run, vx / onward, vy / onward, b[2], corner,
+        )  # fmt: skip
+        short = max(0.0, corner.before - TURN_SHARE * run) + max(0.0, corner.after - TURN_SHARE * onward)
+        over += min(10.0, short / 100.0)
+    return TURN_COST * over
+
+
+@compiled
+def open_places(data: ProblemArrays, places: Floats) -> Flags:  # pragma: no cover - compiled
+    """Whether places (n, 3), world m, are on the map, high enough above the ground and outside all kill spheres, (n,).
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.evaluation.problem import make_problem
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> data = make_problem(scenario, load_airframe(scenario).limits).search
+    >>> unit = scenario.threats.position[0]
+    >>> open_places(data, np.array([scenario.start, unit + [0.0, 0.0, 50.0], [-5000.0, 0.0, 300.0]])).tolist()
+    [True, False, False]
+    """
+    required = required_clearance(data)
+    out = np.zeros(places.shape[0], dtype=np.bool_)
+    for k in range(places.shape[0]):
+        x, y, z = places[k, 0], places[k, 1], places[k, 2]
+        if not (data.west <= x <= data.east and data.south <= y <= data.north):
+            continue
+        column, row = polymap(data.to_pixel, x, y)
+        # Written so that NaN is not open.
+        if not z > pixel_height(data.heights, column, row) + clearance_at(required, x, y):
+            continue
+        dose, _, _ = kill_density(data.missiles, data.kill_margin, 0.0, x, y, z, x, y, z, 0.0, 0.0, 0.0, 0.0)
+        out[k] = dose == 0.0
+    return out
