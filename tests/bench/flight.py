@@ -37,7 +37,7 @@ MISMATCHES = {
     "control power -25 %": Variation(control=0.75),
     "volts -8 %": Variation(volts=0.92),
 }
-# The reference laws at their best: what `python -m tests.bench.tune_reference_laws` found, in winds that are not
+# The reference laws at their best: what `python -m tests.bench.tuning.tune_reference_laws` found, in winds that are not
 # reported on and on the inner loops as they are; what swings in any of those winds is left out.
 BEST_L1 = {"l1_period": 5.0, "l1_damping": 1.2}
 BEST_FIELD = {"field_path": 0.1, "field_course": 11.0, "field_course_integral": 0.2}

@@ -11,8 +11,18 @@ import pytest
 
 from aircraft.catalog import Aircraft, load_aircraft
 from flight.guidance.gains import Gains, load_gains
-from tests.bench.tune_gains import DIGITS, REPORTED, SEARCHED, TRAINED, model_gains, rounded, search, start, write
-from tests.bench.tuning_missions import Case, cases
+from tests.bench.tuning.tune_gains import (
+    DIGITS,
+    REPORTED,
+    SEARCHED,
+    TRAINED,
+    model_gains,
+    rounded,
+    search,
+    start,
+    write,
+)
+from tests.bench.tuning.tuning_missions import Case, cases
 from tests.setups import setup_maker, standard
 
 NAMES = sorted(TRAINED)

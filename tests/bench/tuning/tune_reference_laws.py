@@ -1,8 +1,8 @@
 """Choose the settings of the other lateral laws that the bench compares ours with: the best that swing in no wind.
 
-``python -m tests.bench.tune_reference_laws`` flies a grid of each law's settings, on the inner loops as they are,
-through winds and turbulence that the bench does not report on, and prints the settings with the least median RMS on
-straight legs of those that swing in none of them.  `tests.bench.flight.BEST_L1` and `BEST_FIELD` hold what it
+``python -m tests.bench.tuning.tune_reference_laws`` flies a grid of each law's settings, on the inner loops as they
+are, through winds and turbulence that the bench does not report on, and prints the settings with the least median RMS
+on straight legs of those that swing in none of them.  `tests.bench.flight.BEST_L1` and `BEST_FIELD` hold what it
 found.  A few minutes on one core.
 """
 

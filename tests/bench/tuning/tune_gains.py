@@ -1,10 +1,10 @@
 """Choose an aircraft's gains by coordinate search on one set of missions, and report on others.
 
-``python -m tests.bench.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off the linear
-model from there, searches the rest from round figures (`START`), prints what each round brings and, at the end, how the
-chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts the result
-into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions come from the
-seed (`tests.bench.tuning_missions`); the standard mission is none of them.  Two minutes a round on two cores.
+``python -m tests.bench.tuning.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off the
+linear model from there, searches the rest from round figures (`START`), prints what each round brings and, at the end,
+how the chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts the
+result into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions come from the
+seed (`tests.bench.tuning.tuning_missions`); the standard mission is none of them.  Two minutes a round on two cores.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
 from flight.simulation.simulate import SimulatedFlight, simulate
 from tests.bench.flight import Errors, errors_of, flown_with, straight_rms
-from tests.bench.tuning_missions import Case, cases
+from tests.bench.tuning.tuning_missions import Case, cases
 from tests.setups import MakeSetup, setup_maker, standard
 
 # Where every search starts, at an airspeed of 25 m/s: round figures, of the size that earlier searches of the Aerosonde
@@ -231,7 +231,7 @@ def write(aircraft: Aircraft, gains: Gains, rounds: int, seed: int) -> None:
     file = aircraft.folder / "gains.toml"
     chosen = "# Chosen by "
     said = (
-        f"{chosen}`python -m tests.bench.tune_gains {aircraft.name} --rounds {rounds} --seed {seed} --write`"
+        f"{chosen}`python -m tests.bench.tuning.tune_gains {aircraft.name} --rounds {rounds} --seed {seed} --write`"
         f" with JSBSim {JSBSIM_VERSION}."
     )
     lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith(chosen)]
@@ -278,7 +278,7 @@ def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Ca
 
 def main() -> None:
     """Search, report, and write if asked to."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench.tune_gains")
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.tuning.tune_gains")
     parser.add_argument("aircraft", nargs="?", default="aerosonde", choices=sorted(TRAINED))
     parser.add_argument("--rounds", type=int, default=6)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,0 +1,1 @@
+"""Settings of guidance laws, looked for by flights."""
