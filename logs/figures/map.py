@@ -18,6 +18,7 @@ from logs.figures.elements.ground import draw_ground
 from logs.figures.elements.labels import LabelPlacer
 from logs.figures.elements.legend import draw_compass, draw_legend, failing_handles
 from logs.figures.elements.threats import draw_threat_circles
+from logs.figures.elements.zones import draw_zone_shapes, name_zones
 from logs.verdict.findings import Verdict
 from world.scenario import Scenario
 from world.threats import Threats
@@ -68,6 +69,7 @@ def draw_map(
         around = draw_ground(figure, axes, scenario.terrain, _RIGHT_COLUMN, _TOP)
         around += _area(axes, scenario)
         around += draw_threat_circles(axes, scenario.threats, route)
+        around += draw_zone_shapes(axes, scenario.zones)
         placer = LabelPlacer(axes)
         failed = failures(verdict, len(route) if route is not None else 0)
         handles: list[Any] = []
@@ -82,6 +84,7 @@ def draw_map(
             _number_waypoints(scenario, route, failed, placer)
             _fail_labels(route, failed, placer)
         _name_threats(axes, scenario.threats, placer)
+        name_zones(axes, scenario.zones, placer)
         draw_compass(figure, scenario, _RIGHT_COLUMN)
         draw_legend(figure, handles + around, _LEFT, legend_top)
     return figure

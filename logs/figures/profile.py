@@ -15,6 +15,7 @@ from logs.figures.elements.failures import Failures, failures, route_distance, r
 from logs.figures.elements.labels import LabelPlacer
 from logs.figures.elements.legend import draw_legend, failing_handles
 from logs.figures.elements.threats import draw_threat_cuts
+from logs.figures.elements.zones import draw_zone_cuts, zone_handles
 from logs.verdict.findings import Verdict
 from world.scenario import Scenario
 
@@ -59,6 +60,8 @@ def draw_profile(
         _limits(axes, scenario, route, track, ground, float(at[-1]))
         handles = _ground(axes, scenario, distance, ground)
         threat_handles, names = draw_threat_cuts(axes, scenario.threats, distance, points)
+        zone_names = draw_zone_cuts(axes, scenario.zones, distance, points, ground)
+        threat_handles += zone_handles(scenario.zones)
         lines = [] if straight else _plan(axes, at, route)
         placer = LabelPlacer(axes)
         placer.avoid(at / 1000.0, route[:, 2])
@@ -70,6 +73,8 @@ def draw_profile(
         if not straight:
             _numbers(axes, at, route, failed, placer)
         _name_threats(axes, names, placer)
+        for name, middle, amsl in zone_names[:_MOST_NAMES]:
+            placer.place(name, middle, amsl, size=6.0, gap=0.0, prefer=(0, 0), optional=True, color=style.ZONE)
         _fail_labels(at, route, failed, placer)
         _label_axes(figure, axes, scenario, straight)
         draw_legend(figure, lines + handles + threat_handles, _LEFT, (_BOTTOM - 0.58) / _HEIGHT)
@@ -87,10 +92,14 @@ def _ground_under(scenario: Scenario, points: Floats) -> Floats | None:
 def _limits(
     axes: Any, scenario: Scenario, route: Floats, track: Track | None, ground: Floats | None, length: float
 ) -> None:
-    """Show all of ground, plan and flight, and the ceiling if that does not press them flat."""
+    """Show all of ground, plan and flight, and greatest height and ceiling if those do not press them flat."""
     heights = [route[:, 2]]
     if ground is not None:
         heights.append(ground)
+    if ground is not None and scenario.limits.max_height_m is not None:
+        # As far as it does not press the path flat.
+        highest = float(route[:, 2].max()) + scenario.limits.max_height_m
+        heights.append(np.minimum(ground + scenario.limits.max_height_m, highest))
     if track is not None:
         heights.append(track.position[:, 2])
     together = np.concatenate(heights)
@@ -120,6 +129,11 @@ def _ground(axes: Any, scenario: Scenario, distance: Floats, ground: Floats | No
         axes.fill_between(at, ground, ground + required, zorder=2.8, **look)
         label = f"required clearance, {required:g} m"
         handles.append(Patch(facecolor="#f8dfa6", edgecolor=_BAND, hatch="////", linewidth=0.0, label=label))
+    most = scenario.limits.max_height_m
+    if most is not None:
+        line = axes.plot(at, ground + most, color=style.ZONE, linewidth=1.4, linestyle=(0, (5, 1.5)), zorder=4)
+        line[0].set_label(f"greatest height, {most:g} m above ground")
+        handles.append(line[0])
     return handles
 
 

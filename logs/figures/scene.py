@@ -19,7 +19,9 @@ from logs.figures.elements.failures import Failures, failures, route_distance, r
 from logs.figures.elements.labels import LabelPlacer
 from logs.figures.elements.legend import draw_legend, failing_handles
 from logs.figures.elements.scene_data import GroundGrid, drawn_positions, exaggeration, ground_grid, scene_bounds
+from logs.figures.elements.zones import zone_handles
 from logs.verdict.findings import Verdict
+from world.airspace.zone_outlines import zone_walls
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -73,6 +75,7 @@ def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None)
         figure, axes = _frame(setup, projection, bounds, grid)
         handles = _ground(axes, projection, grid, bounds)
         handles += _threats(axes, projection, setup)
+        handles += _zones(axes, projection, setup)
         placer = LabelPlacer(axes)
         handles += _paths(axes, projection, terrain, route, track, failed, placer)
         _labels(setup, projection, route, failed, placer)
@@ -190,6 +193,22 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]
         if some.size:
             handles.append(Patch(linewidth=1.1, label=label, **look))
     return handles
+
+
+def _zones(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
+    """Walls of the zones, from ground or floor to the ceiling, or to above the path."""
+    zones, route = setup.scenario.zones, setup.route.waypoints
+    low, top = float(route[:, 2].min()), float(route[:, 2].max()) + 50.0
+    for zone in zones:
+        fill = (*style.ZONE_FILL, 0.10 if zone.kind == "exclusion" else 0.03)
+        for wall in zone_walls(zone, setup.scenario.terrain, low, top):
+            drawn = projection.project(wall)[:, :, :2]
+            sides = np.concatenate([drawn[:-1], drawn[1:, ::-1]], axis=1)
+            axes.add_collection(PolyCollection(list(sides), facecolor=fill, edgecolor="none", zorder=3.2))
+            width = 1.1 if zone.kind == "exclusion" else 2.0
+            for edge in (0, 1):
+                axes.plot(*drawn[:, edge].T, color=style.ZONE, linewidth=width, alpha=0.4 + 0.6 * edge, zorder=3.3)
+    return zone_handles(zones)
 
 
 def _hidden(projection: Projection, terrain: Terrain | None, points: Floats) -> NDArray[np.bool_]:

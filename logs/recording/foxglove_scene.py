@@ -1,4 +1,4 @@
-"""Foxglove messages for a 3-D viewer: the terrain, the threats, the plan, the track and the aircraft.
+"""Foxglove messages for a 3-D viewer: the terrain, the threats, zones, the plan, the track and the aircraft.
 
 Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is forward, left, up.
 """
@@ -21,6 +21,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import ArrayLike, NDArray
 
 from logs.recording.protobuf_arrays import length_delimited, repeated_submessages
+from world.airspace.zone_outlines import zone_walls
 from world.scenario import Scenario
 from world.terrain import Terrain
 from world.threats import Threats
@@ -46,6 +47,9 @@ _KILL = (0.85, 0.10, 0.10, 0.35)
 _DETECTION = (0.95, 0.65, 0.10, 0.15)
 _PLAN = (0.10, 0.35, 0.90, 1.0)
 _TRACK = (0.95, 0.95, 0.95, 1.0)
+_KEEP_OUT, _STAY_IN = (0.75, 0.15, 0.15, 1.0), (0.95, 0.85, 0.30, 1.0)
+# Upright lines of one outline of a zone, about.
+MOST_POSTS = 24
 
 
 def timestamp(time_ns: int) -> Timestamp:
@@ -179,3 +183,25 @@ def _pose(position: ArrayLike) -> Pose:
 def _colour(rgba: tuple[float, float, float, float]) -> Color:
     r, g, b, a = rgba
     return Color(r=r, g=g, b=b, a=a)
+
+
+def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
+    """Edges of zones as lines, from ground or floor to the ceiling, or to above the path; and their names."""
+    entity = _entity(time_ns, "zones")
+    low, top = float(waypoints[:, 2].min()), float(waypoints[:, 2].max()) + 50.0
+    for zone in scenario.zones:
+        walls = zone_walls(zone, scenario.terrain, low, top)
+        for wall in walls:
+            step = max(1, (len(wall) - 1) // MOST_POSTS)
+            for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
+                entity.lines.append(_line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN))
+                entity.lines[-1].points.extend(_points(path))
+        entity.texts.add(
+            pose=_pose(walls[0][0, 1]),
+            billboard=True,
+            font_size=14.0,
+            scale_invariant=True,
+            color=_colour(_TRACK),
+            text=zone.name,
+        )
+    return _update(entity)

@@ -55,6 +55,8 @@ CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
 PROFILE = "planfly"
 LONGEST = 1e7  # s
+# A log has it where its scenario has zones.
+ZONES_TOPIC = "/scene/zones"
 
 _BUFFER = 2**20
 _NO_ROWS: Rows = np.empty(0, dtype=TRACK_ROW)
@@ -222,6 +224,11 @@ class Recorder:
             "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats),
             "/scene/plan": scene.plan_scene(EPOCH_NS, setup.route.waypoints),
         }
+        if setup.scenario.zones:
+            descriptor = SceneUpdate.DESCRIPTOR
+            channel = self._writer.channel(ZONES_TOPIC, descriptor.full_name, schema_of(descriptor))
+            self._channels[ZONES_TOPIC] = channel
+            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, setup.scenario, setup.route.waypoints)
         self._write([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 

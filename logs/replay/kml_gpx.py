@@ -4,7 +4,9 @@ GPX is made with gpxpy (Apache-2.0).  KML is written with the standard library: 
 LGPL (simplekml, fastkml) or no longer kept up.
 """
 
+import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
+from world.airspace.zone_outlines import zone_parts
 from world.frames import to_geo
 
 Floats = NDArray[np.float64]
@@ -72,8 +75,47 @@ def track_line(setup: FlightSetup, track: Track) -> MapLine:
     return MapLine(f"{setup.scenario.name} flown", np.asarray(lat), np.asarray(lon), position[:, 2])
 
 
-def kml_text(title: str, lines: list[MapLine]) -> str:
-    """KML document: a folder for each line, heights absolute, and a placemark for each named point.
+@dataclass(frozen=True, slots=True)
+class MapZone:
+    """A zone on the map.
+
+    name: of the zone, with what it is.
+    parts: (k, 2) latitude and longitude in degrees of the outline of each part, and then of its holes, closed.
+    height: m of its ceiling, None where it has none.
+    above_ground: whether that is above the ground, not above mean sea level.
+    """
+
+    name: str
+    parts: tuple[tuple[Floats, ...], ...]
+    height: float | None
+    above_ground: bool
+
+
+def map_zones(setup: FlightSetup) -> list[MapZone]:
+    """Zones of a setup's scenario.
+
+    >>> from logs.recording.example_log import example_log
+    >>> map_zones(example_log().setup)
+    []
+    """
+    made = []
+    for zone in setup.scenario.zones:
+        parts = tuple(tuple(_geographic(setup, ring) for ring in part) for part in zone_parts(zone))
+        top = zone.ceiling
+        name = f"{zone.name} ({'keep out' if zone.kind == 'exclusion' else 'stay in'})"
+        height = None if top is None else top.height
+        made.append(MapZone(name, parts, height, top is not None and top.datum == "ground"))
+    return made
+
+
+def _geographic(setup: FlightSetup, ring: Floats) -> Floats:
+    return np.stack(to_geo(setup.scenario.origin, ring[:, 0], ring[:, 1]), axis=-1)
+
+
+def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
+    """KML document: a folder for each line, heights absolute, and a placemark for each named point and each zone.
+
+    A zone is an outline on the ground, or a body up to its ceiling.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> text = kml_text("one leg", [line])
@@ -98,8 +140,34 @@ def kml_text(title: str, lines: list[MapLine]) -> str:
             point = _add(mark, "Point")
             _add(point, "altitudeMode", "absolute")
             _add(point, "coordinates", _coordinates(line, k))
+    _add_zones(document, zones)
     ElementTree.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_zones(document: ElementTree.Element, zones: Sequence[MapZone]) -> None:
+    if not zones:
+        return
+    folder = _add(document, "Folder")
+    _add(folder, "name", "zones")
+    for zone in zones:
+        mark = _add(folder, "Placemark")
+        _add(mark, "name", zone.name)
+        several = _add(mark, "MultiGeometry")
+        for outline, *holes in zone.parts:
+            polygon = _add(several, "Polygon")
+            if zone.height is not None:
+                _add(polygon, "extrude", "1")
+                _add(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
+            _add_ring(polygon, "outerBoundaryIs", outline, zone)
+            for hole in holes:
+                _add_ring(polygon, "innerBoundaryIs", hole, zone)
+
+
+def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:
+    line = _add(_add(polygon, kind), "LinearRing")
+    up = 0.0 if zone.height is None else zone.height
+    _add(line, "coordinates", " ".join(f"{lon:.8f},{lat:.8f},{up:.3f}" for lat, lon in ring))
 
 
 def _add(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
@@ -112,8 +180,8 @@ def _coordinates(line: MapLine, k: int) -> str:
     return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
 
 
-def gpx_text(title: str, lines: list[MapLine]) -> str:
-    """GPX document: a line with named points is a route, any other a track.
+def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
+    """GPX document: a line with named points is a route, any other a track, and so are a zone's outlines and holes.
 
     >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
     >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])
@@ -141,4 +209,10 @@ def gpx_text(title: str, lines: list[MapLine]) -> str:
                 gpxpy.gpx.GPXTrackSegment([gpxpy.gpx.GPXTrackPoint(a, b, elevation=c) for a, b, c in rows])
             )
             gpx.tracks.append(track)
+    for zone in zones:
+        track = gpxpy.gpx.GPXTrack(name="".join(ch for ch in zone.name if ch.isprintable()))
+        for ring in itertools.chain.from_iterable(zone.parts):
+            points = [gpxpy.gpx.GPXTrackPoint(round(float(lat), 8), round(float(lon), 8)) for lat, lon in ring]
+            track.segments.append(gpxpy.gpx.GPXTrackSegment(points))
+        gpx.tracks.append(track)
     return str(gpx.to_xml(version="1.1")) + "\n"

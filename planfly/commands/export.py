@@ -1,14 +1,14 @@
 """``planfly export``: a plan, a mission or a log as the files that its targets' suffixes name."""
 
 import argparse
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from flight.mission.fences import with_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from logs.recording.reader import FlightLog, read_log
-from logs.replay.kml_gpx import MapLine, gpx_text, kml_text, plan_line, track_line
+from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
 from planfly.open_mission import is_log, open_mission, open_plan
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.results import print_warnings
@@ -27,13 +27,14 @@ class _Source:
     """What an input holds.
 
     mission: its items, and a plan's threats as fences.
-    lines: on a map, by what they are; none where no target asks for one.
+    lines, zones: on a map, lines by what they are; none where no target asks for one.
     notes: what the mission does not hold of the plan.
     log: the input, where it is a flight log.
     """
 
     mission: Mission
     lines: dict[str, MapLine] = field(default_factory=dict)
+    zones: list[MapZone] = field(default_factory=list)
     notes: tuple[str, ...] = ()
     log: FlightLog | None = None
 
@@ -71,7 +72,7 @@ def _read_log(path: Path) -> _Source:
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
         lines["flown"] = track_line(log.setup, log.track)
-    return _Source(log.setup.mission, lines, log=log)
+    return _Source(log.setup.mission, lines, map_zones(log.setup), log=log)
 
 
 def _read_mission(path: Path, maps: bool) -> _Source:
@@ -81,24 +82,25 @@ def _read_mission(path: Path, maps: bool) -> _Source:
     is_plan = path.suffix.lower() == ".json"
     if maps:
         setup = open_mission(path, None, None).setup
-        lines = {"plan": plan_line(setup)}
-        return _with_fences(setup.mission, setup.scenario, lines) if is_plan else _Source(setup.mission, lines)
+        source = _Source(setup.mission, {"plan": plan_line(setup)}, map_zones(setup))
+        return _with_fences(source, setup.scenario) if is_plan else source
     if not is_plan:
         return _Source(read_mission(path))
     opened = open_plan(path)
-    return _with_fences(opened.mission, opened.scenario, {})
+    return _with_fences(_Source(opened.mission), opened.scenario)
 
 
-def _with_fences(mission: Mission, scenario: Scenario, lines: dict[str, MapLine]) -> _Source:
-    fenced, notes = with_fences(mission, scenario)
-    return _Source(fenced, lines, notes)
+def _with_fences(source: _Source, scenario: Scenario) -> _Source:
+    fenced, notes = with_fences(source.mission, scenario)
+    return replace(source, mission=fenced, notes=notes)
 
 
 def _text(source: _Source, target: Path, title: str) -> tuple[str, str]:
     """Text of a target, and what it holds."""
     suffix, mission = target.suffix.lower(), source.mission
     if suffix in MAPS:
-        return MAPS[suffix](title, list(source.lines.values())), " and ".join(source.lines)
+        held = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
+        return MAPS[suffix](title, list(source.lines.values()), source.zones), " and ".join(held)
     kind = mission_kind(target)
     if kind in _HOLDS:
         count = len(mission.fences if kind == "fence" else mission.rally)

@@ -28,6 +28,10 @@ Codes = NDArray[np.int32]
 
 # A m of way at the edge of the band costs this share more than in its middle: legs are longer than a grid's steps.
 EDGE_COST = 0.3
+# What a change of course costs, in steps of the grid: for each step sideways more or less than the one before, squared.
+TURN_COST = 0.15
+# Of the steepest slopes, the share that a route uses: legs cut its corners.
+SLOPE_SHARE = 0.9
 # A place on a grid: its ground, and the lowest and highest that a path may be there, m; lowest > highest for none.
 COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
 
@@ -115,7 +119,7 @@ def _slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float) 
     for side in range(-SIDEWAYS, SIDEWAYS + 1):
         b[0], b[1] = position_of(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        out[side + SIDEWAYS, 0], out[side + SIDEWAYS, 1] = math.tan(climb), math.tan(dive)
+        out[side + SIDEWAYS, 0], out[side + SIDEWAYS, 1] = SLOPE_SHARE * math.tan(climb), SLOPE_SHARE * math.tan(dive)
     return out
 
 
@@ -155,11 +159,13 @@ def _step_on(
     cost: Floats,
     price: Floats,
     after: Floats,
+    came_before: Codes,
     came: Codes,
 ) -> None:  # pragma: no cover - compiled
     """Relax one stage: costs (across, layers) before and after it, and the cell (across x layers) that each came from.
 
-    before, columns: `COLUMN` records (across,) of the stage before and of this one.
+    before, columns: `COLUMN` records (across,) of the stage before and of this one.  came_before: of the stage before;
+    a change of course is counted from the cheapest way to a cell alone, so that a route is not quite the cheapest.
     """
     step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
     beside = float(data.tracking.across)
@@ -184,13 +190,15 @@ def _step_on(
                 if cost[y, z] == math.inf:
                     continue
                 up = first + z * grid.pitch
+                turned = 0 if stage == 1 else side - (y - came_before[y, z] // grid.layers)
+                here = cost[y, z] + TURN_COST * step * turned * turned
                 lowest = max(0, math.ceil((up - dive - to_first) / grid.pitch))
                 highest = min(grid.layers - 1, math.floor((up + climb - to_first) / grid.pitch))
                 for z2 in range(lowest, highest + 1):
                     rise = to_first + z2 * grid.pitch - up
                     if max(up, up + rise) > closed.low and min(up, up + rise) < closed.high:
                         continue
-                    total = cost[y, z] + math.sqrt(run * run + rise * rise) * price[to, z2]
+                    total = here + math.sqrt(run * run + rise * rise) * price[to, z2]
                     if total < after[to, z2]:
                         after[to, z2] = total
                         came[to, z2] = y * grid.layers + z
@@ -222,7 +230,19 @@ def cheapest_airspace_route(
         if stage == stages:
             price[home, _layer(grid, columns[stage, home], data.destination[2])] = 1.0
         after[:] = math.inf
-        _step_on(data, frame, grid, stage, columns[stage - 1], columns[stage], cost, price, after, cells[stage])
+        _step_on(
+            data,
+            frame,
+            grid,
+            stage,
+            columns[stage - 1],
+            columns[stage],
+            cost,
+            price,
+            after,
+            cells[stage - 1],
+            cells[stage],
+        )
         for y in range(wide):
             left = math.sqrt((frame.length - along) ** 2 + grid.across[y] ** 2)
             for z in range(grid.layers):

@@ -146,3 +146,11 @@ def test_files_are_named_when_they_cannot_be_read(tmp_path: Path) -> None:
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"plan\.json: name: 5: "):
         read_plan(file)
+
+
+def test_what_is_known_of_zones_and_height_comes_back_and_nothing_of_it_is_written_where_there_is_none() -> None:
+    assert not {"zone_distance_m", "headroom_m"} & set(json.loads(plan_json(made()))["certificate"])
+    certificate = replace(CERTIFICATE, zone_distance=-3.5, headroom=12.25)
+    text = plan_json(made(certificate=certificate))
+    assert json.loads(text)["certificate"]["zone_distance_m"] == -3.5
+    assert parse_plan(text, "plan.json").certificate == certificate

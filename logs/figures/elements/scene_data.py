@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements.failures import Failures
+from world.airspace.zone_outlines import zone_walls
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
@@ -90,6 +91,7 @@ def scene_json(setup: FlightSetup, track: Track | None, failed: Failures) -> str
             }
             for k, name in enumerate(threats.names)
         ],
+        **_zone_walls(setup),
         "plan": np.round(setup.route.waypoints, 1).tolist(),
         "track": [] if track is None else np.round(drawn_positions(track), 1).tolist(),
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
@@ -97,6 +99,20 @@ def scene_json(setup: FlightSetup, track: Track | None, failed: Failures) -> str
     # "<" would end the script element early where a name holds one.
     text = json.dumps(scene, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def _zone_walls(setup: FlightSetup) -> dict[str, object]:
+    """Names, kinds and rings of zones, each corner's foot and upper edge; nothing where there are none."""
+    zones, up = setup.scenario.zones, setup.route.waypoints[:, 2]
+    if not zones:
+        return {}
+    walls = [zone_walls(zone, setup.scenario.terrain, float(up.min()), float(up.max()) + 50.0) for zone in zones]
+    return {
+        "zones": [
+            {"name": zone.name, "keep_out": zone.kind == "exclusion", "rings": [np.round(w, 1).tolist() for w in rings]}
+            for zone, rings in zip(zones, walls, strict=True)
+        ]
+    }
 
 
 def _ground(grid: GroundGrid) -> dict[str, object]:

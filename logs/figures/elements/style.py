@@ -30,6 +30,8 @@ MISSILE = "#D55E00"
 RADAR = "#007A5A"  # Okabe-Ito's bluish green, darkened for thin dashes on pale ground
 FAIL = "#B0408A"  # reddish purple, darkened for text
 LIMIT = "#E69F00"
+# Dark red-brown, always with a hatch or a broad line, which missiles have not; and the same as red, green and blue.
+ZONE, ZONE_FILL = "#7A1F1F", (0.478, 0.122, 0.122)
 BLUE = "#0072B2"
 INK = "#222222"
 QUIET = "#6b6b6b"

@@ -139,6 +139,17 @@
     paths.forEach(function (path) { for (var k = 0; k + 1 < path.length; k += 2) out.push([path[k], path[k + 1]]); });
     return out;
   }
+  function wall(ring, colour) {
+    var at = [], normal = [], colours = [], index = [];
+    for (var k = 0; k + 1 < ring.length; k++) {
+      var a = ring[k][0], b = ring[k + 1][0], n = [b[1] - a[1], a[0] - b[0], 0], l = Math.hypot(n[0], n[1]) || 1;
+      [a, b, ring[k + 1][1], ring[k][1]].forEach(function (p) {
+        at.push.apply(at, put(p)); normal.push(n[0] / l, n[1] / l, 0); colours.push.apply(colours, colour);
+      });
+      index.push(4 * k, 4 * k + 1, 4 * k + 2, 4 * k, 4 * k + 2, 4 * k + 3);
+    }
+    return mesh(new Float32Array(at), new Float32Array(normal), new Float32Array(colours), index);
+  }
   function groundUnder(p) {
     if (!heights) return low;
     var g = scene.ground, c = Math.round((p[0] - E0) / (E1 - E0) * (g.columns - 1)), r = Math.round((p[1] - N0) / (N1 - N0) * (g.rows - 1));
@@ -151,6 +162,15 @@
   scene.threats.forEach(function (t) {
     if (t.kill > 0) { domes.push(dome(t.at, t.kill, [0.835, 0.369, 0])); missiles = missiles.concat(rings(t.at, t.kill)); }
     if (t.detection > 0) radars = radars.concat(rings(t.at, t.detection));
+  });
+  (scene.zones || []).forEach(function (z) {
+    z.rings.forEach(function (ring) {
+      if (z.keep_out) domes.push(wall(ring, [0.478, 0.122, 0.122]));
+      [0, 1].forEach(function (edge) {
+        var path = ring.map(function (corner) { return corner[edge]; });
+        lines.push(strips([path], z.keep_out ? 1.6 : 2.6, [0.478, 0.122, 0.122, 0.4 + 0.6 * edge], 0.25));
+      });
+    });
   });
   if (!ground) lines.push(strips([[[E0, N0, low], [E1, N0, low], [E1, N1, low], [E0, N1, low], [E0, N0, low]]], 1.5, [0.5, 0.5, 0.5, 1], 0));
   lines.push(strips(dashed(radars), 1.2, [0, 0.478, 0.353, 0.8], 0.15));
@@ -253,6 +273,7 @@
     });
     scene.plan.forEach(function (p, k) { if (k && k < last) write(String(k), p, "#004c7f", true, -8); });
     scene.threats.forEach(function (t) { write(t.name.slice(0, 24), t.at, "#333", false, 4); });
+    (scene.zones || []).forEach(function (z) { write(z.name.slice(0, 24), z.rings[0][0][1], "#7a1f1f", false, -4); });
     write("N", [midE, N1, low], "#111", true, 4); write("S", [midE, N0, low], "#111", true, 4);
     write("E", [E1, midN, low], "#111", true, 4); write("W", [E0, midN, low], "#111", true, 4);
     var words = root.querySelector(".stretch");

@@ -24,7 +24,7 @@ SHORTEST, LONGEST, INTERVAL = 5000.0, 8000.0, 350.0
 # No zone is nearer to an end than this, m.
 AWAY = 250.0
 # The grid search: pitch along and across, layers, room kept from zones and from the band's edges, m.
-PITCH, LAYER, ZONE_ROOM, BAND_ROOM = 100.0, 2.5, 80.0, 25.0
+PITCH, LAYER, ZONE_ROOM, BAND_ROOM = 100.0, 2.5, 40.0, 15.0
 # Of the steepest slopes in still air and light turbulence, what it climbs and sinks by, rad.
 _TURBULENCE = ("none", "light")
 

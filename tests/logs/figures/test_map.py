@@ -52,3 +52,12 @@ def test_map_widens_to_a_flight_that_left_the_area() -> None:
     assert axes.get_xlim()[0] < -1200
     assert axes.get_xlim()[1] > 3000
     assert axes.get_ylim()[1] > 900
+
+
+def test_zones_are_drawn_and_named() -> None:
+    zones = [{"name": "town", "kind": "exclusion", "east_m": 0, "north_m": -500, "radius_m": 150}]
+    figure = draw_map(make_scenario(zones=zones), **ALL, track=None, verdict=None)
+    boxes = [path.get_extents() for item in figure.axes[0].collections for path in item.get_paths()]
+    assert any((box.x0, box.x1, box.y0, box.y1) == pytest.approx((-150, 150, -650, -350)) for box in boxes)
+    assert "town" in {text.get_text() for text in figure.axes[0].texts}
+    assert "zone to keep out of" in {text.get_text() for text in figure.legends[0].get_texts()}

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.figures.elements.style import png_bytes
+from logs.figures.elements.style import ZONE, png_bytes
 from logs.figures.scene import Projection, draw_scene
 from logs.verdict.places import Place
 from tests.logs.figures.figure_data import make_verdict
@@ -74,3 +74,18 @@ def test_a_path_behind_a_ridge_is_drawn_dashed() -> None:
     way[:, 0] = np.linspace(-900.0, 900.0, 4)
     assert dashed(replace(hidden, route=replace(hidden.route, waypoints=way))) > 100
     assert dashed(make_setup(terrain={"kind": "flat", "amsl_m": 0}, threats=[])) == 0
+
+
+def test_zones_are_bodies_from_the_ground_up() -> None:
+    square = [[-300, -300], [300, -300], [300, 300], [-300, 300]]
+    zone = {"name": "town", "kind": "exclusion", "polygon_m": square, "ceiling_amsl_m": 500}
+    setup = make_setup(zones=[zone], terrain={"kind": "flat", "amsl_m": 40})
+    figure = draw_scene(setup, None, None)
+    edges = [line for line in figure.axes[0].lines if line.get_color() == ZONE]
+    assert len(edges) == 2
+    lower, upper = (line.get_ydata() for line in edges)
+    # All of it is 460 m high, seen from 36 degrees above; the title says how much heights are stretched.
+    title = figure.axes[0].get_title(loc="left")
+    stretch = 1.0 if "true to scale" in title else float(title.split("×")[1])
+    np.testing.assert_allclose(upper - lower, 460.0 * stretch * math.cos(DOWN))
+    assert "zone to keep out of" in legend(figure)

@@ -4,8 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from logs.recording.foxglove_scene import body_rotation
+from logs.recording.foxglove_scene import body_rotation, zones_scene
+from logs.recording.state_channel import EPOCH_NS
+from tests.logs.made_flight import make_setup
 
 
 @pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (0.3, -0.2, 1.9), (-1.1, 0.7, -2.8), (math.pi, 0.1, 0.4)])
@@ -31,3 +34,19 @@ def test_the_pose_turns_body_axes_into_the_world(attitude: tuple[float, float, f
         ]
     )
     np.testing.assert_allclose(got, wanted, atol=1e-12)
+
+
+def test_zones_are_lines_from_the_ground_to_the_ceiling() -> None:
+    square = [[-300, -200], [200, -200], [200, 400], [-300, 400]]
+    zones = [
+        {"name": "town", "kind": "exclusion", "polygon_m": square, "ceiling_amsl_m": 700},
+        {"name": "fence", "kind": "inclusion", "east_m": 0, "north_m": 0, "radius_m": 1400},
+    ]
+    setup = make_setup(zones=zones, terrain={"kind": "flat", "amsl_m": 40})
+    entity = SceneUpdate.FromString(zones_scene(EPOCH_NS, setup.scenario, setup.route.waypoints)).entities[0]
+    assert (entity.id, [text.text for text in entity.texts]) == ("zones", ["town", "fence"])
+    town = [line for line in entity.lines if len(line.points) in (5, 2)][:6]
+    assert {(point.x, point.y) for point in town[0].points} == {tuple(map(float, corner)) for corner in square}
+    assert [{point.z for point in line.points} for line in town] == [{40.0}, {700.0}, *[{40.0, 700.0}] * 4]
+    fence = [point for line in entity.lines[6:] for point in line.points]
+    assert all(math.hypot(point.x, point.y) == pytest.approx(1400.0) for point in fence)

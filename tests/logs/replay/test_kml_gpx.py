@@ -7,11 +7,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from logs.replay.kml_gpx import MapLine, gpx_text, kml_text, plan_line, track_line
+from flight.simulation.flight_setup import FlightSetup
+from logs.replay.kml_gpx import MapLine, gpx_text, kml_text, map_zones, plan_line, track_line
 from tests.logs.made_flight import WAYPOINTS, make_setup, make_track
 
 # The names of OGC 12-007 and of GPX 1.1, clause for clause theirs.
 KML = "{http://www.opengis.net/kml/2.2}"
+BOUNDARIES = ("outerBoundaryIs", "innerBoundaryIs")
 GPX = "{http://www.topografix.com/GPX/1/1}"
 LINE = MapLine("evil <name> & \x07", np.array([46.0, 46.01]), np.array([8.0, -8.5]), np.array([500.0, 520.25]))
 
@@ -77,3 +79,39 @@ def test_gpx_has_named_points_as_a_route_and_others_as_a_track() -> None:
     assert len(tracks[1].findall(f".//{GPX}trkpt")) == 1
     named = [point.findtext(f"{GPX}name") for point in routes[0].findall(f"{GPX}rtept")]
     assert named == ["0", "1 (item 2)", "2 (item 3)", "3 (item 4)"]
+
+
+def zoned_setup() -> FlightSetup:
+    outer, hole = [[-300, -300], [300, -300], [300, 300], [-300, 300]], [[-90, -90], [90, -90], [90, 90], [-90, 90]]
+    zones = [
+        {"name": "a & b", "kind": "exclusion", "rings_m": [hole, outer], "ceiling_agl_m": 120},
+        {"name": "fence", "kind": "inclusion", "east_m": 0, "north_m": 0, "radius_m": 1400},
+    ]
+    return make_setup(zones=zones)
+
+
+def test_zones_are_polygons_of_kml_with_their_holes_and_ceilings() -> None:
+    setup = zoned_setup()
+    root = ElementTree.fromstring(kml_text("zones", [], map_zones(setup)))
+    marks = root.findall(f"{KML}Document/{KML}Folder/{KML}Placemark")
+    assert [mark.findtext(f"{KML}name") for mark in marks] == ["a & b (keep out)", "fence (stay in)"]
+    polygon = marks[0].find(f"{KML}MultiGeometry/{KML}Polygon")
+    assert polygon is not None
+    assert polygon.findtext(f"{KML}altitudeMode") == "relativeToGround"
+    rings = [polygon.findtext(f"{KML}{kind}/{KML}LinearRing/{KML}coordinates") for kind in BOUNDARIES]
+    corners = [[tuple(map(float, point.split(","))) for point in (ring or "").split()] for ring in rings]
+    assert [len(ring) for ring in corners] == [5, 5]
+    assert all(ring[0] == ring[-1] and ring[0][2] == 120.0 for ring in corners)
+    # 300 m and 90 m north of the origin.
+    north = [(max(lat for _, lat, _ in ring) - setup.scenario.origin.lat_deg) * 111_200.0 for ring in corners]
+    assert north == pytest.approx([300.0, 90.0], rel=0.01)
+    open_top = marks[1].find(f"{KML}MultiGeometry/{KML}Polygon")
+    assert open_top is not None
+    assert open_top.findtext(f"{KML}altitudeMode") is None
+
+
+def test_zones_are_tracks_of_gpx_a_segment_a_ring() -> None:
+    root = ElementTree.fromstring(gpx_text("zones", [], map_zones(zoned_setup())))
+    tracks = root.findall(f"{GPX}trk")
+    assert [track.findtext(f"{GPX}name") for track in tracks] == ["a & b (keep out)", "fence (stay in)"]
+    assert [len(track.findall(f"{GPX}trkseg")) for track in tracks] == [2, 1]

@@ -102,3 +102,16 @@ def test_a_scene_without_terrain_and_flight_has_neither() -> None:
     bare = replace(SETUP, scenario=replace(SETUP.scenario, terrain=None, external=True))
     scene = json.loads(scene_json(bare, None, NOTHING))
     assert (scene["ground"], scene["track"]) == (None, [])
+
+
+def test_zones_stand_in_the_scene_where_there_are_any() -> None:
+    assert "zones" not in json.loads(scene_json(SETUP, None, NOTHING))
+    zone = {"name": "</script>", "kind": "exclusion", "east_m": 0, "north_m": 0, "radius_m": 200, "ceiling_amsl_m": 900}
+    setup = make_setup(zones=[zone], terrain={"kind": "flat", "amsl_m": 40})
+    text = scene_json(setup, None, NOTHING)
+    assert "<" not in text
+    (found,) = json.loads(text)["zones"]
+    ring = np.array(found["rings"][0])
+    assert (found["keep_out"], ring.shape[1:]) == (True, (2, 3))
+    assert np.hypot(ring[:, :, 0], ring[:, :, 1]) == pytest.approx(200.0, abs=0.1)
+    assert (set(ring[:, 0, 2]), set(ring[:, 1, 2])) == ({40.0}, {900.0})
