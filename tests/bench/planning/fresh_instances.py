@@ -1,7 +1,7 @@
-"""Fresh random instances that no tuning has seen: ``python -m tests.bench.fresh_instances --from 7001 --count 60``.
+"""Fresh random instances that no tuning has seen: ``python -m tests.bench.planning.fresh_instances --from 7001``.
 
 Of `tests.instances`: 60 threats, each instance one that a grid can pass.  Best known is the shortest certified path of
-`tests.bench.lattice_search` and of everything that is measured here.  What the lattice finds is kept in
+`tests.bench.planning.lattice_search` and of everything that is measured here.  What the lattice finds is kept in
 ``runs/fresh-instances.json``, for it takes the longest.
 """
 
@@ -19,7 +19,7 @@ from planner.evaluation.problem import make_problem
 from planner.plan import Objective
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
-from tests.bench.lattice_search import lattice_search
+from tests.bench.planning.lattice_search import lattice_search
 from tests.bench.task import Task, exact_airframe
 from tests.instances import random_scenario
 from world.scenario import from_spec
@@ -92,7 +92,7 @@ def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int) -> dict[
 
 def main() -> None:
     """Measure what the command line asks for."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench.fresh_instances")
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.planning.fresh_instances")
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")
     parser.add_argument("--count", type=int, default=60, help="instances")
     parser.add_argument("--runs", type=int, default=1, help="seeds of each algorithm on each")
