@@ -9,7 +9,7 @@ from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import Change, Place, Quantity, Suggestion
-from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_EDGE, ZONE_TRIES
+from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ZONE_TRIES
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
@@ -63,7 +63,7 @@ def _least_shift(
         visit = path_zones(shifted, record, terrain)[0]
         if visit.unknown:
             return None
-        if visit.depth <= FENCE_EDGE:
+        if visit.depth <= FENCE_DEPTH:
             return shift
         shift += float(visit.depth)
         if shift >= most:

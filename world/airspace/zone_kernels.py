@@ -91,14 +91,31 @@ def box_distance(
     return math.sqrt(across * across + along * along)
 
 
+@inlined
+def distance_to_edge(edge: Record, east: float, north: float) -> float:  # pragma: no cover - compiled
+    """Horizontal distance from a place to one edge, m."""
+    step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
+    off_e, off_n = east - edge.east, north - edge.north
+    share = (off_e * step_e + off_n * step_n) / (step_e * step_e + step_n * step_n)
+    share = min(1.0, max(0.0, share))
+    off_e -= share * step_e
+    off_n -= share * step_n
+    return math.sqrt(off_e * off_e + off_n * off_n)
+
+
 @compiled
-def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Horizontal distance from a place to zone z's outline, m; negative inside its shape."""
+def nearest_edge(
+    records: ZoneRecords, z: int, east: float, north: float
+) -> tuple[float, int]:  # pragma: no cover - compiled
+    """Horizontal distance from a place to zone z's outline, m, negative inside its shape, and the edge that is nearest.
+
+    A cylinder has no edges: its number is -1.
+    """
     zone = records.zones[z]
     if zone.round:
         out = math.sqrt((east - zone.centre_east) ** 2 + (north - zone.centre_north) ** 2)
-        return float(out - zone.radius)
-    nearest2 = math.inf
+        return float(out - zone.radius), -1
+    nearest2, nearest = math.inf, zone.first_edge
     inside = False
     for k in range(zone.first_edge, zone.last_edge):
         edge = records.edges[k]
@@ -109,13 +126,21 @@ def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> fl
         off_e -= share * step_e
         off_n -= share * step_n
         away2 = off_e * off_e + off_n * off_n
-        nearest2 = away2 if away2 < nearest2 else nearest2
+        if away2 < nearest2:
+            nearest2, nearest = away2, k
         # A ray to the east: an edge counts with its lower end and without its upper.
         if (edge.north > north) != (edge.to_north > north) and edge.east + step_e * (
             north - edge.north
         ) / step_n > east:
             inside = not inside
-    return -math.sqrt(nearest2) if inside else math.sqrt(nearest2)
+    return (-math.sqrt(nearest2) if inside else math.sqrt(nearest2)), nearest
+
+
+@compiled
+def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:  # pragma: no cover - compiled
+    """Horizontal distance from a place to zone z's outline, m; negative inside its shape."""
+    away, _ = nearest_edge(records, z, east, north)
+    return away
 
 
 @inlined

@@ -10,12 +10,21 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from logs.verdict.measures.path_blocks import BLOCK_MOVES, move_blocks
 from logs.verdict.measures.path_moves import move_point
+from logs.verdict.measures.zone_parts import (
+    PART,
+    between_ends,
+    beyond_limit,
+    copy_part,
+    farthest_from_outline,
+    look_at_zone,
+)
 from logs.verdict.tolerances import FENCE_DEPTH, FENCE_EDGE
-from world.airspace.zone_kernels import ZoneRecords, box_distance, edge_distance, outside_band
-from world.frames import POLYMAP, PolyMapRecord, polymap
+from world.airspace.zone_kernels import ZoneRecords, box_distance
+from world.frames import POLYMAP, PolyMapRecord
 from world.kernels import Record, Records, compiled, record_dtype
-from world.terrain import Terrain, ground_height
+from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
@@ -46,14 +55,9 @@ VISIT = record_dtype(
     ("exit_leg", np.int64),
     ("unknown", np.bool_),
 )
-# Consecutive moves: their box on the map, their least and greatest height, and the steepest ground below them, m per m.
-BLOCK = record_dtype("west", "east", "south", "north", "low", "high", "steepest")
-# A part of a move: its first and last share, and how far beyond the limit each is.
-PART = record_dtype("first", "last", "before", "after")
-# Moves of a block.
-_BLOCK = 64
-# Halves of halves: a way of 1,000 km comes down to `FENCE_EDGE` in 34.
-_MOST_HALVES = 64
+# Parts at a time: halves of halves, of which a way of 1,000 km comes down to `FENCE_EDGE` in 34, the whole move, and
+# one to swap two by.
+_MOST_PARTS = 64
 # s.  Two stays that are no further apart are one.
 _TOUCH = 1e-6
 
@@ -80,7 +84,7 @@ def _path_zones(
     for z in range(count):
         zone = records.zones[z]
         above_ground = above_ground or zone.floor_above_ground or zone.ceiling_above_ground
-    blocks = _blocks(moves, heights, to_pixel, pitch, above_ground)
+    blocks = move_blocks(moves, heights, to_pixel, pitch, above_ground)
     apart = np.zeros(count)
     for z in range(count):
         visits[z].depth = -math.inf
@@ -89,7 +93,7 @@ def _path_zones(
             for b in range(blocks.shape[0]):
                 block = blocks[b]
                 apart[z] = min(apart[z], box_distance(records, z, block.west, block.east, block.south, block.north))
-    parts = np.zeros(_MOST_HALVES, PART)
+    parts = np.zeros(_MOST_PARTS, PART)
     known = -math.inf
     # The nearest first: what is known of them says of the others that they are further away.
     for z in np.argsort(apart, kind="mergesort"):
@@ -99,82 +103,6 @@ def _path_zones(
         _visit(moves, blocks, records, z, heights, to_pixel, known, parts, visits[z])
         known = max(known, min(0.0, visits[z].depth))
     return visits
-
-
-@compiled
-def _blocks(
-    moves: Records, heights: Heights, to_pixel: PolyMapRecord, pitch: float, above_ground: bool
-) -> Records:  # pragma: no cover - compiled
-    """(b,) of `BLOCK`; the ground is looked at where a zone counts from it."""
-    blocks = np.zeros((moves.shape[0] + _BLOCK - 1) // _BLOCK, BLOCK)
-    for b in range(blocks.shape[0]):
-        block = blocks[b]
-        block.west, block.south, block.low = math.inf, math.inf, math.inf
-        block.east, block.north, block.high = -math.inf, -math.inf, -math.inf
-        for k in range(b * _BLOCK, min(moves.shape[0], (b + 1) * _BLOCK)):
-            move = moves[k]
-            east, north, up = move_point(move, 0.5)
-            # No point of a move is further from its middle than half its length.
-            half = 0.5 * move.length
-            lift = 0.5 * abs(move.climb) + 1.25 * abs(move.bend)
-            block.west, block.east = min(block.west, east - half), max(block.east, east + half)
-            block.south, block.north = min(block.south, north - half), max(block.north, north + half)
-            block.low, block.high = min(block.low, up - lift), max(block.high, up + lift)
-        if above_ground:
-            block.steepest = _steepest(block, heights, to_pixel, pitch)
-    return blocks
-
-
-@compiled
-def _steepest(
-    block: Record, heights: Heights, to_pixel: PolyMapRecord, pitch: float
-) -> float:  # pragma: no cover - compiled
-    """Steepest slope that the bilinear ground can have under a block, m per m; NaN adds nothing."""
-    rows, cols = heights.shape
-    west, south = polymap(to_pixel, block.west, block.south)
-    east, north = polymap(to_pixel, block.east, block.north)
-    # The map's axes may be turned against the raster's: both diagonals' ends.
-    left, upper = polymap(to_pixel, block.west, block.north)
-    right, lower = polymap(to_pixel, block.east, block.south)
-    first_col, last_col = min(west, east, left, right), max(west, east, left, right)
-    first_row, last_row = min(south, north, upper, lower), max(south, north, upper, lower)
-    if not (last_col >= 0.0 and first_col <= cols - 1 and last_row >= 0.0 and first_row <= rows - 1):
-        return 0.0
-    steepest = 0.0
-    for i in range(max(0, int(first_row) - 1), min(rows - 1, int(last_row) + 2)):
-        for j in range(max(0, int(first_col) - 1), min(cols - 1, int(last_col) + 2)):
-            over = max(abs(heights[i, j + 1] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i + 1, j]))
-            down = max(abs(heights[i + 1, j] - heights[i, j]), abs(heights[i + 1, j + 1] - heights[i, j + 1]))
-            steep = over * over + down * down
-            # NaN compares as less.
-            if steep > steepest:
-                steepest = steep
-    # A hair more, for what single precision rounds.
-    return math.sqrt(steepest) / pitch * (1.0 + 1e-6)
-
-
-@compiled
-def violation(
-    records: ZoneRecords, z: int, heights: Heights, to_pixel: PolyMapRecord, east: float, north: float, up: float
-) -> float:  # pragma: no cover - compiled
-    """How far beyond zone z's limit a place is, m: the least way, level or straight up or down, that ends it.
-
-    Negative where it is on the right side: the way, level or upright, that it has at least.  NaN where the zone counts
-    from the ground, which is not known there, and the map alone does not tell.
-    """
-    zone = records.zones[z]
-    away = edge_distance(records, z, east, north)
-    ground = 0.0
-    if zone.floor_above_ground or zone.ceiling_above_ground:
-        ground = ground_height(heights, to_pixel, east, north)
-    off = outside_band(zone, up, ground)
-    if off != off:
-        # Beside its shape it is outside whatever the ground.
-        if away <= 0.0:
-            return math.nan
-        off = away
-    outside = max(away, off)
-    return -outside if zone.exclusion else outside
 
 
 @compiled
@@ -189,88 +117,159 @@ def _visit(
     parts: Records,
     visit: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Fill in how a path meets zone z; known: m, depths below it need not be exact."""
+    """Fill in how a path meets zone z; known: m, depths below it need not be exact.
+
+    In three rounds: the moves' ends alone; the deepest place, which is near the best of them; and, where the zone is
+    violated, when.
+    """
     zone = records.zones[z]
-    slope = zone.floor_above_ground or zone.ceiling_above_ground
-    for b in range(blocks.shape[0]):
-        block = blocks[b]
-        steepest = block.steepest if slope else 0.0
-        across, along = 0.5 * (block.east - block.west), 0.5 * (block.north - block.south)
-        reach = math.sqrt(across * across + along * along)
-        middle = violation(
-            records, z, heights, to_pixel, block.west + across, block.south + along, 0.5 * (block.low + block.high)
-        )
-        highest = middle + max(reach, 0.5 * (block.high - block.low) + steepest * reach)
-        if highest <= 0.0 and highest <= max(known, visit.depth):
-            continue
-        first = moves[b * _BLOCK]
-        before = violation(records, z, heights, to_pixel, first.east, first.north, first.up)
-        for k in range(b * _BLOCK, min(moves.shape[0], (b + 1) * _BLOCK)):
-            east, north, up = move_point(moves[k], 1.0)
-            after = violation(records, z, heights, to_pixel, east, north, up)
-            _part_moves(moves[k], records, z, heights, to_pixel, steepest, known, before, after, parts, visit)
-            before = after
+    above_ground = zone.floor_above_ground or zone.ceiling_above_ground
+    for turn in range(3):
+        for b in range(blocks.shape[0]):
+            block = blocks[b]
+            steepest = block.steepest if above_ground else 0.0
+            across, along = 0.5 * (block.east - block.west), 0.5 * (block.north - block.south)
+            reach, lift = math.sqrt(across * across + along * along), 0.5 * (block.high - block.low)
+            away, off, _ = look_at_zone(
+                records, z, heights, to_pixel, block.west + across, block.south + along, block.low + lift
+            )
+            highest = beyond_limit(zone.exclusion, away, off) + max(reach, lift + steepest * reach)
+            # Unknown ground beside a middle that is known is to be found.
+            if highest <= (0.0 if turn == 2 else max(known, visit.depth)) and not (above_ground and away < reach):
+                continue
+            first, last = b * BLOCK_MOVES, min(moves.shape[0], (b + 1) * BLOCK_MOVES)
+            _visit_block(moves[first:last], turn, records, z, heights, to_pixel, steepest, known, parts, visit)
+        if turn == 1 and not visit.depth > 0.0:
+            break
 
 
 @compiled
-def _part_moves(
-    move: Record,
+def _visit_block(
+    moves: Records,
+    turn: int,
     records: ZoneRecords,
     z: int,
     heights: Heights,
     to_pixel: PolyMapRecord,
     steepest: float,
     known: float,
-    before: float,
-    after: float,
     parts: Records,
     visit: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Cut a move in halves until each part is certain, and add the parts to a visit in the order that they have."""
-    # The most that the violation changes over the whole move: level, and upright.
-    upright = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + steepest * move.length
-    change = max(move.length, upright)
-    parts[0].first, parts[0].last, parts[0].before, parts[0].after = 0.0, 1.0, before, after
-    left = 1
-    while left > 0:
-        part = parts[left - 1]
-        first, last, before, after = part.first, part.last, part.before, part.after
-        reach = change * (last - first)
-        highest, lowest = 0.5 * (before + after + reach), 0.5 * (before + after - reach)
-        # Between two places above unknown ground all counts as unknown.
-        certain = highest <= 0.0 or lowest > 0.0 or (before != before and after != after)
-        deeper = highest > max(visit.depth, known) + FENCE_DEPTH
-        if reach > FENCE_EDGE and (deeper or not certain):
-            middle = 0.5 * (first + last)
-            east, north, up = move_point(move, middle)
-            between = violation(records, z, heights, to_pixel, east, north, up)
-            # The later half lies below the earlier one.
-            part.first, part.before = middle, between
-            left += 1
-            parts[left - 1].first, parts[left - 1].last = first, middle
-            parts[left - 1].before, parts[left - 1].after = before, between
-            continue
-        left -= 1
-        _add_part(move, first, last, before, after, visit)
+    """Add some moves in a row to a visit; turn: the round, as `_visit` counts them."""
+    part = parts[0]
+    part.to_east, part.to_north, up = move_point(moves[0], 0.0)
+    part.to_away, part.to_off, part.to_edge = look_at_zone(
+        records, z, heights, to_pixel, part.to_east, part.to_north, up
+    )
+    for k in range(moves.shape[0]):
+        part.first, part.last = 0.0, 1.0
+        part.east, part.north, part.away = part.to_east, part.to_north, part.to_away
+        part.off, part.edge = part.to_off, part.to_edge
+        part.to_east, part.to_north, up = move_point(moves[k], 1.0)
+        part.to_away, part.to_off, part.to_edge = look_at_zone(
+            records, z, heights, to_pixel, part.to_east, part.to_north, up
+        )
+        if turn == 0:
+            _deepen(moves[k], part, records.zones[z].exclusion, visit)
+        else:
+            _cut_move(moves[k], turn == 2, records, z, heights, to_pixel, steepest, known, parts, visit)
 
 
 @compiled
-def _add_part(
-    move: Record, first: float, last: float, before: float, after: float, visit: Record
+def _cut_move(
+    move: Record,
+    ordered: bool,
+    records: ZoneRecords,
+    z: int,
+    heights: Heights,
+    to_pixel: PolyMapRecord,
+    steepest: float,
+    known: float,
+    parts: Records,
+    visit: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Add a part of a move, wrong or right throughout or passing the limit once, to a visit."""
-    for share, depth in ((first, before), (last, after)):
+    """Cut a move, the first of the parts, in halves until each is certain, and add them to a visit.
+
+    ordered: until it is certain of each on which side of the limit it is, and then added by its time; else until none
+    can be deeper than what is known.  The first part's end is left as it was: the next move begins there.
+    """
+    exclusion = records.zones[z].exclusion
+    # The most that the height in a band changes over the whole move.
+    climb = max(abs(move.climb), abs(move.climb + 2.0 * move.bend)) + steepest * move.length
+    copy_part(parts[0], parts[1])
+    left = 1
+    while left > 0:
+        part = parts[left]
+        share = part.last - part.first
+        run, rise = share * move.length, share * climb
+        enough = 0.0 if ordered else max(visit.depth, known) + FENCE_DEPTH
+        lowest, highest = between_ends(exclusion, part, run, rise, math.inf)
+        done = highest <= enough or (ordered and lowest > 0.0) or max(run, rise) <= FENCE_EDGE
+        done = done or _is_unknown(exclusion, part)
+        if not done:
+            # With the edges beside it looked at, which takes longer.
+            farthest = farthest_from_outline(records, z, move, part, run)
+            lowest, highest = between_ends(exclusion, part, run, rise, farthest)
+            done = highest <= enough
+        if done:
+            if ordered:
+                _add_part(move, part, exclusion, visit)
+            else:
+                _deepen(move, part, exclusion, visit)
+            left -= 1
+            continue
+        earlier = parts[left + 1]
+        copy_part(part, earlier)
+        middle = 0.5 * (part.first + part.last)
+        earlier.last = part.first = middle
+        east, north, up = move_point(move, middle)
+        away, off, edge = look_at_zone(records, z, heights, to_pixel, east, north, up)
+        part.east, part.north, part.away, part.off, part.edge = east, north, away, off, edge
+        earlier.to_east, earlier.to_north, earlier.to_away = east, north, away
+        earlier.to_off, earlier.to_edge = off, edge
+        if not ordered and beyond_limit(exclusion, part.to_away, part.to_off) > beyond_limit(
+            exclusion, earlier.away, earlier.off
+        ):
+            # The half that may be deeper is to lie on top: what is found there spares the other.
+            copy_part(part, parts[_MOST_PARTS - 1])
+            copy_part(earlier, part)
+            copy_part(parts[_MOST_PARTS - 1], earlier)
+        left += 1
+
+
+@compiled
+def _is_unknown(exclusion: bool, part: Record) -> bool:  # pragma: no cover - compiled
+    """Whether both ends are above ground that would tell and is not known: all between counts as unknown."""
+    before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
+    return before != before and after != after
+
+
+@compiled
+def _deepen(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
+    """Take a part's ends for the deepest place of a visit where they are, and note unknown ground."""
+    for at_end in range(2):
+        depth = beyond_limit(exclusion, part.away, part.off)
+        if at_end:
+            depth = beyond_limit(exclusion, part.to_away, part.to_off)
         if depth > visit.depth:
+            share = part.last if at_end else part.first
             visit.depth, visit.at_time, visit.at_leg = depth, move.time + share * move.lasts, move.leg
             visit.at_east, visit.at_north, visit.at_up = move_point(move, share)
-    visit.unknown = visit.unknown or before != before or after != after
+        visit.unknown = visit.unknown or depth != depth
+
+
+@compiled
+def _add_part(move: Record, part: Record, exclusion: bool, visit: Record) -> None:  # pragma: no cover - compiled
+    """Add a part of a move, wrong or right throughout or passing the limit once, to a visit."""
+    before, after = beyond_limit(exclusion, part.away, part.off), beyond_limit(exclusion, part.to_away, part.to_off)
     if not (before > 0.0 or after > 0.0):
         return
-    enter, leave = first, last
+    enter, leave = part.first, part.last
     if before <= 0.0:
-        enter = first + (last - first) * before / (before - after)
+        enter += (leave - enter) * before / (before - after)
     elif after <= 0.0:
-        leave = first + (last - first) * before / (before - after)
+        leave = enter + (leave - enter) * before / (before - after)
     begins, ends = move.time + enter * move.lasts, move.time + leave * move.lasts
     visit.beyond += ends - begins
     if visit.entries == 0 or begins > visit.exit_time + _TOUCH:

@@ -1,10 +1,11 @@
 """Choose an aircraft's gains by coordinate search on one set of missions, and report on others.
 
-``python -m tests.bench.tuning.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off the
-linear model from there, searches the rest from round figures (`START`), prints what each round brings and, at the end,
-how the chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts the
-result into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions come from the
-seed (`tests.bench.tuning.tuning_missions`); the standard mission is none of them.  Two minutes a round on two cores.
+``python -m tests.bench.tuning.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off
+the linear model from there, searches the rest from round figures (`START`), prints what each round brings and, at the
+end, how the chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts
+the result into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions
+come from the seed (`tests.bench.tuning.tuning_missions`); the standard mission is none of them.  Two minutes a round
+on two cores.
 """
 
 import argparse

@@ -1,0 +1,90 @@
+"""Bounds of a part of a move beside a zone: no place between its ends is further beyond the limit than they say."""
+
+import math
+
+import numpy as np
+import pytest
+
+from logs.verdict.measures.path_moves import MOVE, move_point
+from logs.verdict.measures.zone_parts import (
+    PART,
+    between_ends,
+    beyond_limit,
+    copy_part,
+    farthest_from_outline,
+    look_at_zone,
+)
+from tests.logs.verdict.measures.test_zone_visits import move
+from tests.world.airspace.test_zone_kernels import star
+from world.airspace.zone_kernels import ZoneRecords, zone_records
+from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
+from world.frames import POLYMAP
+from world.kernels import Record, Records
+
+NO_GROUND = (np.full((2, 2), np.nan, np.float32), np.zeros(1, POLYMAP)[0])
+
+
+def looked(records: ZoneRecords, place: tuple[float, float, float]) -> tuple[float, float, int]:
+    return look_at_zone(records, 0, *NO_GROUND, *place)
+
+
+def whole(one: Record, records: ZoneRecords) -> Record:
+    part: Record = np.zeros(1, PART).view(PART)[0]
+    part.first, part.last = 0.0, 1.0
+    part.east, part.north, up = move_point(one, 0.0)
+    part.away, part.off, part.edge = looked(records, (part.east, part.north, up))
+    part.to_east, part.to_north, up = move_point(one, 1.0)
+    part.to_away, part.to_off, part.to_edge = looked(records, (part.to_east, part.to_north, up))
+    return part
+
+
+@pytest.mark.parametrize("kind", ["exclusion", "inclusion"])
+def test_no_place_is_beyond_the_bounds(kind: str) -> None:
+    rng = np.random.default_rng(9)
+    shapes = (make_polygon([star(rng, 9)]), Cylinder(100.0, -200.0, 600.0))
+    band = (ZoneLevel(100.0, "amsl"), ZoneLevel(300.0, "amsl"))
+    tight = 0
+    for k in range(200):
+        zone = Zone("z", "exclusion" if kind == "exclusion" else "inclusion", shapes[k % 2], *band)
+        records = zone_records([zone])
+        length = float(rng.uniform(5.0, 300.0))
+        row = move(
+            *rng.uniform(-700.0, 700.0, 2).tolist(), float(rng.uniform(0.0, 400.0)),
+            course=float(rng.uniform(0.0, 360.0)), length=length, climb=float(rng.uniform(-60.0, 60.0)),
+            bend=float(rng.uniform(-30.0, 30.0)), curvature=float(rng.choice([0.0, rng.uniform(-0.008, 0.008)])),
+        )  # fmt: skip
+        moves: Records = np.array([row], MOVE)
+        one, part = moves[0], whole(moves[0], records)
+        rise = max(abs(one.climb), abs(one.climb + 2.0 * one.bend))
+        farthest = farthest_from_outline(records, 0, one, part, length)
+        low, high = between_ends(kind == "exclusion", part, length, rise, farthest)
+        depths = []
+        for share in np.linspace(0.0, 1.0, 101):
+            away, off, _ = looked(records, move_point(one, share))
+            depths.append(beyond_limit(kind == "exclusion", away, off))
+            outside = -away if kind == "exclusion" else away
+            assert outside <= farthest + 1e-9
+        assert low - 1e-9 <= min(depths)
+        assert max(depths) <= high + 1e-9
+        tight += high - max(depths) < 0.1 * length
+    assert tight > 40
+
+
+def test_along_an_edge_the_bound_is_exact() -> None:
+    records = zone_records([Zone("z", "exclusion", make_polygon([[(0.0, -900.0), (900.0, -900.0), (0.0, 5000.0)]]))])
+    way: Records = np.array([move(5.0, 0.0, 0.0, course=0.0, length=2000.0)], MOVE)
+    assert farthest_from_outline(records, 0, way[0], whole(way[0], records), 2000.0) == pytest.approx(5.0)
+
+
+def test_unknown_ground_tells_nothing_but_beside_the_shape() -> None:
+    for exclusion in (True, False):
+        assert math.isnan(beyond_limit(exclusion, -3.0, math.nan))
+        assert beyond_limit(exclusion, 3.0, math.nan) == (-3.0 if exclusion else 3.0)
+
+
+def test_a_copy_is_the_same() -> None:
+    parts: Records = np.zeros(2, PART)
+    for k, name in enumerate(parts.dtype.names or ()):
+        parts[0][name] = k + 1
+    copy_part(parts[0], parts[1])
+    assert parts[0].tolist() == parts[1].tolist()
