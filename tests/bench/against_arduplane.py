@@ -1,10 +1,12 @@
 """ArduPlane's law against ArduPlane itself: both fly the same random plans in the same wind, gust for gust.
 
-``python -m tests.bench.against_arduplane [--plans N] [--from SEED] [--json FILE] [--keep FILE]`` plans across the
-ridges near Jacksboro (random ends, winds of 0 to 10 m/s from anywhere, light or moderate turbulence), flies each plan
-with the law and with the program that PLANFLY_ARDUPLANE names (default: ``../shared/autopilot/arduplane`` beside the
-checkout), and prints, for all corners that turn enough, how far each overshoots, and how much ground clearance each
-keeps.  --keep writes what the program flew, with its missions, as `tests.authorities` keeps it.
+``python -m tests.bench.against_arduplane [--plans N] [--from SEED] [--steep] [--json FILE] [--keep FILE]`` plans
+across the ridges near Jacksboro (random ends, winds of 0 to 10 m/s from anywhere, light or moderate turbulence),
+flies each plan with the law and with the program that PLANFLY_ARDUPLANE names (default:
+``../shared/autopilot/arduplane`` beside the checkout), and prints, for all corners that turn enough, how far each
+overshoots, and how much ground clearance each keeps.  --steep plans for climbs that take all the throttle there is;
+plans otherwise leave gusts a share of it.  --keep writes what the program flew, with its missions, as
+`tests.authorities` keeps it.
 """
 
 import argparse
@@ -78,10 +80,10 @@ class Compared:
     apart_up: tuple[float, float]
 
 
-def random_setup(seed: int) -> tuple[FlightSetup, Airframe]:
+def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airframe]:
     """A plan between random ends in a random wind, for ArduPlane with exact navigation: the first that is feasible.
 
-    The same seed gives the same one.
+    The same seed gives the same one.  steep: whether plans may climb as `_climbing` says.
     """
     for draw in range(50):
         rng = np.random.default_rng([seed, draw])
@@ -102,7 +104,7 @@ def random_setup(seed: int) -> tuple[FlightSetup, Airframe]:
         try:
             scenario = from_spec(spec, f"random {seed}")
             airframe = load_airframe(scenario)
-            plan = make_plan(scenario, _climbing(airframe, scenario), seed)
+            plan = make_plan(scenario, _climbing(airframe, scenario) if steep else airframe, seed)
         except ScenarioError:  # an end within a missile's reach
             continue
         if plan.feasible:
@@ -184,9 +186,9 @@ def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
     )
 
 
-def compare(seed: int) -> tuple[Compared, FlightSetup]:
+def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
     """Fly one random plan with both."""
-    setup, airframe = random_setup(seed)
+    setup, airframe = random_setup(seed, steep=steep)
     law = simulate(setup, airframe.aircraft)
     real, _ = fly_autopilot(setup, airframe.aircraft, BINARY)
     (law_across, law_up), (across, up) = (_along_legs(setup, flown.track) for flown in (law, real))
@@ -260,13 +262,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench.against_arduplane")
     parser.add_argument("--plans", type=int, default=40)
     parser.add_argument("--from", dest="first", type=int, default=1, help="seed of the first plan")
+    parser.add_argument("--steep", action="store_true", help="plans climb with all the throttle there is")
     parser.add_argument("--json", default="runs/against-arduplane.json", help="where the figures go")
     parser.add_argument("--keep", help="where the real flights go, for tests")
     args = parser.parse_args()
     found, kept = [], []
     for seed in range(args.first, args.first + args.plans):
         begun = time.monotonic()
-        compared, setup = compare(seed)
+        compared, setup = compare(seed, steep=args.steep)
         _print(compared, time.monotonic() - begun)
         found.append(compared)
         kept.append(kept_flight(compared, setup))
