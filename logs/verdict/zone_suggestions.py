@@ -10,7 +10,7 @@ from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import Change, Quantity, Suggestion
-from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ZONE_TRIES
+from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ROUNDING, ZONE_TRIES
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
@@ -28,17 +28,18 @@ _UPRIGHT: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("de
 def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
     """Pass a zone further to one side, or higher or lower; the least change first.
 
-    item: the finding of the zone that is violated.  Of planned path and flight the one that goes further beyond the
-    zone's limit is shifted, all of the legs on which it was found to.
+    item: the finding of the zone that is violated.  All of the legs on which it is are shifted: of the planned path
+    where that violates it, and by as much more as the flight went deeper; of the flight where only that does.
     """
     z, facts = item.place.index or 0, {fact.what: fact.value for fact in item.facts}
     if "entry leg" not in facts:
         return ()
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([demands.airspace.zones[z]]), demands.setup.scenario.terrain
-    moves = planned_moves(demands)
-    if aligned is not None and (item.flown or 0.0) >= (item.planned or 0.0):
-        moves = flown_moves(aligned, first, last)
+    planned, flown = item.planned or 0.0, item.flown or 0.0
+    moves, deeper = planned_moves(demands), max(0.0, flown - planned)
+    if aligned is not None and planned <= ROUNDING:
+        moves, deeper = flown_moves(aligned, first, last), 0.0
     near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
     found = []
     for ways in (_LEVEL, _UPRIGHT):
@@ -46,7 +47,7 @@ def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: 
         for what, axis, sign in ways:
             shift = _least_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
             if shift is not None:
-                best = shift, Change(what, item.place, None, float(math.ceil(shift + BUFFER_LENGTH)), "m")
+                best = shift, Change(what, item.place, None, float(math.ceil(shift + deeper + BUFFER_LENGTH)), "m")
         if best is not None:
             found.append(best)
     return tuple((change,) for _, change in sorted(found, key=lambda one: one[0]))
