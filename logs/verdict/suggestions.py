@@ -52,7 +52,7 @@ def _suggest(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding)
         case "height", Place("leg"):
             return _lower(item)
         case "fence", Place("exclusion" | "inclusion"):
-            return zone_suggestions(demands, aligned, item.place)
+            return zone_suggestions(demands, aligned, item)
         case "bounds", _:
             return _inside(item)
         case "energy", _:

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 
+from logs.verdict.findings import Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
-from logs.verdict.places import Change, Place, Quantity, Suggestion
-from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ZONE_TRIES
+from logs.verdict.places import Change, Quantity, Suggestion
+from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ROUNDING, ZONE_TRIES
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
@@ -24,27 +25,29 @@ _LEVEL: tuple[tuple[Quantity, str, float], ...] = (
 _UPRIGHT: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
-def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, place: Place) -> tuple[Suggestion, ...]:
+def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
     """Pass a zone further to one side, or higher or lower; the least change first.
 
-    place: the zone's.  Of planned path and flight the one that goes further beyond the zone's limit is shifted, all of
-    the legs on which it does.
+    item: the finding of the zone that is violated.  All of the legs on which it is are shifted: of the planned path
+    where that violates it, and by as much more as the flight went deeper; of the flight where only that does.
     """
-    z = place.index or 0
+    z, facts = item.place.index or 0, {fact.what: fact.value for fact in item.facts}
+    if "entry leg" not in facts:
+        return ()
+    first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([demands.airspace.zones[z]]), demands.setup.scenario.terrain
-    candidates = [planned_moves(demands)]
-    if aligned is not None:
-        candidates.append(flown_moves(aligned))
-    visits = [path_zones(moves, record, terrain)[0] for moves in candidates]
-    moves, visit = max(zip(candidates, visits, strict=True), key=lambda pair: float(pair[1].depth))
-    near = moves[(moves["leg"] >= visit.entry_leg) & (moves["leg"] <= visit.exit_leg)]
+    planned, flown = item.planned or 0.0, item.flown or 0.0
+    moves, deeper = planned_moves(demands), max(0.0, flown - planned)
+    if aligned is not None and planned <= ROUNDING:
+        moves, deeper = flown_moves(aligned, first, last), 0.0
+    near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
     found = []
     for ways in (_LEVEL, _UPRIGHT):
         best: tuple[float, Change] | None = None
         for what, axis, sign in ways:
             shift = _least_shift(near, record, terrain, axis, sign, math.inf if best is None else best[0])
             if shift is not None:
-                best = shift, Change(what, place, None, float(math.ceil(shift + BUFFER_LENGTH)), "m")
+                best = shift, Change(what, item.place, None, float(math.ceil(shift + deeper + BUFFER_LENGTH)), "m")
         if best is not None:
             found.append(best)
     return tuple((change,) for _, change in sorted(found, key=lambda one: one[0]))

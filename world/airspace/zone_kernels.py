@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from world.airspace.zones import Cylinder, Zone, ZoneLevel
+from world.airspace.zones import Cylinder, Ring, Zone, ZoneLevel
 from world.kernels import Record, Records, compiled, inlined, record_dtype
 
 # One zone.  round: whether it is a cylinder, of which `centre_east`, `centre_north` and `radius` say all.  first_edge,
@@ -51,12 +51,13 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
     (700.0, 0)
     """
     out: Records = np.zeros(len(zones), ZONE)
-    edges: list[tuple[float, float, float, float]] = []
+    first = 0
+    rings: list[Ring] = []
     for record, zone in zip(out, zones, strict=True):
         record.exclusion = zone.kind == "exclusion"
         record.floor, record.floor_above_ground = _level(zone.floor, -math.inf)
         record.ceiling, record.ceiling_above_ground = _level(zone.ceiling, math.inf)
-        record.first_edge = len(edges)
+        record.first_edge = first
         shape = zone.shape
         if isinstance(shape, Cylinder):
             record.round, record.radius = True, shape.radius
@@ -64,16 +65,28 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
             record.west, record.east = shape.east - shape.radius, shape.east + shape.radius
             record.south, record.north = shape.north - shape.radius, shape.north + shape.radius
         else:
-            for ring in shape.rings:
-                edges += [(*corner, *after) for corner, after in zip(ring, (*ring[1:], ring[0]), strict=True)]
-            corners = np.array([corner for ring in shape.rings for corner in ring])
-            record.west, record.south = corners.min(axis=0)
-            record.east, record.north = corners.max(axis=0)
-        record.last_edge = len(edges)
-    made: Records = np.array(edges, EDGE)
-    for array in (out, made):
+            easts, norths = zip(*(corner for ring in shape.rings for corner in ring), strict=True)
+            record.west, record.east, record.south, record.north = min(easts), max(easts), min(norths), max(norths)
+            rings += shape.rings
+            first += len(easts)
+        record.last_edge = first
+    edges = _edges(rings)
+    for array in (out, edges):
         array.setflags(write=False)
-    return ZoneRecords(out, made)
+    return ZoneRecords(out, edges)
+
+
+def _edges(rings: list[Ring]) -> Records:
+    """(e,) of `EDGE` from every corner of some rings to the next of its ring."""
+    corners = np.array([corner for ring in rings for corner in ring], dtype=np.float64).reshape(-1, 2)
+    after = np.roll(corners, -1, axis=0)
+    sizes = np.array([len(ring) for ring in rings], dtype=np.int64)
+    ends = np.cumsum(sizes)
+    after[ends - 1] = corners[ends - sizes]
+    made: Records = np.zeros(len(corners), EDGE)
+    made["east"], made["north"] = corners.T
+    made["to_east"], made["to_north"] = after.T
+    return made
 
 
 def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:

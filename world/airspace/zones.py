@@ -94,16 +94,22 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
     for shape in shapes:
         if not shape.is_valid:
             raise ValueError(f"crosses or touches itself ({shapely.is_valid_reason(shape)})")
+    if len(shapes) == 1:
+        _check_area(shapes[0].area)
+        return Polygon((cleaned[0] if shapes[0].exterior.is_ccw else cleaned[0][::-1],))
     tree = shapely.STRtree(shapes)
     for first, second in tree.query(shapes, predicate="intersects").T:
         if first < second and _cross(shapes[first], shapes[second]):
             raise ValueError("its rings cross each other, or share an edge")
     # A ring is within itself.
     depths = [len(tree.query(shape, predicate="within")) - 1 for shape in shapes]
-    inside = sum(shape.area if depth % 2 == 0 else -shape.area for shape, depth in zip(shapes, depths, strict=True))
+    _check_area(sum(shape.area * (1 if depth % 2 == 0 else -1) for shape, depth in zip(shapes, depths, strict=True)))
+    return Polygon(tuple(_turned(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
+
+
+def _check_area(inside: float) -> None:
     if not inside >= LEAST_AREA:
         raise ValueError(f"nothing inside: {inside:.3g} m2; at least {LEAST_AREA:g} m2 are needed")
-    return Polygon(tuple(_turned(ring, depth) for ring, depth in zip(cleaned, depths, strict=True)))
 
 
 def _cross(one: shapely.Polygon, other: shapely.Polygon) -> bool:

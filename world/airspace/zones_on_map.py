@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.airspace.ring_on_map import ring_on_map
-from world.airspace.zone_kernels import edge_distance, outside_band, zone_records
+from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.airspace.zone_tables import ZoneTable
 from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, make_cylinder, make_polygon
 from world.errors import ScenarioError
@@ -65,8 +65,9 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
 
     ends: of each its key in the file, and its position (3,) m.
     """
+    records = zone_records(zones)
     for key, point in ends:
-        broken = zone_broken_at(zones, point, ground)
+        broken = _first_broken(zones, records, point, ground)
         if broken is not None:
             side = "inside the exclusion" if broken.kind == "exclusion" else "outside the inclusion"
             raise ScenarioError(f"{source}: zones: {broken.name}: {key} lies {side}")
@@ -80,7 +81,10 @@ def zone_broken_at(zones: Sequence[Zone], point: Floats, ground: Terrain | None)
     >>> [zone_broken_at([mast], np.array([0.0, 0.0, up]), None) is mast for up in (290.0, 310.0)]
     [True, False]
     """
-    records = zone_records(zones)
+    return _first_broken(zones, zone_records(zones), point, ground)
+
+
+def _first_broken(zones: Sequence[Zone], records: ZoneRecords, point: Floats, ground: Terrain | None) -> Zone | None:
     east, north, up = (float(value) for value in point)
     under = math.nan if ground is None else float(ground.height(east, north))
     for k, zone in enumerate(zones):

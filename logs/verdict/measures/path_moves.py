@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from flight.guidance.fly_by_path import FlyByPath, arc_point
 from flight.guidance.path_kernels import profile
-from flight.simulation.track import Track
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from world.kernels import Record, Records, compiled, record_dtype
@@ -87,22 +86,24 @@ def path_moves(path: FlyByPath, speeds: Floats) -> Records:
     return np.array(rows, MOVE)
 
 
-def flown_moves(aligned: AlignedTrack) -> Records:
-    """Moves of a flown track, one from each row to the next."""
-    return track_moves(aligned.track, aligned.rows)
+def flown_moves(aligned: AlignedTrack, first: int = 0, last: int | None = None) -> Records:
+    """Moves of a flown track, one from each row to the next; first, last: legs of which they are wanted, default all.
 
-
-def track_moves(track: Track, rows: NDArray[np.int64]) -> Records:
-    """Moves of a track of t rows; rows: (w,) the one at each waypoint."""
-    step = np.diff(track.position, axis=0)
+    What came before the first leg belongs to it, and what came after the last to that.
+    """
+    legs = len(aligned.rows) - 1
+    last = legs - 1 if last is None else last
+    begin = 0 if first <= 0 else int(aligned.rows[first])
+    end = len(aligned.track) if last >= legs - 1 else int(aligned.rows[last + 1]) + 1
+    position, time = aligned.track.position[begin:end], aligned.track.time[begin:end]
+    step = np.diff(position, axis=0)
     moves: Records = np.zeros(len(step), MOVE)
     for axis, name in enumerate(("east", "north", "up")):
-        moves[name] = track.position[:-1, axis]
+        moves[name] = position[:-1, axis]
     run = np.hypot(step[:, 0], step[:, 1])
     moves["course_east"] = np.divide(step[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
     moves["course_north"] = np.divide(step[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
     moves["length"], moves["climb"] = run, step[:, 2]
-    moves["time"], moves["lasts"] = track.time[:-1], np.diff(track.time)
-    # What came before the first leg belongs to it, and what came after the last to that.
-    moves["leg"] = np.searchsorted(rows[1:-1], np.arange(len(step)), side="right")
+    moves["time"], moves["lasts"] = time[:-1], np.diff(time)
+    moves["leg"] = np.searchsorted(aligned.rows[1:-1], np.arange(begin, begin + len(step)), side="right")
     return moves

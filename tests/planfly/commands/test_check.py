@@ -51,3 +51,79 @@ def test_check_names_px4s_rules(tmp_path: Path) -> None:
     # A landing steeper than PX4's parameter has it is PX4's to refuse; a spline no fixed wing's autopilot flies.
     assert [ok for reason, ok in reasons.items() if "(PX4 checkFixedWindLandApproach)" in reason] == [None]
     assert [ok for reason, ok in reasons.items() if "(PX4 checkMissionItemValidity)" in reason] == [False]
+
+
+FENCED = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t100\t1
+1\t0\t0\t16\t0\t0\t0\t0\t46.00\t8.0\t400\t1
+2\t0\t0\t16\t0\t0\t0\t0\t46.02\t8.0\t400\t1
+3\t0\t0\t5004\t100\t0\t0\t0\t46.01\t{lon}\t0\t1
+"""
+ZONED = """name = "zoned"
+[origin]
+lat_deg = 46.0
+lon_deg = 8.0
+[terrain]
+kind = "flat"
+amsl_m = 300
+[area]
+east_m = [-2000, 2000]
+north_m = [-1000, 4000]
+[start]
+east_m = 0
+north_m = 0
+amsl_m = 400
+[destination]
+east_m = 0
+north_m = 2200
+amsl_m = 400
+[limits]
+max_height_m = {most}
+[[zones]]
+name = "town"
+kind = "exclusion"
+polygon_m = [[{west}, 800], [900, 800], [900, 1500], [{west}, 1500]]
+ceiling_agl_m = 150
+"""
+
+
+# A leg through the middle of the mission's own circle of 100 m; the same beside it: 0.002 degrees are 155 m.
+@pytest.mark.parametrize(("lon", "code"), [("8.0", 4), ("8.002", 0)])
+def test_a_leg_through_the_missions_own_fence_is_not_flyable(
+    lon: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, log = tmp_path / "m.waypoints", tmp_path / "flight.mcap"
+    file.write_text(FENCED.format(lon=lon), encoding="utf-8")
+    assert main(["check", str(file)]) == code
+    assert ("fence item 0 (exclusion) violated (100.0 m beyond it)" in capsys.readouterr().out) == (code == 4)
+    assert main(["fly", str(file), "--log", str(log)]) == code
+    capsys.readouterr()
+    assert main(["check", str(log)]) == code
+
+
+# 150 m off a leg at 100 m above ground, or over it; and the height allowed, 99 m or 101 m.
+@pytest.mark.parametrize(("west", "most", "rules"), [(150, 101, set()), (-50, 101, {"fence"}), (150, 99, {"height"})])
+def test_a_log_holds_its_zones_and_repeats_the_verdict(
+    west: int, most: int, rules: set[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, scenario, log = tmp_path / "m.waypoints", tmp_path / "s.toml", tmp_path / "flight.mcap"
+    file.write_text(FENCED.format(lon="8.02"), encoding="utf-8")
+    scenario.write_text(ZONED.format(west=west, most=most), encoding="utf-8")
+    told = ["--json", str(tmp_path / "geometry.json")]
+    assert main(["check", str(file), "--scenario", str(scenario), *told]) == (4 if rules else 0)
+    findings = json.loads((tmp_path / "geometry.json").read_text(encoding="utf-8"))["findings"]
+    assert {item["rule"] for item in findings if item["ok"] is False} == rules
+    guided = ["--guidance", "path"]  # ArduPlane's law keeps no height to a metre
+    code = main(["fly", str(file), "--scenario", str(scenario), "--log", str(log), *guided])
+    assert code == (4 if rules else 0)
+    capsys.readouterr()
+    first, again = tmp_path / "first.json", tmp_path / "again.json"
+    for target in (first, again):
+        assert main(["check", str(log), "--json", str(target)]) == code
+        scenario.unlink(missing_ok=True)
+    assert first.read_bytes() == again.read_bytes()
+    flown = json.loads(first.read_text(encoding="utf-8"))["findings"]
+    assert {item["rule"] for item in flown if item["ok"] is False} == rules
+    assert [item["place"]["name"] for item in flown if item["rule"] == "fence" and item["ok"] is False] == (
+        ["town"] if "fence" in rules else []
+    )

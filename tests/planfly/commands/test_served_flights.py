@@ -6,9 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flight.live.arming import ACCEPTED, ArmingState
 from flight.live.flight_process import JudgeMission
 from flight.live.status_text import CRITICAL, INFO, WARNING
-from flight.mission.items import Mission
+from flight.mission.items import Command, Frame, Mission, MissionItem
 from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Place
@@ -16,6 +17,7 @@ from planfly.commands.served_flights import ServedFlights, ServeOptions, open_se
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
+from world.frames import to_geo
 
 
 def failing(leg: int) -> Finding:
@@ -61,6 +63,39 @@ def test_a_mission_is_judged_before_it_is_flown(options: ServeOptions) -> None:
     assert prepared is None
     assert (judged.number, judged.possible, judged.flyable) == (5, False, False)
     assert [text.severity for text in judged.texts] == [CRITICAL]
+
+
+def circle(options: ServeOptions, east: float, radius: float) -> MissionItem:
+    lat, lon = to_geo(open_served(options).scenario.origin, east, 0.0)
+    params = (radius, 0.0, 0.0, 0.0)
+    return MissionItem(
+        0, int(Command.NAV_FENCE_CIRCLE_EXCLUSION), int(Frame.GLOBAL), params, float(lat), float(lon), 0.0
+    )
+
+
+@pytest.mark.parametrize(("east", "armed"), [(750.0, False), (750.0 + 1500.0, True)])
+def test_an_upload_that_crosses_its_own_fence_is_warned_of_and_not_armed(
+    east: float, armed: bool, options: ServeOptions
+) -> None:
+    level = mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0))
+    fenced = replace(level, fences=(circle(options, east, 200.0),))
+    _, judged = ServedFlights(options).prepare(JudgeMission(fenced, 1))
+    assert (judged.possible, judged.flyable) == (True, armed)
+    warnings = [text.text for text in judged.texts if text.severity == WARNING]
+    assert any(text.startswith("fence at fence item 0 (exclusion): 200.0 m inside at ") for text in warnings) != armed
+    arming = ArmingState()
+    arming.mission_uploaded()
+    arming.mission_judged(judged)
+    assert (arming.arm(True, 0.0).result == ACCEPTED) == armed
+
+
+def test_an_upload_with_a_fence_that_is_none_cannot_be_flown(options: ServeOptions) -> None:
+    level = mission(options, (0.0, 0.0, 150.0), (1500.0, 0.0, 150.0))
+    prepared, judged = ServedFlights(options).prepare(
+        JudgeMission(replace(level, fences=(circle(options, 900.0, 0.0),)), 1)
+    )
+    assert prepared is None
+    assert "fence item 0: radius 0 m: must be above 0" in judged.texts[0].text
 
 
 def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOptions) -> None:

@@ -68,3 +68,5 @@ def test_a_flights_moves_lead_from_row_to_row() -> None:
         np.testing.assert_allclose(move_point(moves[k], 1.0), track.position[k + 1], atol=1e-9)
         assert moves[k].time + moves[k].lasts == pytest.approx(track.time[k + 1])
     np.testing.assert_array_equal(moves["leg"], np.arange(len(moves)) >= aligned.rows[1])
+    for leg in (0, 1):
+        np.testing.assert_array_equal(flown_moves(aligned, leg, leg), moves[moves["leg"] == leg])
