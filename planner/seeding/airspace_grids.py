@@ -168,7 +168,8 @@ def _step_on(
     a change of course is counted from the cheapest way to a cell alone, so that a route is not quite the cheapest.
     """
     step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
-    beside = float(data.tracking.across)
+    # At a fixed end the flight is where the plan is.
+    beside = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
     slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]))
     for y in range(wide):
         if not np.isfinite(cost[y]).any():
