@@ -1,5 +1,6 @@
 """An algorithm on a scenario: seeds, generations, escalation, and the plan that comes of it."""
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -46,6 +47,8 @@ STALLED_GENERATIONS, LEAST_GAIN = 10, 2e-4
 SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
 # Evaluations that a quick path, each seed, and the best path at the end are improved with by a pattern search, at most.
 QUICK_SEARCH, SEED_SEARCH, LAST_SEARCH = 50, 300, 200
+# Times as many for seeds where a path has to stay in a band of heights above ground: hardly a move keeps to it.
+BAND_EFFORT = 3
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 # Of the airspeed: in more wind no path is searched for.
@@ -247,12 +250,13 @@ def _starts(search: Search, grids: tuple[tuple[int, int], ...], previous: Floats
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += older
     improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
+    banded = math.isfinite(search.problem.search.airspace.max_height)
     for route in _routes(search, grids) if search.algorithm.seeded else ():
         if search.over() or search.safe_already():
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
-        improved_scores.append(search.improve(starts[-1], SEED_SEARCH))
+        improved_scores.append(search.improve(starts[-1], SEED_SEARCH * (BAND_EFFORT if banded else 1)))
     if not starts:
         return np.empty((0, encoding.lower.size))
     order = best_first(np.array(improved_scores))
