@@ -53,7 +53,7 @@ class Certificate:
     bounds: margin to map, floor and ceiling, m.
     kill_distance: between the path and the nearest missile sphere's surface, m; negative inside, inf without missiles.
     zone_distance: outside exclusions and inside inclusions, m, on the map or in height; negative where one is violated,
-    inf without zones near.
+    inf without zones.
     headroom: greatest height above ground that is allowed less the path's, m; inf where none is.
     problems: one line each of what failed, empty if the path is certified.
     """

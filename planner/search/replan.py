@@ -11,6 +11,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
 from planner.search.algorithms import find_algorithm
+from planner.search.explain_failure import zones_entered
 from planner.search.limits_for import limits_for
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
@@ -53,8 +54,8 @@ def replan(
     >>> new.safe, new.flown_legs, np.array_equal(new.waypoints[:4], old.waypoints[:4])
     (True, 3, True)
 
-    Raises MissionError for a leg that the old plan has not or that begins in a missile's kill sphere, and for a plan of
-    another mission; ScenarioError as `plan_path`.
+    Raises MissionError for a leg that the old plan has not or that begins in a missile's kill sphere or against a zone,
+    and for a plan of another mission; ScenarioError as `plan_path`.
     """
     count = len(old.waypoints)
     if not 0 <= leg < count - 1:
@@ -96,7 +97,7 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
 
 
 def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
-    """Raise MissionError if a missile reaches the place that the new plan is to begin at."""
+    """Raise MissionError if a missile reaches the place that the new plan is to begin at, or a zone forbids it."""
     threats = scenario.threats
     inside = threats.kill_radius - np.sqrt(((threats.position - old.waypoints[leg]) ** 2).sum(axis=1))
     unit = int(np.argmax(np.where(threats.kill_radius > 0.0, inside, -math.inf))) if len(inside) else -1
@@ -105,6 +106,10 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
             f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {inside[unit]:.0f} m inside the kill "
             f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe"
         )
+    forbidden = zones_entered(scenario, old.waypoints[[leg, leg]])
+    if forbidden:
+        begins = f"waypoint {leg}, where it begins, does not keep to {forbidden[0]}"
+        raise MissionError(f"{scenario.name}: leg {leg}: {begins}: no path from there does")
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:

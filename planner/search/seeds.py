@@ -1,5 +1,7 @@
 """What a seeded search starts from: the straight line where it is safe, or routes over grids, fitted and improved."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,6 +17,8 @@ Floats = NDArray[np.float64]
 
 # Evaluations that a quick path and each seed are improved with by a pattern search, at most.
 QUICK_SEARCH, SEED_SEARCH = 50, 300
+# Times as many for seeds where a path has to stay in a band of heights above ground: hardly a move keeps to it.
+BAND_EFFORT = 3
 
 
 def straight_line(search: Search) -> bool:
@@ -46,12 +50,13 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += older
     improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
+    effort = BAND_EFFORT if math.isfinite(search.problem.search.airspace.max_height) else 1
     for route in _routes(search, grids) if search.algorithm.seeded else ():
         if search.over() or search.safe_already():
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
-        improved_scores.append(search.improve(starts[-1], SEED_SEARCH))
+        improved_scores.append(search.improve(starts[-1], SEED_SEARCH * effort))
     if not starts:
         return np.empty((0, encoding.lower.size))
     order = best_first(np.array(improved_scores))

@@ -28,10 +28,9 @@ Codes = NDArray[np.int32]
 
 # A m of way at the edge of the band costs this share more than in its middle: legs are longer than a grid's steps.
 EDGE_COST = 0.3
-# What a change of course costs, in steps of the grid: for each step sideways more or less than the one before, squared.
-TURN_COST = 0.15
-# Of the steepest slopes, the share that a route uses: legs cut its corners.
-SLOPE_SHARE = 0.9
+# On a gentle grid: what a change of course costs, in steps of the grid, for each step sideways more or less than the
+# one before, squared; and of the steepest slopes, the share that a route uses: legs cut its corners.
+TURN_COST, SLOPE_SHARE = 0.15, 0.9
 # A place on a grid: its ground, and the lowest and highest that a path may be there, m; lowest > highest for none.
 COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
 
@@ -40,6 +39,7 @@ class AirspaceGrid(NamedTuple):
     """One resolution: places across (m from the line) at each of stages + 1 places along, and layers of height.
 
     pitch: between layers, m.  The first layer is at the lowest height allowed where `follows`, else at `floor` (m).
+    gentle: whether changes of course cost something, and slopes are less than the steepest.
     """
 
     stages: int
@@ -48,6 +48,7 @@ class AirspaceGrid(NamedTuple):
     pitch: float
     follows: bool
     floor: float
+    gentle: bool = False
 
 
 class _Passage(NamedTuple):
@@ -111,15 +112,17 @@ def _passage(
 
 
 @compiled
-def _slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float) -> Floats:  # pragma: no cover
-    """Tangents (sideways, 2) of the steepest climb and dive of each step at a height, m."""
+def _slopes(
+    data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float
+) -> Floats:  # pragma: no cover - compiled
+    """Tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height, m."""
     out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
     for side in range(-SIDEWAYS, SIDEWAYS + 1):
         b[0], b[1] = position_of(frame, step, side * step)
         climb, dive = slope_limits(data, a, b)
-        out[side + SIDEWAYS, 0], out[side + SIDEWAYS, 1] = SLOPE_SHARE * math.tan(climb), SLOPE_SHARE * math.tan(dive)
+        out[side + SIDEWAYS, 0], out[side + SIDEWAYS, 1] = share * math.tan(climb), share * math.tan(dive)
     return out
 
 
@@ -168,8 +171,10 @@ def _step_on(
     a change of course is counted from the cheapest way to a cell alone, so that a route is not quite the cheapest.
     """
     step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
-    beside = float(data.tracking.across)
-    slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]))
+    # At a fixed end the flight is where the plan is.
+    beside = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
+    turn_cost, share = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
+    slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), share)
     for y in range(wide):
         if not np.isfinite(cost[y]).any():
             continue
@@ -191,7 +196,7 @@ def _step_on(
                     continue
                 up = first + z * grid.pitch
                 turned = 0 if stage == 1 else side - (y - came_before[y, z] // grid.layers)
-                here = cost[y, z] + TURN_COST * step * turned * turned
+                here = cost[y, z] + turn_cost * turned * turned
                 lowest = max(0, math.ceil((up - dive - to_first) / grid.pitch))
                 highest = min(grid.layers - 1, math.floor((up + climb - to_first) / grid.pitch))
                 for z2 in range(lowest, highest + 1):

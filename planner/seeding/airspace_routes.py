@@ -49,28 +49,44 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
             pitch = max(pitch, LEAST_PITCH * step)
             layers = max(1, math.floor((data.ceiling - low) / pitch) + 1)
         if stages <= 8 or (stages + 1) * across.size * layers <= MOST_CELLS:
-            return AirspaceGrid(stages, np.asarray(across, np.float64), layers, pitch, follows, low)
+            return AirspaceGrid(stages, np.asarray(across, np.float64), layers, pitch, follows, low, gentle=True)
         stages = max(8, int(stages / 1.2))
 
 
 def airspace_routes(
     data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
 ) -> Iterator[GridRoute]:
-    """Routes as found: of each grid's number of stages, `FINER` times as many, up to so many different ones."""
+    """Routes as found: of each grid's number of stages, `FINER` times as many, up to so many different ones.
+
+    Those of gentle grids are flown more easily; the first route of all is also looked for where the grid is not gentle,
+    as gaps are passed that way only.
+    """
     expected = EXPECTED * math.dist(data.start, data.destination)
-    for stages, each in grids:
+    for number, (stages, each) in enumerate(grids):
         grid = airspace_grid(data, frame, span, FINER * stages)
-        along = np.linspace(0.0, frame.length, grid.stages + 1)
+        if number == 0:
+            route = _route(data, frame, grid._replace(gentle=False), (), expected)
+            if route is not None:
+                yield route
         used: tuple[GridRoute, ...] = ()
         for _ in range(each):
-            extra = beside_used(along, grid.across, used)
-            for bound in (math.inf,) if used else (expected, math.inf):
-                points, cost = cheapest_airspace_route(data, frame, grid, extra, bound)
-                if len(points):
-                    break
-            if not len(points):
+            route = _route(data, frame, grid, used, math.inf if used else expected)
+            if route is None:
                 break
-            route = GridRoute(points, float(cost))
             expected = expected if used else route.cost
             used = (*used, route)
             yield route
+
+
+def _route(
+    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, used: tuple[GridRoute, ...], expected: float
+) -> GridRoute | None:
+    """Cheapest way over a grid beside those used; None where there is none.  expected: a cost that may be enough."""
+    extra = beside_used(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
+    for bound in (expected, math.inf):
+        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound)
+        if len(points):
+            return GridRoute(points, float(cost))
+        if bound == math.inf:
+            break
+    return None

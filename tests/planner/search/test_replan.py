@@ -1,5 +1,6 @@
 """Planning again in flight: what is flown stays, and a threat that pops up is avoided."""
 
+import dataclasses
 import math
 from collections.abc import Callable
 
@@ -10,6 +11,7 @@ from aircraft.path_limits import Limits
 from planner.plan import Plan, parse_plan, plan_json
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, with_waypoints
+from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError, ScenarioError
 from world.geometry import turning_angles
 from world.scenario import Scenario
@@ -85,3 +87,15 @@ def test_legs_that_are_not_there_and_other_missions_are_refused(
 def test_longest_legs_are_split() -> None:
     path = np.array([[0.0, 0, 0], [1000, 0, 100], [1100, 0, 100]])
     np.testing.assert_allclose(with_waypoints(path, 5)[:, 0], [0, 250, 500, 1000, 1100])
+
+
+def test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refused(old: Plan, limits: Limits) -> None:
+    middle = 0.5 * (old.waypoints[4] + old.waypoints[5])
+    now = dataclasses.replace(old.scenario, zones=(Zone("fire", "exclusion", Cylinder(*middle[:2].tolist(), 400.0)),))
+    plan = replan(now, limits, old, 2, seed=1)
+    assert plan.safe
+    legs = [np.linspace(*plan.waypoints[i : i + 2], 2000) for i in range(2, len(plan.waypoints) - 1)]
+    assert np.linalg.norm(np.concatenate(legs)[:, :2] - middle[:2], axis=1).min() > 400.0
+    here = dataclasses.replace(old.scenario, zones=(Zone("fire", "exclusion", Cylinder(*old.waypoints[3, :2], 50.0)),))
+    with pytest.raises(MissionError, match="leg 3: waypoint 3, where it begins, does not keep to fire"):
+        replan(here, limits, old, 3, seed=1)

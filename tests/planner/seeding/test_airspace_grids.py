@@ -10,7 +10,7 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_ZONE_MARGIN, make_problem
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.airspace_grids import AirspaceGrid, cheapest_airspace_route
+from planner.seeding.airspace_grids import SLOPE_SHARE, AirspaceGrid, cheapest_airspace_route
 from world.scenario import Scenario
 
 Made = Callable[..., ProblemArrays]
@@ -112,3 +112,30 @@ def test_no_step_is_steeper_than_the_aircraft_flies(made: Made) -> None:
     assert np.abs(steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])).max() <= np.tan(np.radians(10.0))
     # Straight on the ridge is steeper than that: the way leads round it.
     assert np.abs(points[:, 1]).max() >= 300.0
+
+
+def test_a_gentle_grid_turns_less_and_leaves_a_tenth_of_the_slopes(made: Made) -> None:
+    """Three towers to be passed: by the shortest way, or with fewer changes of course."""
+    zones = [
+        {
+            "name": f"tower {k}",
+            "kind": "exclusion",
+            "east_m": 1000 + 1000 * k,
+            "north_m": 60 * (-1) ** k,
+            "radius_m": 150,
+        }
+        for k in range(3)
+    ]
+    ridge = {"kind": "peaks", "peak": [{"east_m": 4800, "north_m": 0, "height_m": 300, "sigma_m": 400}]}
+    limits = {"min_clearance_m": 60, "max_height_m": 160, "max_climb_deg": 15, "max_dive_deg": 15}
+    data = made(zones=zones, terrain=ridge, limits=limits)
+    found = []
+    for gentle in (False, True):
+        points, _ = route(data, AirspaceGrid(60, ACROSS, 12, 6.0, True, 0.0, gentle))
+        assert len(points) == 61
+        steps = np.diff(points, axis=0)
+        steepest = float(np.abs(steps[:, 2] / np.hypot(steps[:, 0], steps[:, 1])).max())
+        found.append((float((np.diff(steps[:, 1] / 100.0) ** 2).sum()), steepest))
+    (turns, steepest), (gentle_turns, gentlest) = found
+    assert gentle_turns < turns
+    assert gentlest <= SLOPE_SHARE * np.tan(np.radians(15.0)) < steepest
