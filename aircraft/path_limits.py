@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aircraft.envelope import GRAVITY, Envelope, ground_slope, ground_speed
 from aircraft.tracking import TrackingError
 from world.geometry import wrap
-from world.kernels import compiled, compiled_views, inlined
+from world.kernels import compiled, inlined
 from world.wind import W20, Wind, mean_wind_speed
 
 Floats = NDArray[np.float64]
@@ -161,7 +161,7 @@ def downwind(table: PerformanceTable) -> tuple[float, float]:  # pragma: no cove
     return math.sin(table.wind_to), math.cos(table.wind_to)
 
 
-@compiled_views
+@inlined
 def slopes_along(
     table: PerformanceTable, tail_share: float, cross_share: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -182,7 +182,7 @@ def slopes_along(
     return up, down
 
 
-@compiled_views
+@inlined
 def aircraft_slopes(
     table: PerformanceTable, course: float, amsl: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -191,7 +191,7 @@ def aircraft_slopes(
     return slopes_along(table, math.cos(angle), math.sin(angle), amsl)
 
 
-@compiled_views
+@inlined
 def _turn_radius(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, side: float, wx: float, wy: float
 ) -> float:  # pragma: no cover - compiled
@@ -214,7 +214,7 @@ def _turn_radius(
     return radius
 
 
-@compiled_views
+@inlined
 def turn_radius_between(
     table: PerformanceTable, course_in: float, course_out: float, amsl: float
 ) -> float:  # pragma: no cover - compiled
@@ -231,7 +231,7 @@ def turn_radius_between(
     return _turn_radius(table, ux, uy, vx, vy, amsl, side, wx, wy)
 
 
-@compiled_views
+@inlined
 def corner_tangent(
     table: PerformanceTable, ux: float, uy: float, vx: float, vy: float, amsl: float, wx: float, wy: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -248,7 +248,7 @@ def corner_tangent(
     return radius * abs(cross) / (1.0 + dot), radius
 
 
-@compiled_views
+@inlined
 def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> float:  # pragma: no cover - compiled
     """Tangent of the slope along a fly-by arc: the heights of its tangent points over the arc's own length.
 
@@ -261,7 +261,7 @@ def arc_slope(tan_in: float, tan_out: float, tangent: float, radius: float) -> f
     return 0.5 * (tan_in + tan_out) * tangent / (radius * half)
 
 
-@compiled_views
+@inlined
 def fly_over_run(turn: float) -> float:  # pragma: no cover - compiled
     """Run after a fly-over turn (rad), in radii; its greatest up to this angle, so that it never falls with the angle.
 

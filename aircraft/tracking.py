@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from world.kernels import Record, compiled, compiled_views, record_dtype
+from world.kernels import Record, compiled, inlined, record_dtype
 
 Floats = NDArray[np.float64]
 
@@ -105,7 +105,7 @@ def _density_factor(amsl: float) -> float:  # pragma: no cover - compiled
     return factor
 
 
-@compiled_views
+@inlined
 def faster_by(tracking: Record, amsl: float) -> float:  # pragma: no cover - compiled
     """How much faster than its airspeed in numbers it flies at a height, m/s."""
     faster: float = tracking.airspeed * (_density_factor(amsl) - 1.0)
@@ -126,7 +126,7 @@ def _between(table: Floats, airspeed: float, turn: float, ground_speed: float) -
     return value
 
 
-@compiled_views
+@inlined
 def corner_room(
     tracking: Record, turn: float, ground_speed: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled

@@ -65,19 +65,31 @@ def load_airframe(scenario: Scenario) -> Airframe:
         raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
     ardupilot = table.steering.autopilot == "ardupilot"
     parameters = load_parameters(aircraft, table.params) if ardupilot else None
-    airspeed = aircraft.airspeed if table.airspeed_mps is None else table.airspeed_mps
-    if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        raise ScenarioError(
-            f"{scenario.name}: flight.airspeed_mps: {airspeed:g}: {aircraft.name} flies "
-            f"{aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
-        )
+    airspeed = _airspeed(scenario, aircraft, parameters)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
     battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
     limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
     if parameters is not None:
-        tracking = tracking_error(parameters, airspeed, table.steering.nav, fly_over=table.fly_over)
+        nav, turbulence = table.steering.nav, scenario.wind.turbulence
+        tracking = tracking_error(parameters, airspeed, nav, fly_over=table.fly_over, turbulence=turbulence)
         limits = replace(limits, tracking=tracking)
     return Airframe(aircraft, limits, battery, parameters)
+
+
+def _airspeed(scenario: Scenario, aircraft: Aircraft, parameters: ArduPilotParameters | None) -> float:
+    """Airspeed until a mission sets one, m/s: the scenario's, a parameter file's AIRSPEED_CRUISE, the aircraft's."""
+    stated = {} if parameters is None else parameters.by_origin("file")
+    if (airspeed := scenario.flight.airspeed_mps) is not None:
+        where = f"{scenario.name}: flight.airspeed_mps"
+    elif parameters is not None and "AIRSPEED_CRUISE" in stated:
+        airspeed, where = stated["AIRSPEED_CRUISE"], f"{parameters.source}: AIRSPEED_CRUISE"
+    else:
+        airspeed, where = aircraft.airspeed, aircraft.name
+    if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
+        raise ScenarioError(
+            f"{where}: {airspeed:g}: {aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
+        )
+    return airspeed
 
 
 def tightened_airframe(airframe: Airframe, scenario: Scenario) -> Airframe:

@@ -38,7 +38,7 @@ _SIDE = (
     Candidate("ROLL_LIMIT_DEG", 1.0, 60.0, "deg"),
 )
 # Rules that a height off the plan breaks before a track beside it does.
-_OF_HEIGHT = ("clearance", "bounds", "slope", "energy", "stall", "speed")
+_OF_HEIGHT = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
 
 Passes = Callable[[ArduPilotParameters], bool]
 
@@ -100,7 +100,7 @@ def _off(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
     """How far off (m) the flight was where it failed, as `DecidingParameter` has it."""
     if failed.rule == "corridor":
         return failed.flown
-    if failed.place.kind != "leg" or failed.rule != "clearance":
+    if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
         return None
     beside = [item for item in findings if item.rule == "slope" and item.place == failed.place]
     errors = [fact.value for item in beside for fact in item.facts if fact.what == "height error"]

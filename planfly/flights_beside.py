@@ -34,11 +34,17 @@ def airframe_answer(setup: FlightSetup, aircraft: Aircraft) -> AirframeAnswer:
 def find_deciding_parameter(setup: FlightSetup, aircraft: Aircraft, verdict: Verdict) -> DecidingParameter | None:
     """The parameter with another value of which a flight that failed passes; None where there is none.
 
-    verdict: on the flight with the setup's own parameters.  Takes about ten flights, by ArduPlane's law: what they show
-    of a real autopilot's flight is not known, and nothing is looked for.
+    verdict: on the flight with the setup's own parameters.  Takes about ten flights, by ArduPlane's law: of a real
+    autopilot's flight they say something where the law's own flight fails as well, and nothing where it passes.
     """
-    if setup.parameters is None or setup.program is not None or verdict.flyable:
+    if setup.parameters is None or verdict.flyable:
         return None
+    findings = verdict.findings
+    if setup.program is not None:
+        own = _flown_by_law(setup, aircraft)
+        if own.flyable:
+            return None
+        findings = own.findings
     # The corridor is as wide as it was, whatever radius is tried.
     scenario = setup.scenario
     limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
@@ -46,8 +52,13 @@ def find_deciding_parameter(setup: FlightSetup, aircraft: Aircraft, verdict: Ver
     same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
 
     def passes(parameters: ArduPilotParameters) -> bool:
-        changed = replace(same, parameters=parameters)
-        flown = simulate(changed, aircraft)
-        return judge_flight(changed, flown.track, flown.ended).flyable
+        return _flown_by_law(replace(same, parameters=parameters), aircraft).flyable
 
-    return deciding_parameter(setup.parameters, verdict.findings, passes)
+    return deciding_parameter(setup.parameters, findings, passes)
+
+
+def _flown_by_law(setup: FlightSetup, aircraft: Aircraft) -> Verdict:
+    """Fly a setup by ArduPlane's law, whoever flew it before, and judge that flight."""
+    by_law = replace(setup, program=None)
+    flown = simulate(by_law, aircraft)
+    return judge_flight(by_law, flown.track, flown.ended)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from flight.mission.end_courses import with_end_courses
+from flight.mission.fence_zones import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
@@ -119,8 +120,11 @@ def make_setup(
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario.
 
-    placed: the mission's places on the scenario's map where they are known already.
+    placed: the mission's places on the scenario's map where they are known already.  Raises MissionError for a mission
+    that cannot be laid out, and for a fence whose shapes are none.
     """
+    # A fence that makes no zones is bad input, and the verdict could not judge it.
+    fence_zones(mission.fences, scenario.origin, mission.source)
     limits, airspeed, fly_over = airframe.limits, airframe.airspeed, scenario.flight.fly_over
     if placed is None:
         route = make_route(mission, scenario.origin, scenario.terrain, airspeed, fly_over, limits)

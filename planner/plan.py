@@ -52,6 +52,9 @@ class Certificate:
     clearance: least height above ground less the required clearance, m.
     bounds: margin to map, floor and ceiling, m.
     kill_distance: between the path and the nearest missile sphere's surface, m; negative inside, inf without missiles.
+    zone_distance: outside exclusions and inside inclusions, m, on the map or in height; negative where one is violated,
+    inf without zones near.
+    headroom: greatest height above ground that is allowed less the path's, m; inf where none is.
     problems: one line each of what failed, empty if the path is certified.
     """
 
@@ -62,6 +65,8 @@ class Certificate:
     bounds: float
     kill_distance: float
     problems: tuple[str, ...]
+    zone_distance: float = np.inf
+    headroom: float = np.inf
 
     @property
     def ok(self) -> bool:
@@ -134,6 +139,8 @@ class _CertificateFile(_Model):
     clearance_margin_m: float | None
     bounds_margin_m: float
     kill_distance_m: float | None
+    zone_distance_m: float | None = None
+    headroom_m: float | None = None
     problems: list[str]
 
 
@@ -158,6 +165,12 @@ class _PlanFile(_Model):
 
 def _or_none(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None
+
+
+def _airspace_keys(certificate: Certificate) -> dict[str, float]:
+    """What a certificate says of zones and greatest height; nothing where the scenario has none."""
+    values = {"zone_distance_m": certificate.zone_distance, "headroom_m": certificate.headroom}
+    return {key: float(value) for key, value in values.items() if np.isfinite(value)}
 
 
 def plan_json(plan: Plan) -> str:
@@ -193,6 +206,7 @@ def plan_json(plan: Plan) -> str:
             "clearance_margin_m": _or_none(certificate.clearance),
             "bounds_margin_m": certificate.bounds,
             "kill_distance_m": _or_none(certificate.kill_distance),
+            **_airspace_keys(certificate),
             "problems": list(certificate.problems),
         },
         "history": [[_or_none(value) for value in row] for row in plan.history.tolist()],
@@ -239,6 +253,8 @@ def parse_plan(
         clearance=np.nan if saved.clearance_margin_m is None else saved.clearance_margin_m,
         bounds=saved.bounds_margin_m,
         kill_distance=_or_inf(saved.kill_distance_m),
+        zone_distance=_or_inf(saved.zone_distance_m),
+        headroom=_or_inf(saved.headroom_m),
         problems=tuple(saved.problems),
     )
     history = np.array([[np.nan if v is None else v for v in row] for row in file.history]).reshape(-1, 3)

@@ -24,7 +24,7 @@ COMMANDS = (
     "scenarios",
 )
 MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60
-KERNELS = {"compiled", "compiled_views", "inlined"}
+KERNELS = {"compiled", "inlined"}
 # Phrases that lean on a text the reader does not have; taken apart, so that this file may hold them.
 LEANING = ("Do the" + " same", "the design" + " document", "the" + " issue")
 # A dotted name in single backquotes that begins with a folder of ours; a file such as flight.mcap is none.

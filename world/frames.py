@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from world.kernels import compiled, compiled_views
+from world.kernels import compiled, inlined
 
 if TYPE_CHECKING:
     from pyproj import Proj, Transformer
@@ -241,7 +241,7 @@ def _least_squares(basis: Floats, values: Floats) -> Floats:  # pragma: no cover
     return out
 
 
-@compiled_views
+@inlined
 def polymap(record: PolyMapRecord, x: float, y: float) -> tuple[float, float]:  # pragma: no cover - compiled
     """Both components of a `PolyMap`'s record at one point, by Horner's scheme."""
     a = (x - record.centre_x) / record.half_x

@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from world.kernels import compiled_views, inlined
+from world.kernels import inlined
 
 Floats = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def wrap(angle: float) -> float:  # pragma: no cover - compiled
     return angle - 2.0 * math.pi * math.floor(angle / (2.0 * math.pi) + 0.5)
 
 
-@compiled_views
+@inlined
 def turning_angle(
     ax: float, ay: float, bx: float, by: float, cx: float, cy: float
 ) -> float:  # pragma: no cover - compiled
@@ -125,7 +125,7 @@ def turning_angle(
     return math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy + 0.0)
 
 
-@compiled_views
+@inlined
 def sphere_window(
     a: Floats, b: Floats, centre: Floats, radius: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
@@ -155,7 +155,7 @@ def sphere_window(
     return math.sqrt(closest2), max(0.0, middle - half), min(1.0, middle + half)
 
 
-@compiled_views
+@inlined
 def segment_exposure(
     a: Floats, b: Floats, centre: Floats, radius: float, scale: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -180,7 +180,7 @@ def segment_exposure(
     return leave - enter, window_exposure(enter, leave, length2, along, start2, scale)
 
 
-@compiled_views
+@inlined
 def window_exposure(
     enter: float, leave: float, length2: float, along: float, start2: float, scale: float
 ) -> float:  # pragma: no cover - compiled

@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from world.airspace.zone_files import read_zone_files
+from world.airspace.zones import Zone
+from world.airspace.zones_on_map import check_ends, make_zones
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
@@ -47,6 +50,7 @@ class Scenario:
     start_course, destination_course: rad or None.
     terrain: None where none was given (an external mission).
     limits, planner, flight: the file's tables of these names.
+    zones: of airspace, to keep out of or to stay in.
     external: made around a mission file that came without a scenario: its bounds are no limit and its empty
     threats say nothing.
     """
@@ -68,6 +72,7 @@ class Scenario:
     flight: FlightTable
     wind: Wind
     external: bool = False
+    zones: tuple[Zone, ...] = ()
 
     def __post_init__(self) -> None:
         """Lock the arrays."""
@@ -155,6 +160,10 @@ def from_spec(
     ('tight', [[-300.0, 2900.0], [-150.0, 150.0]])
     """
     spec = spec if isinstance(spec, ScenarioFile) else check_scenario(spec, source)
+    if spec.zones_file is not None:
+        # Written down with the scenario's own, so that a log without the files makes the same scenario.
+        zones = [*(spec.zones or ()), *read_zone_files(spec.zones_file, source, base)]
+        spec = spec.model_copy(update={"zones": zones, "zones_file": None})
     if terrain is not None:
         spec, base = _with_terrain(spec, terrain, source, base), None
     raster = None
@@ -242,8 +251,11 @@ def _assemble(
     start = map_position(spec.start, "start", source, origin, ground)
     destination = map_position(spec.destination, "destination", source, origin, ground)
     # Ends that another terrain buries are for the verdict to find.
-    for name, point in () if replaced else (("start", start), ("destination", destination)):
+    ends = () if replaced else (("start", start), ("destination", destination))
+    for name, point in ends:
         check_inside(name, point, source, bounds, floor, ceiling, ground)
+    zones = make_zones(spec.zones or (), source, origin, ground)
+    check_ends(zones, source, ends if zones else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start")
     wind = Wind(
@@ -272,6 +284,7 @@ def _assemble(
         flight=spec.flight,
         wind=wind,
         external=external,
+        zones=zones,
     )
 
 

@@ -11,8 +11,12 @@ from pydantic import BaseModel, ValidationError
 
 from world.errors import ScenarioError
 from world.scenario_tables import ScenarioFile
+from world.text_files import read_small_file
 
 Table = TypeVar("Table", bound=BaseModel)
+
+# Twenty thousand threats are 3 MB.
+MOST_BYTES = 16 * 2**20
 
 
 def parse_scenario(text: str, source: str) -> ScenarioFile:
@@ -54,12 +58,9 @@ def checked_table(make: Callable[[], Table], source: str) -> Table:
 
 def read_scenario_text(path: Path) -> str:
     """Read the text of a scenario file.  Raises ScenarioError if it is missing, too large or not UTF-8."""
+    data = read_small_file(path, MOST_BYTES, "scenario", ScenarioError)
     try:
-        if path.stat().st_size > 16 * 2**20:
-            raise ScenarioError(f"{path}: {path.stat().st_size:,} bytes: a scenario file has at most 16 MiB")
-        return path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot be read: {error.strerror}") from error
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise ScenarioError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
 

@@ -6,8 +6,9 @@ into a `Scenario`.
 
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
+from world.airspace.zone_tables import MOST_ZONES, ZoneTable
 from world.scenario_types import (
     MAP_EXTENT,
     Amsl,
@@ -23,6 +24,7 @@ from world.scenario_types import (
     Name,
     Navigation,
     Radius,
+    ScenarioTable,
     Seed,
     Span,
     no_line_break,
@@ -30,20 +32,14 @@ from world.scenario_types import (
 )
 
 
-class _Table(BaseModel):
-    # Strict: pydantic would otherwise take true, "5" and "yes" for numbers and truths.  Each number states its own
-    # range, which NaN and the infinities are outside of.
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class OriginTable(_Table):
+class OriginTable(ScenarioTable):
     """[origin]: the point where east_m = north_m = 0."""
 
     lat_deg: Latitude
     lon_deg: Longitude
 
 
-class PeakTable(_Table):
+class PeakTable(ScenarioTable):
     """[[terrain.peak]]: a Gaussian hill."""
 
     east_m: Metres
@@ -52,7 +48,7 @@ class PeakTable(_Table):
     sigma_m: Annotated[float, within(10.0, 100_000.0)]
 
 
-class TerrainTable(_Table):
+class TerrainTable(ScenarioTable):
     """[terrain]; kind "none" is made by planfly for a mission that came without terrain, never read from a file.
 
     vertical_error_m: of the heights, as their source states it; none where it is not stated, for no file says.
@@ -77,7 +73,7 @@ class TerrainTable(_Table):
         return self
 
 
-class AreaTable(_Table):
+class AreaTable(ScenarioTable):
     """[area]: the map box and its ceiling."""
 
     east_m: Span
@@ -102,7 +98,7 @@ class AreaTable(_Table):
         return self
 
 
-class PointTable(_Table):
+class PointTable(ScenarioTable):
     """A position: east_m, north_m or lat_deg, lon_deg; amsl_m or height_m above ground."""
 
     east_m: Metres | None = None
@@ -155,10 +151,11 @@ class ThreatTable(PointTable):
         return self
 
 
-class LimitsTable(_Table):
+class LimitsTable(ScenarioTable):
     """[limits]: a number, or "aircraft" for what the envelope allows.
 
     corridor_m: half width of the corridor about the legs; where it is not given, what the autopilot needs.
+    max_height_m: above ground; none where it is not given.
     """
 
     max_turn_deg: Annotated[float, within(0.0, 180.0, above=True, also=', or "aircraft"')] | Literal["aircraft"] = (
@@ -167,17 +164,26 @@ class LimitsTable(_Table):
     max_climb_deg: Angle = "aircraft"
     max_dive_deg: Angle = "aircraft"
     min_clearance_m: Annotated[float, within(0.0, 5000.0)] = 30.0
+    max_height_m: Annotated[float, within(0.0, 9000.0, above=True)] | None = None
     corridor_m: Annotated[float, within(1.0, 5000.0)] | None = None
 
+    @model_validator(mode="after")
+    def _a_band_between(self) -> "LimitsTable":
+        if self.max_height_m is not None and self.max_height_m <= self.min_clearance_m:
+            raise ValueError(
+                f"max_height_m: {self.max_height_m:g}: must be above min_clearance_m {self.min_clearance_m:g}"
+            )
+        return self
 
-class GoalsTable(_Table):
+
+class GoalsTable(ScenarioTable):
     """[planner] goals of the second level of preference."""
 
     length_ratio: Annotated[float, within(1.0, 100.0)] | None = None
     kill_exposure: Annotated[float, within(0.0, 1e9)] | None = None
 
 
-class PlannerTable(_Table):
+class PlannerTable(ScenarioTable):
     """[planner]."""
 
     algorithm: Name | None = None
@@ -218,7 +224,7 @@ class Steering(NamedTuple):
     nav: Navigation
 
 
-class FlightTable(_Table):
+class FlightTable(ScenarioTable):
     """[flight]; what is None was not stated, and `steering` says what that comes to.
 
     autopilot: who flies; guidance alone means "ideal", params alone "ardupilot".
@@ -266,7 +272,7 @@ class FlightTable(_Table):
         return self.model_copy(update={**who, "nav": nav})
 
 
-class WindTable(_Table):
+class WindTable(ScenarioTable):
     """[wind]: gradient in m/s per metre of height above the start."""
 
     speed_mps: Annotated[float, within(0.0, 40.0)] = 0.0
@@ -276,8 +282,12 @@ class WindTable(_Table):
     seed: Seed | None = None
 
 
-class ScenarioFile(_Table):
-    """A whole scenario file."""
+class ScenarioFile(ScenarioTable):
+    """A whole scenario file.
+
+    zones: None where there are none, so that what is written of a scenario without them stays as it was.
+    zones_file: GeoJSON or KML, one or several; in a made scenario their zones stand among the others.
+    """
 
     name: Name
     description: Annotated[str, Field(max_length=500), AfterValidator(no_line_break)] = ""
@@ -286,7 +296,9 @@ class ScenarioFile(_Table):
     area: AreaTable | None = None
     start: EndTable
     destination: EndTable
-    threats: Annotated[list[ThreatTable], Field(max_length=20_000)] = []
+    threats: list[ThreatTable] = Field(default_factory=list, max_length=20_000)
+    zones: Annotated[list[ZoneTable], Field(max_length=MOST_ZONES)] | None = None
+    zones_file: FilePath | Annotated[list[FilePath], Field(max_length=100)] | None = None
     limits: LimitsTable = LimitsTable()
     planner: PlannerTable = PlannerTable()
     flight: FlightTable = FlightTable()

@@ -1,8 +1,8 @@
-"""The numbers, names and choices that a scenario file holds, with their ranges."""
+"""The numbers, names and choices that a scenario file holds, with their ranges, and what its tables share."""
 
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 # Positions lie within this distance of the map's origin, east or west and north or south, m.
 MAP_EXTENT = 500_000.0
@@ -47,3 +47,11 @@ Navigation = Literal["perfect", "rtk", "gnss"]
 Seed = Annotated[int, within(0, 2**63 - 1)]
 Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 Angle = Annotated[float, within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
+
+
+class ScenarioTable(BaseModel):
+    """A table of a scenario file: unknown keys are refused."""
+
+    # Strict: pydantic would otherwise take true, "5" and "yes" for numbers and truths.  Each number states its own
+    # range, which NaN and the infinities are outside of.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

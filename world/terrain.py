@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.frames import PolyMap, PolyMapRecord, fit_polymap, polymap
-from world.kernels import compiled, compiled_views, inlined
+from world.kernels import compiled, inlined
 
 Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
@@ -111,7 +111,7 @@ def steepest_slopes(heights: Heights, pitch: float) -> Heights:  # pragma: no co
     return out
 
 
-@compiled_views
+@inlined
 def ground_height(
     heights: Heights, to_pixel: PolyMapRecord, east: float, north: float
 ) -> float:  # pragma: no cover - compiled
@@ -128,7 +128,7 @@ def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north
     return out
 
 
-@compiled_views
+@inlined
 def segment_clearance(
     heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -153,7 +153,7 @@ def segment_clearance(
     return best, best_at
 
 
-@compiled_views
+@inlined
 def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no cover - compiled
     """Next fraction after t at which start + t * step is a whole number; inf if it never is."""
     if step == 0.0:
@@ -163,7 +163,7 @@ def _next_crossing(start: float, step: float, t: float) -> float:  # pragma: no 
     return (line - start) / step
 
 
-@compiled_views
+@inlined
 def _piece_clearance(
     heights: Heights, col0: float, row0: float, up0: float, col1: float, row1: float, up1: float
 ) -> tuple[float, float]:  # pragma: no cover - compiled

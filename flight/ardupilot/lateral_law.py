@@ -11,7 +11,7 @@ from aircraft.envelope import GRAVITY
 from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
 from flight.guidance.path_kernels import Records
 from world.geometry import wrap
-from world.kernels import Record, compiled, compiled_views
+from world.kernels import Record, compiled
 
 # An acceptance is sent as whole metres in a byte.
 MOST_ACCEPTANCE = 255.0
@@ -36,7 +36,7 @@ def turn_distance(
     return whole * min(1.0, turn / (0.5 * math.pi))
 
 
-@compiled_views
+@compiled
 def past_line(estimated: Record, from_east: float, from_north: float, b: Record) -> bool:  # pragma: no cover - compiled
     """Whether the line across the leg at its end is passed; a leg without length is.
 
@@ -48,7 +48,7 @@ def past_line(estimated: Record, from_east: float, from_north: float, b: Record)
     return passed
 
 
-@compiled_views
+@compiled
 def navigate_legs(
     estimated: Record,
     waypoints: Records,
@@ -90,7 +90,7 @@ def navigate_legs(
         own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
 
 
-@compiled_views
+@compiled
 def _reached(
     estimated: Record, b: Record, parameters: Record, own: Record, length: float, air_density_factor: float
 ) -> bool:  # pragma: no cover - compiled
@@ -108,7 +108,7 @@ def _reached(
     return passed or distance <= reach
 
 
-@compiled_views
+@compiled
 def _around(
     estimated: Record, b: Record, parameters: Record, own: Record, length: float, speed: float
 ) -> float:  # pragma: no cover - compiled
@@ -135,7 +135,7 @@ def _around(
     return demanded
 
 
-@compiled_views
+@compiled
 def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - compiled
     """Whether the aircraft on a circle has passed the corner of the route that stands for this part of it."""
     corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
@@ -145,17 +145,37 @@ def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - co
 
 
 @compiled
+def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:  # pragma: no cover - compiled
+    """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.  pitch: rad."""
+    level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
+    wanted = math.atan(side_acceleration / (GRAVITY * level))
+    within: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
+    return within
+
+
+@compiled
+def least_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
+    """Least airspeed that is flown in a wanted bank (rad), equivalent, m/s: AIRSPEED_MIN, for the load in the bank.
+
+    A bank of phi takes 1 / sqrt(cos phi) of the least airspeed.
+    """
+    load = math.sqrt(math.cos(min(math.radians(85.0), abs(bank)))) if parameters.stall_prevention > 0.0 else 1.0
+    least: float = parameters.airspeed_min / load
+    return least
+
+
+@compiled
 def roll_demand(
     side_acceleration: float, pitch: float, airspeed: float, parameters: Record
 ) -> float:  # pragma: no cover - compiled
     """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG and what the airspeed bears without a stall, rad.
 
-    pitch: rad.  airspeed: equivalent, m/s.  A bank of phi takes 1 / sqrt(cos phi) of the least airspeed.
+    pitch: rad.  airspeed: equivalent, m/s.
     """
-    level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
-    wanted = math.atan(side_acceleration / (GRAVITY * level))
-    limit = parameters.roll_limit
+    wanted = wanted_bank(side_acceleration, pitch, parameters)
+    if parameters.stall_prevention <= 0.0:
+        return wanted
     spare = max(1.0, airspeed / parameters.airspeed_min)
-    limit = min(limit, max(_LEAST_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare)))))
+    limit = max(_LEAST_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
     demanded: float = min(limit, max(-limit, wanted))
     return demanded

@@ -26,8 +26,10 @@ ARDUPILOT_MEMORY = record_dtype(
     ("held", np.int64),  # 1 with throttle or pitch at its upper limit, -1 at its lower
     # Airspeed.
     ("flown", np.bool_),  # whether there is a velocity of before
-    "last_velocity_east",  # m/s over the ground, when it navigated last
+    "last_velocity_east",  # m/s, when it navigated last
     "last_velocity_north",
+    "last_velocity_up",
+    "airspeed_read",  # m/s, smoothed
     "airspeed",  # m/s, of the measured one and the acceleration
     "airspeed_drift",  # m/s^2, what the acceleration leaves out
     "acceleration",  # m/s^2, along the nose, without its mean

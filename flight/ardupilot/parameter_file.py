@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from world.errors import ParameterError
+from world.text_files import read_small_file, utf8_text
 
 # A vehicle has some 1,500 parameters in lines of 40 bytes.
 MOST_BYTES = 4 * 2**20
@@ -40,19 +41,8 @@ def read_parameter_file(path: Path) -> dict[str, Entry]:
 
     Raises ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
     """
-    try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise ParameterError(f"{path}: {size:,} bytes: a parameter file has at most {MOST_BYTES:,}")
-        data = path.read_bytes()
-    except OSError as error:
-        raise ParameterError(f"{path}: cannot be read: {error.strerror}") from error
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise ParameterError(f"{path}:{line}: not a text file in UTF-8 (byte {error.start})") from error
-    return parse_parameters(text, str(path))
+    data = read_small_file(path, MOST_BYTES, "parameter", ParameterError)
+    return parse_parameters(utf8_text(data, path, ParameterError), str(path))
 
 
 def parse_parameters(text: str, source: str) -> dict[str, Entry]:

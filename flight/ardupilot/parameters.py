@@ -63,6 +63,7 @@ DEFINITIONS = {
     "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _CENTI)),
     "airspeed_min": Definition("AIRSPEED_MIN", 9.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MIN", 1.0)),
     "airspeed_max": Definition("AIRSPEED_MAX", 22.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MAX", 1.0)),
+    "stall_prevention": Definition("STALL_PREVENTION", 1.0, 0.0, 1.0),
     "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PERCENT),
     "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PERCENT),
     "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PERCENT),
@@ -86,6 +87,8 @@ DEFINITIONS = {
     "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _CENTI)),
     "rtl_radius": Definition("RTL_RADIUS", 0.0, -32767.0, 32767.0),
 }
+# Read, and no flight of ours shows them: a return is flown as a leg to home at the last height, and ends the flight.
+NOT_FLOWN = ("RTL_ALTITUDE", "RTL_RADIUS")
 ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
 
 
@@ -110,6 +113,7 @@ class ArduPilotParameters:
     roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
     roll_time, pitch_time: s, in which an attitude is to follow its demand.
     airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
+    stall_prevention: 1 where a bank is narrowed, and the least airspeed raised, for the load in it; 0 where not.
     throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
     glide_slope_min: m, a leg that climbs or sinks less is flown as a step.
     glide_slope_threshold: m, so far above a climbing slope it is drawn anew, 0 for never.
@@ -139,6 +143,7 @@ class ArduPilotParameters:
     airspeed_cruise: float = field(init=False)
     airspeed_min: float = field(init=False)
     airspeed_max: float = field(init=False)
+    stall_prevention: float = field(init=False)
     throttle_min: float = field(init=False)
     throttle_max: float = field(init=False)
     throttle_cruise: float = field(init=False)

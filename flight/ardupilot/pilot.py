@@ -12,7 +12,7 @@ from flight.ardupilot.lateral_law import navigate_legs, roll_demand
 from flight.guidance.inner_loops import follow_roll, steer_elevator
 from flight.guidance.lateral import find_on_path
 from flight.guidance.path_kernels import Records, profile
-from world.kernels import Record, compiled, compiled_views
+from world.kernels import Record, compiled
 
 # ArduPlane navigates and updates its height and speed law so often, s (its scheduler's table: 10 Hz).
 NAVIGATION_TICK = 0.1
@@ -37,7 +37,7 @@ def true_by_equivalent(amsl: float) -> float:  # pragma: no cover - compiled
     return ratio
 
 
-@compiled_views
+@compiled
 def fly_as_ardupilot(
     state: Record,
     estimated: Record,
@@ -74,7 +74,7 @@ def fly_as_ardupilot(
     _follow(state, estimated, gains, memory, parameters, own, factor, commands, dt)
 
 
-@compiled_views
+@compiled
 def _begin(
     state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record
 ) -> None:  # pragma: no cover - compiled
@@ -85,6 +85,7 @@ def _begin(
     own.height_limited = estimated.up
     own.height_demand = estimated.up
     own.climb_share, own.sink_share = 1.0, 1.0
+    own.airspeed_read = state.airspeed
     own.airspeed = state.airspeed
     own.airspeed_demand = state.airspeed
     # As it has flown before: what level flight here takes is known.

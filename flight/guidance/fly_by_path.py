@@ -209,7 +209,13 @@ def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
 
 
 def arc_point(piece: Record, along: float) -> tuple[float, float]:
-    """East and north (m) on a piece, a record of `flight.guidance.path_kernels.PIECE`, ``along`` m from its start."""
+    """East and north (m) on a piece, a record of `flight.guidance.path_kernels.PIECE`, ``along`` m from its start.
+
+    >>> quarter = np.array([(0.0, 157.0, 0.0, 0.0, 0.0, 0.01, 0, math.inf)], PIECE)[0]
+    >>> east, north = arc_point(quarter, 50.0 * math.pi)
+    >>> round(float(east), 6), round(float(north), 6)
+    (100.0, 100.0)
+    """
     course, curvature = piece.course, piece.curvature
     if curvature == 0.0:
         return piece.east + along * math.sin(course), piece.north + along * math.cos(course)

@@ -23,7 +23,7 @@ from flight.guidance.lateral_reference_laws import (
 )
 from flight.guidance.path_kernels import Records, mean_curvature, most_curvature, project
 from world.geometry import wrap
-from world.kernels import Record, compiled, compiled_views
+from world.kernels import Record, compiled
 
 # Of the lateral acceleration at the greatest bank, what an arc may take before the aircraft slows down for it.
 ARC_SHARE = 0.95
@@ -31,7 +31,7 @@ ARC_SHARE = 0.95
 LEAD_TICK = 1.0 / 60.0
 
 
-@compiled_views
+@compiled
 def guide(
     state: Record,
     estimated: Record,
@@ -65,7 +65,7 @@ def guide(
     steer_bank(state, gains, memory, commands, bank, dt)
 
 
-@compiled_views
+@compiled
 def find_on_path(estimated: Record, pieces: Records, memory: Record) -> float:  # pragma: no cover - compiled
     """Note in the memory where on the path the aircraft is, and return the path's course there, rad.
 
@@ -201,7 +201,7 @@ def _unexplained(
     return side_now
 
 
-@compiled_views
+@compiled
 def _l1(
     state: Record, estimated: Record, waypoints: Records, gains: Record, memory: Record, dt: float
 ) -> float:  # pragma: no cover - compiled

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem
+from flight.mission.zone_fences import fence_item, zone_fences, zones_under
 from world.errors import MissionError
-from world.frames import GeoOrigin, to_geo, to_map
+from world.frames import GeoOrigin, to_map
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -73,12 +74,13 @@ def fence_problem(
 
 
 def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[str, ...]]:
-    """Mission with a scenario's area and threats as its fence and the route's ends as rally points, and notes.
+    """Mission with a scenario's area, threats and zones as its fence and the route's ends as rally points, and notes.
 
     The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
     no height: a plan that passes above or below the sphere passes through the cylinder.  Radars are no fence: being
-    detected is not forbidden.  Rally points are the first and last position of the mission, at the mission's height
-    over home.  The notes say, for people, what a fence cannot hold, and what of it the mission itself violates.
+    detected is not forbidden.  Zones follow as `flight.mission.zone_fences` makes them.  Rally points are the first and
+    last position of the mission, at the mission's height over home.  The notes say, for people, what a fence cannot
+    hold, and what of it the mission itself violates.
 
     >>> from world.scenario import load_scenario
     >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"))
@@ -89,12 +91,12 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
     """
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
-    fences = [_fence(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
+    fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
     threats = scenario.threats
     lost = []
     for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True):
         if radius > 0.0:
-            fences.append(_fence(scenario.origin, Command.NAV_FENCE_CIRCLE_EXCLUSION, float(radius), position[:2]))
+            fences.append(fence_item(scenario.origin, Command.NAV_FENCE_CIRCLE_EXCLUSION, float(radius), position[:2]))
             lost.append(str(name))
     notes = []
     if lost:
@@ -102,6 +104,14 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
             f"{len(lost)} missile spheres became exclusion circles: a fence has no height, so that each is a cylinder"
         )
     notes += _crossings(mission, fences, scenario.origin)
+    items, more = zone_fences(scenario.zones, scenario.origin)
+    fences += items
+    notes += more
+    if scenario.zones:
+        notes += _passed_zones(mission, scenario)
+    if scenario.limits.max_height_m is not None:
+        above = f"{scenario.limits.max_height_m:g} m above ground"
+        notes.append(f"a fence does not follow the ground: the greatest height of {above} is not in it")
     return replace(mission, fences=numbered(fences), rally=numbered(_rally(mission))), tuple(notes)
 
 
@@ -127,10 +137,15 @@ def _crossings(mission: Mission, fences: list[MissionItem], origin: GeoOrigin) -
     return [f"{over}: an autopilot with this fence refuses it or breaks off"]
 
 
-def _fence(origin: GeoOrigin, command: Command, p1: float, position: Floats) -> MissionItem:
-    lat, lon = to_geo(origin, float(position[0]), float(position[1]))
-    params = (round(p1, 3), 0.0, 0.0, 0.0)
-    return MissionItem(0, int(command), int(Frame.GLOBAL), params, on_grid(float(lat)), on_grid(float(lon)), 0.0)
+def _passed_zones(mission: Mission, scenario: Scenario) -> list[str]:
+    """A note if the mission's own legs cross a zone on the map, above or below it."""
+    positions = [item for item in mission.items if item.has_position]
+    place = to_map(scenario.origin, [item.lat_deg for item in positions], [item.lon_deg for item in positions])
+    passed = zones_under(scenario.zones, np.stack(place, axis=1))
+    if not passed:
+        return []
+    over = f"the mission passes {', '.join(passed[:3])}{'' if len(passed) <= 3 else ' and more'} above or below"
+    return [f"{over}: an autopilot with this fence refuses it or breaks off"]
 
 
 def _rally(mission: Mission) -> list[MissionItem]:

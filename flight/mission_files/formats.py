@@ -8,6 +8,7 @@ from flight.mission.items import MOST_BYTES, Mission
 from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
 from flight.mission_files.wpl import fence_text, parse_waypoints, rally_text, waypoints_text
 from world.errors import MissionError
+from world.text_files import read_small_file, utf8_text
 
 FileKind = Literal["waypoints", "plan", "fence", "rally"]
 
@@ -83,13 +84,7 @@ def mission_text(mission: Mission, kind: FileKind) -> str:
 
 
 def _read_text(path: Path) -> str:
-    try:
-        size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise MissionError(f"{path}: {size:,} bytes: a mission file has at most {MOST_BYTES:,}")
-        data = path.read_bytes()
-    except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+    data = read_small_file(path, MOST_BYTES, "mission", MissionError)
     if not data.strip():
         raise MissionError(f"{path}: empty: a mission is expected")
     if data.startswith(_UTF16):
@@ -97,8 +92,4 @@ def _read_text(path: Path) -> str:
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
         raise MissionError(f"{path}:{line}: a NUL byte: a text file is expected")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        line = data.count(b"\n", 0, error.start) + 1
-        raise MissionError(f"{path}:{line}: not a text file in UTF-8 (byte {error.start})") from error
+    return utf8_text(data, path, MissionError)

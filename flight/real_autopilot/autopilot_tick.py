@@ -9,7 +9,7 @@ from flight.guidance.navigation_error import navigate
 from flight.guidance.path_kernels import Records, profile, project
 from flight.simulation.tick import NOT_A_NUMBER, finish_tick, flight_status, sense
 from flight.simulation.workspace import PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS
-from world.kernels import Record, compiled, compiled_views
+from world.kernels import Record, compiled
 from world.terrain import Heights
 
 Floats = NDArray[np.float64]
@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 _AHEAD = 4
 
 
-@compiled_views
+@compiled
 def autopilot_tick(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
     """Do a tick on the block of a `flight.simulation.workspace.Workspace`, as `flight.simulation.tick.tick` does.
 

@@ -9,9 +9,11 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
 from aircraft.path_limits import Limits, ground_speed_on
+from flight.ardupilot.speed_commands import speeds_flown
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
 from flight.guidance.fly_by_path import waypoint_records
@@ -28,6 +30,8 @@ from world.frames import to_geo
 from world.geometry import leg_courses
 from world.random_streams import NAVIGATION, TURBULENCE, stream
 from world.wind import W20
+
+Floats = NDArray[np.float64]
 
 FDM_HZ = 120.0
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
@@ -80,7 +84,12 @@ class Airborne(ABC):
         self.map = local_map or LocalMap.around(setup)
         self._steps = round(FDM_HZ / setup.guidance_hz)
         self.dt = self._steps / FDM_HZ
-        self._workspace = Workspace(gains, self.path, waypoint_records(setup.route))
+        waypoints = waypoint_records(setup.route)
+        self._airspeeds = setup.route.airspeed
+        if setup.parameters is not None:
+            self._airspeeds = speeds_flown(setup.route.airspeed, setup.airspeed, setup.parameters)
+        waypoints["airspeed"] = np.append(self._airspeeds, self._airspeeds[-1])
+        self._workspace = Workspace(gains, self.path, waypoints)
         self._work = self._workspace.record
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
@@ -90,7 +99,8 @@ class Airborne(ABC):
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle
         self._work.settings.battery = setup.battery
-        self.most_ticks = int((PATIENCE * self.path.length / _slowest_leg(setup) + PATIENCE_SECONDS) / self.dt)
+        patience = PATIENCE * self.path.length / _slowest_leg(setup, self._airspeeds) + PATIENCE_SECONDS
+        self.most_ticks = int(patience / self.dt)
 
     @abstractmethod
     def _fly(self, count: int) -> int:
@@ -134,7 +144,7 @@ class Airborne(ABC):
             amsl=up,
             course=math.atan2(step[0], step[1]) - turn,
             slope=math.atan2(step[2], math.hypot(step[0], step[1])),
-            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(setup.route.airspeed[0]))),
+            airspeed=min(aircraft.airspeed_max, max(aircraft.airspeed_min, float(self._airspeeds[0]))),
             wind=(north_wind * cos + east_wind * sin, east_wind * cos - north_wind * sin, 0.0),
             ground=min(0.0, up - 1000.0) if math.isnan(under) else under,
         )
@@ -183,12 +193,12 @@ class Airborne(ABC):
         return rows, ""
 
 
-def _slowest_leg(setup: FlightSetup) -> float:
+def _slowest_leg(setup: FlightSetup, airspeeds: Floats) -> float:
     """Least ground speed on any leg in the mean wind at its heights, m/s, at least 3."""
     limits: Limits = setup.limits
     points, courses = setup.route.waypoints, leg_courses(setup.route.waypoints)
     speeds = []
-    for leg, airspeed in enumerate(setup.route.airspeed):
+    for leg, airspeed in enumerate(airspeeds):
         table = limits.performance(float(airspeed))
         speeds += [float(ground_speed_on(table, courses[leg], up)) for up in points[leg : leg + 2, 2]]
     return max(3.0, float(np.nanmin([*speeds, math.inf]))) if np.isfinite(speeds).any() else 3.0

@@ -17,7 +17,7 @@ from flight.simulation.track import AILERON, ELEVATOR, RUDDER, THROTTLE
 from flight.simulation.workspace import OUTPUT, PATH_ROW, WORKSPACE, WORKSPACE_NUMBERS
 from world.frames import polymap
 from world.geometry import wrap
-from world.kernels import Record, compiled, compiled_views, field_names
+from world.kernels import Record, compiled, field_names
 from world.terrain import Heights, pixel_height
 from world.wind import mean_wind_speed
 
@@ -40,7 +40,7 @@ ENDS = {
 _STATE, _OUTPUT = field_names(STATE), field_names(OUTPUT)
 
 
-@compiled_views
+@compiled
 def tick_in_block(block: Floats, heights: Heights) -> int:  # pragma: no cover - compiled
     """Do one `tick` on the block of a `flight.simulation.workspace.Workspace`.
 
@@ -50,7 +50,7 @@ def tick_in_block(block: Floats, heights: Heights) -> int:  # pragma: no cover -
     return tick(block[:WORKSPACE_NUMBERS].view(WORKSPACE), block[WORKSPACE_NUMBERS:].view(PATH_ROW), heights)
 
 
-@compiled_views
+@compiled
 def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: no cover - compiled
     """Take the state as JSBSim gave it, in its units; return a key of `ENDS` or 0 to fly on.
 
@@ -80,7 +80,7 @@ def tick(workspace: Records, path: Record, heights: Heights) -> int:  # pragma: 
     return flight_status(work)
 
 
-@compiled_views
+@compiled
 def sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compiled
     """Take the state to SI and to the map, and look up the ground; False where the state is no number.
 
@@ -109,7 +109,7 @@ def sense(work: Record, heights: Heights) -> bool:  # pragma: no cover - compile
     return True
 
 
-@compiled_views
+@compiled
 def finish_tick(work: Record) -> None:  # pragma: no cover - compiled
     """Make the next wind, fill a row of the track, count the tick, and state what to set in JSBSim."""
     state, true, air, timing, place = work.state, work.true, work.air, work.timing, work.place
@@ -126,7 +126,7 @@ def finish_tick(work: Record) -> None:  # pragma: no cover - compiled
     _output(work.output, work.commands, air, work.scale_above, work.scale_below)
 
 
-@compiled_views
+@compiled
 def flight_status(work: Record) -> int:  # pragma: no cover - compiled
     """How the flight stands after a tick: a key of `ENDS`, or 0 to fly on."""
     return _status(

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
+from flight.ardupilot.parameters import NOT_FLOWN, ArduPilotParameters
 from flight.simulation.autopilot_program import AutopilotProgram
 from logs.verdict.levels import DecidingParameter, LevelAnswer
 from logs.verdict.places import Place, Suggestion
@@ -20,6 +21,8 @@ RULES = {
     "loiter": "loiters",
     "slope": "slopes",
     "clearance": "clearance",
+    "height": "heights",
+    "fence": "zones",
     "threat": "threats",
     "bounds": "bounds",
     "waypoint": "waypoints",
@@ -103,6 +106,7 @@ class Verdict:
     leg_ends: of a flown verdict, when the flight passed each waypoint between its ends, s, and inf from the first that
     it did not get to; empty where too little was recorded to tell.
     program: of a flown verdict, the real autopilot that flew, None where none did.
+    parameters: of a flown verdict, those of the ArduPlane that flew, by its law or itself; None where none did.
 
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
@@ -119,6 +123,7 @@ class Verdict:
     notes: tuple[str, ...] = ()
     leg_ends: tuple[float, ...] = ()
     program: AutopilotProgram | None = None
+    parameters: ArduPilotParameters | None = None
 
     @property
     def headline(self) -> str:
@@ -234,11 +239,22 @@ def verdict_json(verdict: Verdict) -> str:
         "complete": verdict.complete,
         "summary": verdict.summary,
         "flown_by": None if verdict.program is None else asdict(verdict.program),
+        "parameters": None if verdict.parameters is None else _parameters_data(verdict.parameters),
         "levels": [_level_data(level) for level in verdict.levels],
         "deciding_parameter": None if verdict.deciding is None else _deciding_data(verdict.deciding),
         "findings": [_finding_data(finding) for finding in verdict.findings],
     }
     return json.dumps(data, indent=1, allow_nan=False) + "\n"
+
+
+def _parameters_data(parameters: ArduPilotParameters) -> dict[str, Any]:
+    """Each parameter's value, in ArduPlane's unit, and who states it; and what a file states that has no use."""
+    return {
+        "file": parameters.source,
+        "values": [parameter._asdict() for parameter in parameters.values],
+        "unused": list(parameters.unused),
+        "not_flown": list(NOT_FLOWN),
+    }
 
 
 def _level_data(level: LevelAnswer) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from logs.verdict.judge_geometry import (
     judge_geometry,
     judge_plan_only,
     judge_unflown,
+    unflyable_items,
 )
 from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
@@ -26,6 +27,8 @@ from logs.verdict.rules.completion_rule import completion_findings
 from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
+from logs.verdict.rules.fence_rule import fence_findings
+from logs.verdict.rules.height_rule import height_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.slope_rule import slope_findings
 from logs.verdict.rules.speed_rule import speed_findings
@@ -73,8 +76,7 @@ def judge_flight(
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
     >>> setup = FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1)
     >>> flown = simulate(setup, aerosonde)
-    >>> verdict = judge_flight(setup, flown.track, flown.ended)
-    >>> verdict.headline
+    >>> judge_flight(setup, flown.track, flown.ended).headline
     'flyable'
     """
     demands = route_demands(setup, envelope=envelope)
@@ -99,6 +101,7 @@ def judge_flight(
         notes=setup.route.notes,
         leg_ends=() if aligned is None else aligned.leg_ends(),
         program=setup.program,
+        parameters=setup.parameters,
     )
 
 
@@ -107,9 +110,12 @@ def _flown_findings(
 ) -> tuple[Finding, ...]:
     """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
     findings = (
+        *unflyable_items(demands.setup),
         *turn_findings(demands, aligned),
         *slope_findings(demands, aligned),
         *clearance_findings(demands, aligned),
+        *height_findings(demands, aligned),
+        *fence_findings(demands, aligned),
         *threat_findings(demands, aligned),
         *bounds_findings(demands, aligned),
         *waypoint_findings(demands, aligned),
@@ -133,7 +139,7 @@ def _levels(
     """
     levels = []
     if demands.envelope:
-        predicted = geometric_findings(demands)
+        predicted = (*unflyable_items(demands.setup), *geometric_findings(demands))
         passes = not any(item.ok is False for item in predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))

@@ -11,6 +11,8 @@ from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
 from logs.verdict.rules.corridor_rule import corridor_findings
 from logs.verdict.rules.energy_rule import energy_findings
+from logs.verdict.rules.fence_rule import fence_findings
+from logs.verdict.rules.height_rule import height_findings
 from logs.verdict.rules.loiter_rule import fold_loiters
 from logs.verdict.rules.px4_rule import mission_findings
 from logs.verdict.rules.slope_rule import slope_findings
@@ -31,6 +33,8 @@ def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
         *turn_findings(demands, None, geometric=True),
         *slope_findings(demands, None, geometric=True),
         *clearance_findings(demands, None, geometric=True),
+        *height_findings(demands, None, geometric=True),
+        *fence_findings(demands, None, geometric=True),
         *threat_findings(demands, None, geometric=True),
         *bounds_findings(demands, None, geometric=True),
         *waypoint_findings(demands, None, geometric=True),
@@ -73,6 +77,11 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     levels = (LevelAnswer("geometry", flyable, headline(findings, flyable)),)
     lines = summary_lines(findings, setup, "geometric", levels)
     return Verdict(findings, flyable, complete, lines, "geometric", levels, notes=setup.route.notes)
+
+
+def unflyable_items(setup: FlightSetup) -> list[Finding]:
+    """What fails of a person's mission by its items alone, whoever flies it; a plan's own are ours."""
+    return [item for item in mission_findings(setup) if item.ok is False] if setup.plan is None else []
 
 
 def flown_level(setup: FlightSetup) -> LevelName:

@@ -6,14 +6,19 @@
 from dataclasses import dataclass
 from typing import Literal
 
-# "flight", "mission" and "plan" are the whole of it; "missile" and "radar" are a threat's two spheres.
-PlaceKind = Literal["flight", "mission", "plan", "leg", "waypoint", "missile", "radar"]
+# "flight", "mission" and "plan" are the whole of it; "missile" and "radar" are a threat's two spheres; "exclusion" and
+# "inclusion" are zones of airspace.
+PlaceKind = Literal[
+    "flight", "mission", "plan", "leg", "waypoint", "missile", "radar", "exclusion", "inclusion"
+]  # fmt: skip
 
 # What a change is of.  To another value: a leg's "length", its "rise" (negative: it falls), "airspeed", a "turn" at
-# most.  By a step: "height" of a leg, "inset" of the path from the area's edges, "distance" from a missile,
-# "duration" of the flight.  By a factor: the "battery" or the "tank".
+# most.  By a step: "height" or "descent" (higher, lower) of a leg, or of the path at a zone; "inset" of the path from
+# the area's edges, "distance" from a missile, "north", "east", "south" or "west" at a zone, "duration" of the flight.
+# By a factor: the "battery" or the "tank".
 Quantity = Literal[
-    "length", "rise", "airspeed", "turn", "height", "inset", "distance", "duration", "battery", "tank"
+    "length", "rise", "airspeed", "turn", "height", "descent", "inset", "distance", "north", "east", "south", "west",
+    "duration", "battery", "tank",
 ]  # fmt: skip
 
 
@@ -22,9 +27,10 @@ class Place:
     """Where something was judged.
 
     kind: what it is.
-    index: of the leg, waypoint or threat, from 0 as the route and the scenario have them; None for the whole.
+    index: of the leg, waypoint, threat or zone, from 0 as the route and the scenario have them, the zones of a
+    mission's fence after the scenario's; None for the whole.
     item: number of the mission item that a waypoint comes from, or that a check names; None where there is none.
-    name: that the scenario gives the threat; "" where it gives none, and for every other kind.
+    name: that the scenario gives the threat or the zone; "" where it gives none, and for every other kind.
 
     >>> Place("waypoint", 3, item=4)
     Place(kind='waypoint', index=3, item=4, name='')

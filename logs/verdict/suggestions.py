@@ -23,6 +23,7 @@ from logs.verdict.tolerances import (
     SPEED_STEP,
     TRIES,
 )
+from logs.verdict.zone_suggestions import zone_suggestions
 
 Floats = NDArray[np.float64]
 # A suggestion with the relative size of its change.
@@ -48,6 +49,10 @@ def _suggest(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding)
             return _further(demands, aligned, item.place, m)
         case "clearance", _:
             return _higher(item)
+        case "height", Place("leg"):
+            return _lower(item)
+        case "fence", Place("exclusion" | "inclusion"):
+            return zone_suggestions(demands, aligned, item.place)
         case "bounds", _:
             return _inside(item)
         case "energy", _:
@@ -242,6 +247,14 @@ def _higher(item: Finding) -> tuple[Suggestion, ...]:
         # A flight that ended early did not get to the lowest place.
         short = max(short, item.limit - item.planned + BUFFER_LENGTH)
     return ((Change("height", item.place, None, _whole(short), "m"),),) if short > BUFFER_LENGTH else ()
+
+
+def _lower(item: Finding) -> tuple[Suggestion, ...]:
+    heights = [height for height in (item.planned, item.flown) if height is not None]
+    if item.limit is None or not heights or not max(heights) > item.limit:
+        return ()
+    high = _whole(max(heights) - item.limit + BUFFER_LENGTH)
+    return ((Change("descent", item.place, None, high, "m"),),)
 
 
 def _inside(item: Finding) -> tuple[Suggestion, ...]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
+from flight.ardupilot.parameters import NOT_FLOWN
 from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import RULES, Finding
@@ -31,7 +32,16 @@ _LEVELS = {
     "airframe": "By the airframe (planfly's guidance, exact navigation)",
 }
 # Rules whose silence the first line tells, by what they judge.
-_UNJUDGED = {"clearance": "terrain", "speed": "airspeed", "takeoff": "take-off", "landing": "landing"}
+_UNJUDGED = {
+    "clearance": "terrain",
+    "height": "heights above ground",
+    "fence": "airspace",
+    "speed": "airspeed",
+    "takeoff": "take-off",
+    "landing": "landing",
+}
+# Rules of which the summary says why they were not judged.
+_EXPLAINED = ("clearance", "height", "fence", "threat", "bounds", "energy", "takeoff", "landing")
 # What ends a flight comes first, then what a plan may be mended by; the others follow in the verdict's order.
 _FIRST = ("departure", "completion", "mission", "slope")
 _URGENCY = {rule: k for k, rule in enumerate(dict.fromkeys((*_FIRST, *RULES)))}
@@ -68,7 +78,9 @@ def _not_judged(findings: Sequence[Finding], rule: str) -> str:
     silent = sum(item.ok is None for item in mine)
     if not silent:
         return ""
-    return f"{_UNJUDGED[rule]} not judged" + ("" if silent == len(mine) else f" on {silent} legs")
+    return f"{_UNJUDGED[rule]} not judged" + (
+        "" if silent == len(mine) else f" on {silent} {'zones' if rule == 'fence' else 'legs'}"
+    )
 
 
 def _by_luck(findings: Sequence[Finding]) -> list[str]:
@@ -105,6 +117,8 @@ def _phrase(item: Finding) -> str:
             # One without a name of its own is called "threat 3 (missile)".
             named = f"threat {where}" if item.place.name else where
             return f"{named} ({max(item.flown or 0.0, item.planned or 0.0):.1f} s inside)"
+        case "fence" if item.place.name:
+            return f"{where} violated ({max(item.flown or 0.0, item.planned or 0.0):.1f} m beyond it)"
     if item.place.kind == "flight":
         return f"{item.rule} ({_numbers(item)})"
     return f"{item.rule} {'at' if item.place.kind == 'waypoint' else 'on'} {where} ({_numbers(item)})"
@@ -145,11 +159,20 @@ def summary_lines(
     levels: the verdict's own last, with the headline.
     """
     *others, own = levels
-    lines = [own.headline, *_whose_fault(levels, deciding, tried=setup.program is None)]
+    lines = [own.headline, *_whose_fault(levels, deciding, real=setup.program is not None)]
     lines.append(f"Start: {setup.route.started}" if setup.route.started else "Start: not stated")
     silent: dict[str, str] = {}
     for item in findings:
-        if item.ok is None and item.rule in ("clearance", "threat", "bounds", "energy", "takeoff", "landing"):
+        if item.ok is None and item.rule in (
+            "clearance",
+            "height",
+            "fence",
+            "threat",
+            "bounds",
+            "energy",
+            "takeoff",
+            "landing",
+        ):
             silent.setdefault(item.rule, item.reason)
     lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
     # Limits of that autopilot's own, which say nothing of the aircraft.
@@ -170,17 +193,17 @@ def summary_lines(
     return tuple(lines)
 
 
-def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, tried: bool) -> list[str]:
+def _whose_fault(levels: Sequence[LevelAnswer], deciding: DecidingParameter | None, *, real: bool) -> list[str]:
     """Where the aircraft can what the autopilot cannot: that it is so, and the parameter that decides.
 
-    tried: whether other parameters were flown.
+    real: whether a real autopilot flew; other parameters are flown by its law.
     """
     answers = {level.name: level.flyable for level in levels}
     if answers.get("autopilot") is not False or not answers.get("airframe"):
         return []
-    why = ": no single parameter that was tried would pass" if tried else ""
+    why = "" if real else ": no single parameter that was tried would pass"
     if deciding is not None:
-        why = f": {deciding_text(deciding)}"
+        why = f": {deciding_text(deciding)}{', by the flight of its law' if real else ''}"
     return [f"The aircraft can, ArduPlane with these parameters cannot{why}"]
 
 
@@ -217,6 +240,8 @@ def _parameter_lines(setup: FlightSetup) -> list[str]:
     unused = list(parameters.unused[:_NAMED])
     more = len(parameters.unused) - len(unused)
     said = f"; not used: {', '.join(unused)}{f', +{more} more' if more else ''}" if unused else ""
+    returns = [name for name in NOT_FLOWN if name in parameters.by_origin("file")]
+    said += f"; read, not flown: {', '.join(returns)}" if returns else ""
     return [
         f"Parameters: {names['file']} of the file, {names['aircraft']} of the aircraft,"
         f" {names['default']} ArduPlane's defaults{said}"

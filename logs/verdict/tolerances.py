@@ -159,6 +159,13 @@ STALL_TOLERANCE = 0.2
 # Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 
+# The rules about airspace
+
+# m.  What the depth of a path beyond a zone's limit is worked out to: half of what a waypoint is rounded by.
+FENCE_DEPTH = 0.01
+# m.  What the places where a path goes in and out of a zone are worked out to.
+FENCE_EDGE = 1e-3
+
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.
@@ -207,5 +214,5 @@ SPEED_STEP = 0.5
 ABOVE_SLOWEST = 1.1
 # m.  Least rise that is worth suggesting.
 LEAST_RISE = 1.0
-# How often a gentler turn is tried.
-TRIES = 6
+# How often a gentler turn is tried, and a larger shift past a zone, which comes nearer by a third or more each time.
+TRIES, ZONE_TRIES = 6, 40

@@ -22,6 +22,8 @@ def place_text(place: Place) -> str:
             return f"item {item}"
         case Place("missile" | "radar"):
             return f"{threat_text(place)} ({place.kind})"
+        case Place("exclusion" | "inclusion"):
+            return f"{place.name} ({place.kind})"
         case Place(kind, index=int(index), item=int(item)):
             return f"{kind} {index} (item {item})"
         case Place(kind, index=int(index)):
@@ -60,8 +62,12 @@ def change_text(change: Change) -> str:
             return f"fly it at {wanted:g} m/s instead of {change.current:g} m/s"
         case "turn":
             return f"turn at most {wanted:.1f}° there"
-        case "height":
-            return f"fly {where} {wanted:.0f} m higher"
+        case "height" | "descent":
+            step = f"{wanted:.0f} m {'higher' if change.what == 'height' else 'lower'}"
+            return f"fly {where} {step}" if change.place.kind == "leg" else f"pass {change.place.name} {step}"
+        case "north" | "east" | "south" | "west":
+            verb = "stay in" if change.place.kind == "inclusion" else "pass"
+            return f"{verb} {change.place.name} {wanted:.0f} m further {change.what}"
         case "inset":
             return f"bring the path {wanted:.0f} m further inside"
         case "distance":

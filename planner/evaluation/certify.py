@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import arc_slope, turn_tangents
+from planner.airspace.airspace_arrays import is_limited
+from planner.evaluation.airspace_room import airspace_pieces
 from planner.evaluation.certify_kernels import (
     heights_above_ground,
     leg_slope_limits,
@@ -31,7 +33,8 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     """Check a path (w, 3) exactly: turns, available length for turns, slopes, clearance, map and missiles.
 
     Clearance is exact for the bilinear terrain on the legs, and on the chords of the arcs that a fly-by turn
-    cuts at each corner; the distance to missiles is that of the same pieces to the spheres.
+    cuts at each corner; the distance to missiles is that of the same pieces to the spheres, and so are those to zones,
+    exact on the map and in height, and the height left below the greatest above ground.
     """
     data = problem.certified
     problems: list[str] = []
@@ -41,7 +44,8 @@ def certify(problem: Problem, waypoints: Floats) -> Certificate:
     clearance = _clearance(data, waypoints, problems)
     bounds = _bounds(data, waypoints, problems)
     distance = kill_distance(data, waypoints)
-    return Certificate(turn, available_length, slope, clearance, bounds, distance, tuple(problems))
+    zones, headroom = _airspace(problem, waypoints, problems)
+    return Certificate(turn, available_length, slope, clearance, bounds, distance, tuple(problems), zones, headroom)
 
 
 def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
@@ -152,3 +156,38 @@ def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> floa
         for i in np.nonzero(margins < -_EPSILON)[0]
     )
     return float(margins.min())
+
+
+def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
+    """Least distance from zones, and least height left below the greatest above ground, m; inf where there are none."""
+    data, space = problem.certified, problem.certified.airspace
+    if not is_limited(space):
+        return math.inf, math.inf
+    pieces = airspace_pieces(data, np.ascontiguousarray(waypoints))
+    headroom = float((space.max_height - pieces["height"]).min())
+    near: dict[str, tuple[float, int]] = {}
+    high: dict[str, float] = {}
+    for piece in pieces:
+        name = f"turn at waypoint {piece['number']}" if piece["of_corner"] else f"leg {piece['number']}"
+        room, left = piece["zones"], float(space.max_height - piece["height"])
+        if not room["kept"]:
+            near[name] = min(near.get(name, (math.inf, 0)), (float(room["nearest"]), int(room["zone"])))
+        # Off the terrain the clearance is not known either, and that is said there.
+        if left < float(piece["buffer"]) - _EPSILON:
+            high[name] = min(high.get(name, math.inf), left)
+    for name, (distance, z) in near.items():
+        problems.append(f"{name}: {_too_near(problem, distance, z)}")
+    for name, left in high.items():
+        wanted = f"{space.max_height:g} m allowed, {space.buffer:g} m in reserve wanted"
+        problems.append(f"{name}: {space.max_height - left:.1f} m above ground at its highest, {wanted}")
+    return float(pieces["zones"]["nearest"].min()), headroom
+
+
+def _too_near(problem: Problem, distance: float, z: int) -> str:
+    """What is said of a piece this far (m) from zone z, as kernels number it."""
+    kept = problem.certified.airspace.zones.kept[z]
+    zone = problem.scenario.zones[int(kept["number"])]
+    if distance < 0.0:
+        return f"{-distance:.1f} m {'inside' if zone.kind == 'exclusion' else 'outside'} {zone.name}"
+    where = "from" if zone.kind == "exclusion" else "inside the edge of"
+    return f"{distance:.1f} m {where} {zone.name}, {kept['beside']:g} m or {kept['beyond']:g} m in height wanted"

@@ -162,7 +162,8 @@ def _strayed_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma
             height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
             least = math.nan if math.isnan(height) or math.isnan(least) else min(least, height)
         out[k].of_arc, out[k].number, out[k].height = piece.of_corner, piece.number, least
-        out[k].buffer = _buffer_on(data, piece.begin, piece.end)
+        ends = data.start_buffer, data.destination_buffer
+        out[k].buffer = buffer_on(data, data.buffer, ends, piece.begin, piece.end)
     return out
 
 
@@ -171,17 +172,20 @@ def _measure_piece(
     data: ProblemArrays, a: Floats, b: Floats, of_arc: bool, number: int, out: Record
 ) -> None:  # pragma: no cover - compiled
     height, _ = segment_clearance(data.heights, data.to_pixel, a, b)
-    out.of_arc, out.number, out.height, out.buffer = of_arc, number, height, _buffer_on(data, a, b)
+    out.of_arc, out.number, out.height = of_arc, number, height
+    out.buffer = buffer_on(data, data.buffer, (data.start_buffer, data.destination_buffer), a, b)
 
 
 @compiled
-def _buffer_on(data: ProblemArrays, a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
+def buffer_on(
+    data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
+) -> float:  # pragma: no cover - compiled
     """Buffer wanted on a piece: fixed ends may have less, and it grows from where the piece is nearest to them.
 
-    It grows half as fast as a search asks, for what lies between the search's samples.
+    buffer, end_buffers: everywhere, and at the start and the destination, m.  It grows half as fast as a search asks,
+    for what lies between the search's samples.
     """
-    buffer = data.buffer
-    for end, end_buffer in ((data.start, data.start_buffer), (data.destination, data.destination_buffer)):
+    for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:
             dx, dy, x, y = b[0] - a[0], b[1] - a[1], a[0] - end[0], a[1] - end[1]
             run2 = dx * dx + dy * dy

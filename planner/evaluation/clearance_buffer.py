@@ -39,17 +39,31 @@ class RequiredClearance(NamedTuple):
 @compiled
 def required_clearance(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
     """What clearance a problem requires."""
-    same_everywhere = min(data.start_buffer, data.destination_buffer) >= data.buffer
+    return _required(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
+
+
+@compiled
+def required_below(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
+    """What a problem's greatest height above ground requires where heights of path and ground change their signs."""
+    space = data.airspace
+    return _required(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
+
+
+@inlined
+def _required(
+    data: ProblemArrays, clearance: float, buffer: float, start_buffer: float, destination_buffer: float
+) -> RequiredClearance:  # pragma: no cover - compiled
+    same_everywhere = min(start_buffer, destination_buffer) >= buffer
     growth = 0.0 if same_everywhere else BUFFER_GROWTH
     return RequiredClearance(
-        data.clearance,
-        data.buffer,
+        clearance,
+        buffer,
         data.start[0],
         data.start[1],
-        data.start_buffer,
+        start_buffer,
         data.destination[0],
         data.destination[1],
-        data.destination_buffer,
+        destination_buffer,
         same_everywhere,
         growth,
         data.slope_bounds.steepest + growth,

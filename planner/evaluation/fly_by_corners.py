@@ -28,12 +28,22 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # prag
 def fly_by_vertices(
     aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
+    """Vertices (k, 3) of the way that a flight takes past the waypoint `at`; see `blended_vertices`."""
+    return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
+
+
+@compiled
+def blended_vertices(
+    blend: float, before: Floats, at: Floats, after: Floats, radius: float
+) -> Floats:  # pragma: no cover - compiled
     """Vertices (k, 3) of the way that a flight takes past the waypoint `at`, at least as low as the flight.
 
     They are: a point on the leg where the blend of heights begins, the fly-by arc of this radius from tangent point to
     tangent point, and a point on the next leg where the blend ends.  Height is even along the arc; where the slope
     breaks downwards a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
     Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
+
+    blend: of `half_blend_length`.
     """
     run_before = math.hypot(at[0] - before[0], at[1] - before[1])
     run_after = math.hypot(after[0] - at[0], after[1] - at[1])
@@ -53,7 +63,6 @@ def fly_by_vertices(
     available_in, available_out = 0.5 * (run_before - tangent), 0.5 * (run_after - tangent)
     beside = 0.5 * arc if chords > 0 else min(available_in, available_out)
     available_in, available_out = min(available_in, beside), min(available_out, beside)
-    blend = half_blend_length(aircraft, at[2])
     half_in = min(abs(slope_in - slope) * blend, available_in)
     half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
     deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
+from planner.evaluation.airspace_scores import add_airspace_violations
 from planner.evaluation.clearance_buffer import RequiredClearance
 from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length, legs_about
 from planner.evaluation.height_lags import HEIGHT_LAG, below_at, measure_lags
@@ -27,7 +28,7 @@ from planner.evaluation.problem_arrays import (
 )
 from planner.evaluation.terrain_clearance import TERRAIN_LEG, sample_terrain, segment_pixels, terrain_excess
 from world.frames import PolyMapRecord
-from world.kernels import Record, Records, compiled, compiled_views, inlined
+from world.kernels import Record, Records, compiled, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -144,6 +145,8 @@ def score_path(
             violations.terrain += _corner_depth(heights, bounds, to_pixel, required, more, vertices)
         if close:
             kill += _corner_kill(missiles, spare, vertices, below, above)
+    if data.airspace.zones.kept.shape[0] > 0 or data.airspace.max_height < math.inf:
+        add_airspace_violations(data, path, legs, corners, flown, lags, violations)
     objectives.length_ratio = length / limits.straight_distance
     objectives.kill_exposure = kill * POINTS * (count - 1) / length
 
@@ -189,7 +192,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
     return radius
 
 
-@compiled_views
+@inlined
 def _measure_flown(
     aircraft: PerformanceTable,
     legs_hold_turns: bool,
@@ -223,14 +226,14 @@ def _measure_flown(
         extents[i] = 2.0 * tangent if tangent > 0.0 else abs(slope_in - slope_out) * blend
 
 
-@compiled_views
+@inlined
 def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
     """How far below and above the legs a flight may be about a corner, m; lag, leg: of the leg after it."""
     here, settled = below_at(lag, 0.0), below_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, here, settled), max(0.0, -here, -settled)
 
 
-@compiled_views
+@inlined
 def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
     """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints that an autopilot strays about."""
     for i in range(1, corners.shape[0] - 1):
@@ -240,7 +243,7 @@ def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:
         extents[i] = max(corners[i].before, corners[i].after)
 
 
-@compiled_views
+@inlined
 def _corner_depth(
     heights: Heights,
     slope_bounds: SlopeBounds,
@@ -259,7 +262,7 @@ def _corner_depth(
     return total
 
 
-@compiled_views
+@inlined
 def _corner_kill(
     missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled

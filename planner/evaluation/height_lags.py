@@ -14,7 +14,7 @@ from aircraft.envelope import ground_speed
 from aircraft.path_limits import PerformanceTable, wind_speed_at
 from aircraft.tracking import faster_by
 from planner.evaluation.leg_geometry import Wind
-from world.kernels import Record, Records, compiled_views, inlined
+from world.kernels import Record, Records, inlined
 
 # How far the aircraft is below a leg at a share f of it, m: steady + slant (1 - f) + rest E(f x decay), where E is the
 # decay; and the most and the least of that and 0.
@@ -29,7 +29,7 @@ def _left(lengths: float) -> float:  # pragma: no cover - compiled
     return left
 
 
-@compiled_views
+@inlined
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
@@ -42,7 +42,7 @@ def lag_length(
     return max(1e-6, length)
 
 
-@compiled_views
+@inlined
 def set_lag(
     tracking: Record, length: float, run: float, rise: float, below: float, lag: Record
 ) -> float:  # pragma: no cover - compiled
@@ -60,7 +60,7 @@ def set_lag(
     return end
 
 
-@compiled_views
+@inlined
 def measure_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:  # pragma: no cover - compiled

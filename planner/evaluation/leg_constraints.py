@@ -10,7 +10,7 @@ from aircraft.path_limits import arc_slope, downwind, slopes_along, wind_speed_a
 from planner.evaluation.clearance_buffer import RequiredClearance, required_clearance
 from planner.evaluation.leg_geometry import Wind, courses_at, roll_length, settling_length, turn_length
 from planner.evaluation.problem_arrays import ProblemArrays
-from world.kernels import Record, Records, compiled, compiled_views, inlined
+from world.kernels import Record, Records, compiled, inlined
 
 Floats = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
     )
 
 
-@compiled_views
+@inlined
 def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # pragma: no cover - compiled
     """Slope (rad) that the aircraft can fly on any course between floor and ceiling; -1 for none.
 
@@ -77,7 +77,7 @@ def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # prag
     return math.atan2(speed * math.sin(air_angle), speed * math.cos(air_angle) + wind)
 
 
-@compiled_views
+@inlined
 def _straight_distance(start: Floats, destination: Floats) -> float:  # pragma: no cover - compiled
     total = 0.0
     for k in range(3):
@@ -85,7 +85,7 @@ def _straight_distance(start: Floats, destination: Floats) -> float:  # pragma: 
     return math.sqrt(total)
 
 
-@compiled_views
+@inlined
 def _slope_limits_on(
     data: ProblemArrays, ux: float, uy: float, low: float, high: float, wind: Wind
 ) -> tuple[float, float]:  # pragma: no cover - compiled
@@ -104,7 +104,7 @@ def _slope_limits_on(
     return climb - data.angle_margin, dive - data.angle_margin
 
 
-@compiled_views
+@inlined
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, less the margin."""
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -113,7 +113,7 @@ def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, floa
     return _slope_limits_on(data, ux, uy, a[2], b[2], downwind(data.aircraft))
 
 
-@compiled_views
+@inlined
 def slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, ux: float, uy: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
@@ -142,7 +142,7 @@ def _turn_excess(
     return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
 
 
-@compiled_views
+@inlined
 def add_leg_violations(
     data: ProblemArrays,
     limits: PrecomputedLimits,
@@ -175,7 +175,7 @@ def add_leg_violations(
             violations.slope += _violation(_arc_excess(data, limits, path, i, legs, corners), graded)
 
 
-@compiled_views
+@inlined
 def _add_turns(
     data: ProblemArrays, limits: PrecomputedLimits, legs: Records, graded: bool, violations: Record
 ) -> None:  # pragma: no cover - compiled
@@ -190,7 +190,7 @@ def _add_turns(
             violations.turn += _violation(_turn_excess(limits.cos_max_turn, largest, ux, uy, vx, vy), graded)
 
 
-@compiled_views
+@inlined
 def _add_bounds(
     data: ProblemArrays, path: Floats, corners: Records, graded: bool, violations: Record
 ) -> None:  # pragma: no cover - compiled
@@ -205,7 +205,7 @@ def _add_bounds(
         violations.bounds += _violation(outside, graded)
 
 
-@compiled_views
+@inlined
 def _add_turn_lengths(
     data: ProblemArrays,
     limits: PrecomputedLimits,
@@ -225,7 +225,7 @@ def _add_turn_lengths(
         violations.turn += _violation(min(10.0, max(0.0, short / 100.0)), graded)
 
 
-@compiled_views
+@inlined
 def _arc_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:  # pragma: no cover - compiled

@@ -9,7 +9,7 @@ from aircraft.envelope import GRAVITY
 from aircraft.path_limits import PerformanceTable, corner_tangent, fly_over_run, roll_reversal_length
 from aircraft.tracking import corner_room, faster_by
 from planner.evaluation.problem_arrays import ProblemArrays
-from world.kernels import Record, Records, compiled, compiled_views, inlined
+from world.kernels import Record, Records, compiled, inlined
 
 Floats = NDArray[np.float64]
 # East and north of the unit vector that the wind blows towards.
@@ -26,7 +26,7 @@ SETTLING_SHARE = 0.05
 SETTLING_LENGTH = 20.0
 
 
-@compiled_views
+@inlined
 def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - compiled
     """Fill `LEG` records (w - 1,) of a path (w, 3)."""
     for i in range(legs.shape[0]):
@@ -39,7 +39,7 @@ def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - com
         legs[i].length = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@compiled_views
+@inlined
 def measure_corners(
     data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
 ) -> None:  # pragma: no cover - compiled
@@ -84,7 +84,7 @@ def measure_corner(
     corner.before, corner.after, corner.excursion = before, after, excursion
 
 
-@compiled_views
+@inlined
 def courses_at(
     data: ProblemArrays, legs: Records, i: int
 ) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
@@ -105,7 +105,7 @@ def settling_length(need: float, run: float) -> float:  # pragma: no cover - com
     return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
 
 
-@compiled_views
+@inlined
 def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
     """Length of leg i that its two turns use, m: of a fly-over only the one at its beginning, on the way back to it."""
     if not fly_over:

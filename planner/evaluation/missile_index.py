@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.geometry import window_exposure
-from world.kernels import Records, compiled_views, inlined
+from world.kernels import Records, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -79,7 +79,7 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
     return MissileIndex(*arrays)
 
 
-@compiled_views
+@inlined
 def kill_density(
     index: MissileIndex,
     margin: float,
@@ -180,7 +180,7 @@ def _closest2(
     return max(0.0, start2 + f * (2.0 * along + f * length2))
 
 
-@compiled_views
+@inlined
 def _dose(along: float, start2: float, length2: float, radius: float, scale: float) -> float:  # pragma: no cover
     """Mean kill density of a segment that enters a sphere; see `window_exposure`."""
     if length2 < 1e-12:

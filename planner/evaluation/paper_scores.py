@@ -35,7 +35,7 @@ from planner.evaluation.problem_arrays import (
 )
 from planner.evaluation.threat_grid import Short, ThreatCells
 from world.geometry import CLOSEST
-from world.kernels import Record, Records, compiled, compiled_views
+from world.kernels import Record, Records, compiled, inlined
 from world.terrain import EDGE
 
 Floats = NDArray[np.float64]
@@ -97,7 +97,7 @@ def _score_paths(
             objective.height_sum = sums.height[b] / POINTS
 
 
-@compiled_views
+@inlined
 def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:  # pragma: no cover - compiled
     """Whether turns and slopes are limited by numbers alone, and the ends have no course."""
     courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
@@ -131,7 +131,7 @@ def _score_block(
             _add_exposures(data.spheres, data.threat_cells.units, size, block)
 
 
-@compiled_views
+@inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma: no cover - compiled
     """Fill in the ground's height at the points, as `pixel_height` gives it."""
     rows, columns = heights.shape
@@ -167,7 +167,7 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma:
         ground[b] = ground[b] if inside else math.nan
 
 
-@compiled_views
+@inlined
 def _add_terrain(
     required: RequiredClearance, size: int, inner: bool, block: Record
 ) -> None:  # pragma: no cover - compiled
@@ -188,7 +188,7 @@ def _add_terrain(
             height[b] += above if above > 0.0 else 0.0
 
 
-@compiled_views
+@inlined
 def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:  # pragma: no cover - compiled
     """Fill in where the list of the units near each point begins, and its length."""
     # These cells are as tall as the world.
@@ -209,7 +209,7 @@ def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:  #
         count[b] = entries if (z >= low) & (z <= high) else 0
 
 
-@compiled_views
+@inlined
 def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> None:  # pragma: no cover - compiled
     """Add kill and detection exposure of the points to the units that were found near them (eq. 9, 10).
 
@@ -245,7 +245,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
         turn += 1
 
 
-@compiled_views
+@inlined
 def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -> None:  # pragma: no cover - compiled
     """Add a leg's length, and whether its slope and the turn into it are too much (eq. 1-4, 8)."""
     climb, dive, cosine = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
@@ -270,7 +270,7 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
         run_before[b] = runs[b]
 
 
-@compiled_views
+@inlined
 def _add_outside(data: ProblemArrays, size: int, place: Record, sums: Record) -> None:  # pragma: no cover - compiled
     """Add whether a waypoint is off the map, below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.frames import PolyMapRecord
-from world.kernels import Record, compiled_views
+from world.kernels import Record, inlined
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ BLOCK_SCRATCH = np.dtype(
 )
 
 
-@compiled_views
+@inlined
 def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
     """Begin all sums with 0."""
     for b in range(BLOCK):
@@ -53,7 +53,7 @@ def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
         sums.turns[b], sums.slopes[b], sums.outside[b], sums.length[b] = 0.0, 0.0, 0.0, 0.0
 
 
-@compiled_views
+@inlined
 def copy_place(place: Record, out: Record, size: int) -> None:  # pragma: no cover - compiled
     """Copy one place of each path to another."""
     for b in range(size):
@@ -61,7 +61,7 @@ def copy_place(place: Record, out: Record, size: int) -> None:  # pragma: no cov
         out.column[b], out.row[b] = place.column[b], place.row[b]
 
 
-@compiled_views
+@inlined
 def subtract_places(end: Record, begin: Record, size: int, out: Record) -> None:  # pragma: no cover - compiled
     """Fill in the step from one place of each path to another."""
     for b in range(size):
@@ -72,7 +72,7 @@ def subtract_places(end: Record, begin: Record, size: int, out: Record) -> None:
         out.row[b] = end.row[b] - begin.row[b]
 
 
-@compiled_views
+@inlined
 def divide_legs(
     begin: Record, step: Record, share: float, size: int, out: Record
 ) -> None:  # pragma: no cover - compiled
@@ -85,7 +85,7 @@ def divide_legs(
         out.row[b] = begin.row[b] + share * step.row[b]
 
 
-@compiled_views
+@inlined
 def load_waypoints(
     to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record
 ) -> None:  # pragma: no cover - compiled
@@ -104,7 +104,7 @@ def load_waypoints(
     _horner(to_pixel.v, to_pixel.size, size, x, y, inner, end.row)
 
 
-@compiled_views
+@inlined
 def _horner(
     coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats
 ) -> None:  # pragma: no cover - compiled

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits, PerformanceTable, derated, within_rates
 from aircraft.tracking import no_tracking
+from planner.airspace.airspace_arrays import KeptAirspace, keep_airspace
+from planner.airspace.kept_zones import ZoneMargins
 from planner.evaluation.encoding import Space
 from planner.evaluation.missile_index import make_missile_index
 from planner.evaluation.problem_arrays import ProblemArrays, SlopeBounds, sphere_records, threat_records
@@ -27,6 +29,10 @@ AIRCRAFT_TURN = math.radians(150.0)
 # height error of a flight (1.3 m worst of 120 flights) and its cross-track error (2 m).
 SEARCH_BUFFER, CERTIFIED_BUFFER = 8.0, 5.0
 SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
+# The same beside zones, and under a greatest height above ground: of what the certificate leaves between that and the
+# required clearance, a search keeps no more than this share on either side.
+SEARCH_ZONE_MARGIN, CERTIFIED_ZONE_MARGIN = 15.0, 10.0
+BAND_SHARE = 0.25
 # Of what a fixed end leaves of the buffer, the share that the certificate asks for.
 CERTIFIED_END_SHARE = 0.75
 # More buffer for each attempt after the first, m: the search had not sampled all ground.
@@ -70,9 +76,13 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.strays else (0.0, 0.0)
     # What the ground rises across the way comes on top; the certificate looks at the ground there.
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up + across * certified.slope_bounds.steepest
+    airspace = _search_airspace(scenario, certified, attempt, up)
+    if airspace.max_height < math.inf:
+        buffer = min(buffer, _most_buffer(certified))
     search = _inset(
         certified._replace(
             buffer=buffer,
+            airspace=airspace,
             kill_margin=SEARCH_KILL_MARGIN + across,
             start_buffer=_end_buffer(terrain, limits, scenario.start, buffer),
             destination_buffer=_end_buffer(terrain, limits, scenario.destination, buffer),
@@ -118,16 +128,31 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
+        airspace=keep_airspace(scenario, ZoneMargins(CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.strays else arrays
 
 
+def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> KeptAirspace:
+    """The airspace with the margins of a search."""
+    buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
+    margins = ZoneMargins(SEARCH_ZONE_MARGIN, buffer, 1.0)
+    return keep_airspace(scenario, margins, min(buffer, _most_buffer(certified)))
+
+
+def _most_buffer(certified: ProblemArrays) -> float:
+    """The most that a search keeps from either edge of a band of heights above ground, m; inf without one."""
+    space = certified.airspace
+    between = space.max_height - certified.clearance - certified.buffer - space.buffer
+    return certified.buffer + BAND_SHARE * max(0.0, between)
+
+
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
     """What the aircraft can do, of which turbulence leaves a plan a share, and no more than its autopilot asks for."""
-    whole = limits.performance()
+    table = derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence])
     if limits.tracking is not None:
-        whole = within_rates(whole, limits.tracking.climb_rate, limits.tracking.sink_rate)
-    return derated(whole, TURBULENCE_SHARE[scenario.wind.turbulence])
+        table = within_rates(table, limits.tracking.climb_rate, limits.tracking.sink_rate)
+    return table
 
 
 def _edges(bounds: Floats) -> dict[str, float]:

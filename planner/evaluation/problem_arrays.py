@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
+from planner.airspace.airspace_arrays import KeptAirspace
 from planner.evaluation.missile_index import MissileIndex
 from planner.evaluation.threat_grid import ThreatCells
 from planner.plan import Objective, Violation
@@ -72,6 +73,7 @@ class ProblemArrays(NamedTuple):
     missiles: the missiles by where they stand.
     slope_bounds: of the ground.
     tracking: a record of `aircraft.tracking.TRACKING`: how far the autopilot strays from its legs.
+    airspace: zones, and the greatest height above ground.
     """
 
     heights: Heights
@@ -105,6 +107,7 @@ class ProblemArrays(NamedTuple):
     missiles: MissileIndex
     slope_bounds: SlopeBounds
     tracking: Record
+    airspace: KeptAirspace
 
 
 def threat_records(threats: Threats) -> Records:

@@ -33,7 +33,7 @@ STRAYED_PIECE = np.dtype(
 # Where legs are cut, in lengths of the height's lag: it has all but decayed after four.
 _CUTS = (0.5, 1.0, 2.0, 4.0)
 # From a fixed end, where the flight is where the plan is, this far (m) until it strays in full.
-_ENDS = 100.0
+ENDS = 100.0
 
 
 @compiled
@@ -85,7 +85,7 @@ def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
     cuts = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         cuts[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
-    end = min(1.0, _ENDS / max(1e-9, run))
+    end = min(1.0, ENDS / max(1e-9, run))
     cuts[len(_CUTS)], cuts[len(_CUTS) + 1] = end, 1.0 - end
     return np.sort(cuts)
 
@@ -112,4 +112,4 @@ def _beside(data: ProblemArrays, place: Floats, across: float) -> float:  # prag
         math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
         math.hypot(place[0] - data.destination[0], place[1] - data.destination[1]),
     )
-    return across * min(1.0, away / _ENDS)
+    return across * min(1.0, away / ENDS)

@@ -12,7 +12,7 @@ from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
 from planner.evaluation.height_lags import below_at
 from planner.evaluation.problem_arrays import SlopeBounds
 from world.frames import PolyMapRecord, polymap
-from world.kernels import Records, compiled_views, inlined
+from world.kernels import Records, inlined
 from world.terrain import TILE, pixel_height
 
 Floats = NDArray[np.float64]
@@ -78,7 +78,7 @@ def _sample(
     return gap, ahead if ahead > pitch else pitch
 
 
-@compiled_views
+@inlined
 def terrain_excess(
     heights: Heights,
     slope_bounds: SlopeBounds,
@@ -116,7 +116,7 @@ def terrain_excess(
     return float(depth * max(run, 1.0) * pitch / 1000.0)
 
 
-@compiled_views
+@inlined
 def _begin_legs(
     to_pixel: PolyMapRecord, sample_pitch: float, path: Floats, legs: Records, extents: Floats, terrain_legs: Records
 ) -> None:  # pragma: no cover - compiled
@@ -139,7 +139,7 @@ def _begin_legs(
         column, row = after_column, after_row
 
 
-@compiled_views
+@inlined
 def sample_terrain(
     heights: Heights,
     slope_bounds: SlopeBounds,

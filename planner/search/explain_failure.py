@@ -1,5 +1,6 @@
 """Why no path was found: what stands across the whole way, and what the search could not have tried."""
 
+import itertools
 import math
 
 import numpy as np
@@ -7,10 +8,14 @@ import numpy as np
 from planner.evaluation.encoding import rotated_frame
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS
+from planner.search.closing_zones import closing_zones
+from world.airspace.zone_kernels import edge_distance, outside_band, zone_records
 from world.scenario import Scenario
 
 # Places looked at along and across the way.
 ALONG, ACROSS = 200, 400
+# Names of zones that are said, at most; and between places of a path that is looked at for them, m.
+MOST_NAMES, ZONE_PITCH = 4, 20.0
 
 
 def what_blocks(plan: Plan) -> list[str]:
@@ -29,7 +34,14 @@ def what_blocks(plan: Plan) -> list[str]:
     """
     scenario = plan.scenario
     lines = _walls(scenario)
-    if not lines:
+    closed = closing_zones(scenario)
+    if closed is not None:
+        names = ", ".join(closed.zones[:MOST_NAMES]) + (" and more" if len(closed.zones) > MOST_NAMES else "")
+        lines.append(f"zones close the whole way (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
+    violated_zones = zones_entered(scenario, plan.waypoints)
+    if violated_zones:
+        lines.append(f"the best path does not keep to: {', '.join(violated_zones[:MOST_NAMES])}")
+    elif not lines:
         violated = [item.name.lower() for item in Violation if plan.violations[item]]
         if violated:
             lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(violated)}")
@@ -86,3 +98,30 @@ def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bo
         if free.any():
             return True
     return math.isinf(scenario.ceiling)
+
+
+def zones_entered(scenario: Scenario, path: np.ndarray) -> list[str]:
+    """Names of the exclusions that places of a path (w, 3) are inside, and of the inclusions that they are outside.
+
+    >>> from world.scenario import load_scenario
+    >>> zones_entered(load_scenario("tight"), np.zeros((2, 3)))
+    []
+    """
+    if not scenario.zones:
+        return []
+    records = zone_records(scenario.zones)
+    counts = [max(2, math.ceil(math.dist(a, b) / ZONE_PITCH)) for a, b in itertools.pairwise(path)]
+    legs = zip(path[:-1], path[1:], counts, strict=True)
+    places = np.concatenate([np.linspace(a, b, count) for a, b, count in legs])
+    ground = np.full(len(places), math.nan)
+    if scenario.terrain is not None:
+        ground = scenario.terrain.height(places[:, 0], places[:, 1])
+    found = []
+    for z, zone in enumerate(scenario.zones):
+        inside = (
+            edge_distance(records, z, east, north) <= 0.0 and not outside_band(records.zones[z], up, under) > 0.0
+            for (east, north, up), under in zip(places, ground, strict=True)
+        )
+        if any(inside) if zone.kind == "exclusion" else not all(inside):
+            found.append(zone.name)
+    return found

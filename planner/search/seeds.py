@@ -3,9 +3,11 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.airspace.airspace_arrays import is_limited
 from planner.evaluation.encoding import rotated_frame, rotated_vectors
 from planner.search.score_table import best_first, safe
 from planner.search.search_state import Search
+from planner.seeding.airspace_routes import airspace_routes
 from planner.seeding.grid_routes import GridRoute, grid_routes
 from planner.seeding.waypoint_fitting import QUICK, fit_waypoints
 
@@ -67,7 +69,8 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     found, scores = [], []
-    for route in grid_routes(data, frame, span, grids):
+    routes = airspace_routes if is_limited(data.airspace) else grid_routes
+    for route in routes(data, frame, span, grids):
         found.append(route)
         path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
         vectors = rotated_vectors(space, encoding, path[None])

@@ -75,11 +75,7 @@ def grid_route(
     if grid.layers.size == 0:
         return None
     along = np.linspace(0.0, frame.length, grid.stages + 1)
-    extra = np.zeros((grid.stages + 1, grid.across.size))
-    width = max(APART, APART_STEPS * frame.length / grid.stages)
-    for route in used:
-        stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
-        extra += np.maximum(0.0, 1.0 - np.abs(grid.across[None, :] - stage_across[:, None]) / width)
+    extra = beside_used(along, grid.across, used)
     for bound in (expected, math.inf):
         cells, cost = cheapest_route(data, frame, grid, extra, bound)
         if cells.size:
@@ -88,6 +84,16 @@ def grid_route(
         if bound == math.inf:
             break
     return None
+
+
+def beside_used(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
+    """What keeping near routes costs more, per m, at places along (s,) and across (y,), m: (s, y)."""
+    extra = np.zeros((along.size, across.size))
+    width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
+    for route in used:
+        stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
+        extra += np.maximum(0.0, 1.0 - np.abs(across[None, :] - stage_across[:, None]) / width)
+    return extra
 
 
 def grid_routes(

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.evaluation.airspace_scores import airspace_excess
 from planner.evaluation.encoding import Encoding, RotatedFrame, rotated_frame
 from planner.evaluation.height_lags import lag_length
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
@@ -44,14 +45,21 @@ def leg_cost(
         data.missiles,
         data.kill_margin,
         0.0,
-        *(a[0], a[1], a[2]),
-        *(b[0], b[1], b[2]),
-        *(0.0, 0.0),
+        a[0],
+        a[1],
+        a[2],
+        b[0],
+        b[1],
+        b[2],
+        0.0,
+        0.0,
         max(0.0, below),
         max(0.0, -below),
     )
     if kill > 0.0:
         total += KILL_COST * length * min(1.0, 0.1 + kill)
+    if data.airspace.zones.kept.shape[0] > 0 or data.airspace.max_height < math.inf:
+        total += DEPTH_COST * airspace_excess(data, a, b, max(0.0, below), max(0.0, -below))
     return total
 
 

@@ -13,7 +13,7 @@ import json
 import math
 import os
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +27,9 @@ from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
 from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import make_plan, make_setup
+from planner.evaluation.problem import TURBULENCE_SHARE
 from world.errors import ScenarioError
-from world.scenario import from_spec, load_scenario
+from world.scenario import Scenario, from_spec, load_scenario
 
 Floats = NDArray[np.float64]
 
@@ -37,6 +38,8 @@ BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", Path(__file__).parents[3] / "s
 LEAST_TURN, LEAST_LEG = math.radians(10.0), 250.0
 # Of the leg after a corner, how much of it is looked at: the next corner begins on the rest.
 LOOKED_AT = 0.75
+# Of TECS_CLMB_MAX, what plans climb with, and in turbulence what it leaves of that.
+PLANNED_CLIMB = 0.9
 # Distances along the legs at which two tracks are compared, m.
 STEP = 20.0
 RATIO_MEDIAN, RATIO_SPREAD, CLEARANCE = (0.95, 1.05), (0.8, 1.25), 3.0
@@ -99,13 +102,25 @@ def random_setup(seed: int) -> tuple[FlightSetup, Airframe]:
         try:
             scenario = from_spec(spec, f"random {seed}")
             airframe = load_airframe(scenario)
-            plan = make_plan(scenario, airframe, seed)
+            plan = make_plan(scenario, _climbing(airframe, scenario), seed)
         except ScenarioError:  # an end within a missile's reach
             continue
         if plan.feasible:
             mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
             return make_setup(scenario, airframe, mission, seed), airframe
     raise ValueError(f"seed {seed}: no feasible plan")
+
+
+def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
+    """An airframe that is planned for climbs as steep as descents: more than is left for ArduPlane in turbulence.
+
+    There the throttle comes to its limit now and then, which is the hardest for its law.
+    """
+    limits, parameters = airframe.limits, airframe.parameters
+    assert limits.tracking is not None
+    assert parameters is not None
+    rate = PLANNED_CLIMB * TURBULENCE_SHARE[scenario.wind.turbulence] * parameters.tecs_climb_max
+    return replace(airframe, limits=replace(limits, tracking=replace(limits.tracking, climb_rate=rate)))
 
 
 def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:

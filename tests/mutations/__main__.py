@@ -58,7 +58,7 @@ def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> l
     places = [Workplace(folder / str(k), limit) for k in range(at_once)]
     # Looked up before the first trial, so that the repository may change meanwhile.
     asked = {mutant: (covering_tests(mutant), kernels_on(mutant)) for mutant in mutants}
-    tests = sorted({test for covering, _ in asked.values() for test in covering})
+    tests = sorted({test for stages, _ in asked.values() for stage in stages for test in stage})
     free: SimpleQueue[Workplace] = SimpleQueue()
 
     def try_out(mutant: Mutant) -> Trial:
@@ -78,6 +78,8 @@ def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> l
             print(f"{number:4d} of {len(mutants)}  {trial.status:8} {trial.seconds:5.0f} s  {_text(trial.mutant)}")
             sys.stdout.flush()
             trials.append(trial)
+    for place in places:
+        place.close()
     return trials
 
 

@@ -11,27 +11,26 @@ from tests.mutations.mutant import ROOT, Mutant
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 # Beside the tests of its own name: where what a room's modules do shows.
 ROOM_TESTS: dict[str, tuple[str, ...]] = {
-    "limits": (),
     "rules": ("tests/logs/verdict",),
     "measures": ("tests/logs/verdict",),
     "physics": ("tests/flight/simulation/test_tick.py", "tests/flight/dynamics/test_fdm.py"),
 }
 
 
-def covering_tests(mutant: Mutant) -> list[str]:
-    """Test files and folders, those of the module's own name first: the first failure ends the run."""
-    if mutant.room == "limits":
-        # A limit's pair of cases stands with a module that reads it, or with a rule that uses that module.
-        users = _users(limits_at(mutant))
-        rules = [
-            rule for user in users for rule in sorted(_importers()[user]) if rule.startswith("logs/verdict/rules/")
-        ]
-        own = [test for module in (*users, *rules) for test in _own_tests(module)]
-    else:
-        own = _own_tests(mutant.file)
-    rest = [place for place in ROOM_TESTS[mutant.room] if (ROOT / place).exists()]
-    # A file is not named twice: pytest would not mind, but the folder's own order would put it first.
-    return [*dict.fromkeys(own), *(place for place in rest if place not in own)]
+def covering_tests(mutant: Mutant) -> list[list[str]]:
+    """Test files and folders in stages: most mutants fall in the first, and only those that do not need the next.
+
+    First those of the module's own name, of a limit those with its pair of cases; then the rest.
+    """
+    if mutant.room != "limits":
+        own, rest = _own_tests(mutant.file), [place for place in ROOM_TESTS[mutant.room] if (ROOT / place).exists()]
+        return [stage for stage in (own, rest) if stage]
+    # A limit's pair of cases stands with a module that reads it, or with a rule that uses that module.
+    users = _users(limits_at(mutant))
+    rules = [rule for user in users for rule in sorted(_importers()[user]) if rule.startswith("logs/verdict/rules/")]
+    tests = dict.fromkeys(test for module in (*users, *rules) for test in _own_tests(module))
+    pairs = [test for test in tests if "/limits/" in test]
+    return [stage for stage in (pairs, [test for test in tests if test not in pairs]) if stage]
 
 
 def kernels_on(mutant: Mutant) -> list[str]:
@@ -92,4 +91,4 @@ def _importers() -> dict[str, set[str]]:
 
 
 def _has_kernels(file: str) -> bool:
-    return re.search(r"^@(compiled|compiled_views|inlined)\b", _sources()[file], re.MULTILINE) is not None
+    return re.search(r"^@(compiled|inlined)\b", _sources()[file], re.MULTILINE) is not None

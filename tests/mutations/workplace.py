@@ -2,17 +2,14 @@
 
 import os
 import shutil
-import signal
-import subprocess
-import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests.mutations.mutant import ROOT, Mutant
+from tests.mutations.warm_process import Request, WarmProcess
 
 _LEFT_OUT = shutil.ignore_patterns(".*", "runs", "build", "*.egg-info", "__pycache__", "*.mcap")
-_PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "--no-header", "--tb=line")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +28,7 @@ class Trial:
 
 
 class Workplace:
-    """A folder with a copy of the repository and caches of its own.
+    """A folder with a copy of the repository, caches of its own, and a process that runs tests there.
 
     Compiled code is cached by the path of its file, so each workplace compiles once, in `warm`.  A trial works on a
     copy of that cache made of links: what it compiles goes with it.
@@ -42,29 +39,49 @@ class Workplace:
         self._limit = limit
         if not self.copy.exists():
             shutil.copytree(ROOT, self.copy, ignore=_LEFT_OUT)
+        self._warm.mkdir(exist_ok=True)
+        self._process = WarmProcess(
+            self.copy,
+            {
+                "PYTHONPATH": str(self.copy),
+                "NUMBA_CACHE_DIR": str(self._cache / "kernels"),
+                "XDG_CACHE_HOME": str(self._cache),
+                "MPLCONFIGDIR": str(self._cache / "matplotlib"),
+            },
+        )
+
+    def close(self) -> None:
+        """End its process; the folder stays."""
+        self._process.close()
 
     def warm(self, tests: list[str]) -> str:
         """Run tests without a mutant, so that all is compiled; the failing test's line, "" where all pass."""
-        code, text = self._run(tests, self._warm, 3600.0, keep_bytecode=True)
+        self._link_cache()
+        code, text = self._run(tests, 3600.0, bytecode=True)
+        shutil.rmtree(self._warm)
+        self._cache.rename(self._warm)
         return "" if code == 0 else _failure(text) or text[-2000:]
 
-    def try_out(self, mutant: Mutant, tests: list[str], kernels: list[str]) -> Trial:
-        """Apply a mutant, run the tests that cover it, and put the source back.
+    def try_out(self, mutant: Mutant, stages: list[list[str]], kernels: list[str]) -> Trial:
+        """Apply a mutant, run the tests that cover it until one fails, and put the source back.
 
-        kernels: files whose compiled code rests on what it changes.
+        stages: tests that are run together.  kernels: files whose compiled code rests on what it changes.
         """
         target = self.copy / mutant.file
         # Numba knows a changed file by its bytes, and a remark at its end changes no line's number.
         changed = {file: file.read_bytes() + b"#\n" for file in (self.copy / name for name in kernels)}
         changed[target] = mutant.applied(target.read_bytes())
         kept = {file: (file.read_bytes(), file.stat()) for file in changed}
-        shutil.rmtree(self._cache, ignore_errors=True)
-        shutil.copytree(self._warm, self._cache, copy_function=os.link)
+        self._link_cache()
         started = time.monotonic()
         try:
             for file, data in changed.items():
                 file.write_bytes(data)
-            code, text = self._run(tests, self._cache, self._limit)
+            for tests in stages:
+                # A mutant of the same length within a second of the last would be taken for it by its bytecode.
+                code, text = self._run(tests, self._limit, bytecode=False)
+                if code != 0:
+                    break
         finally:
             for file, (data, was) in kept.items():
                 file.write_bytes(data)
@@ -72,36 +89,19 @@ class Workplace:
         status = {None: "too long", 0: "alive"}.get(code, "killed")
         return Trial(mutant, status, _failure(text) if status == "killed" else "", time.monotonic() - started)
 
-    def _run(
-        self, tests: list[str], cache: Path, limit: float, *, keep_bytecode: bool = False
-    ) -> tuple[int | None, str]:
+    def _link_cache(self) -> None:
+        shutil.rmtree(self._cache, ignore_errors=True)
+        shutil.copytree(self._warm, self._cache, copy_function=os.link)
+
+    def _run(self, tests: list[str], limit: float, *, bytecode: bool) -> tuple[int | None, str]:
         """Exit code (None where the time ran out) and output of pytest."""
-        settings = {
-            "PYTHONPATH": str(self.copy),
-            "NUMBA_CACHE_DIR": str(cache / "kernels"),
-            "XDG_CACHE_HOME": str(cache),
-            "MPLCONFIGDIR": str(cache / "matplotlib"),
-            # A mutant of the same length within a second of the last would be taken for it by its bytecode.
-            "PYTHONDONTWRITEBYTECODE": "" if keep_bytecode else "1",
-        }
-        cache.mkdir(parents=True, exist_ok=True)
-        process = subprocess.Popen(
-            [sys.executable, *_PYTEST, *tests],
-            cwd=self.copy,
-            env=os.environ | settings,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            start_new_session=True,
-        )
-        try:
-            text, _ = process.communicate(timeout=limit)
-        except subprocess.TimeoutExpired:
-            os.killpg(process.pid, signal.SIGKILL)
-            return None, process.communicate()[0]
-        if process.returncode not in (0, 1, 2):
-            raise RuntimeError(f"pytest ended with {process.returncode}: {text[-2000:]}")
-        return process.returncode, text
+        output = self.copy.parent / "output.txt"
+        code = self._process.run(Request(tests, str(output), limit, bytecode))
+        text = output.read_text(encoding="utf-8", errors="replace")
+        # A signal's number, negative, is a mutant that made compiled code write where it must not.
+        if code is not None and code > 2:
+            raise RuntimeError(f"pytest ended with {code}: {text[-2000:]}")
+        return code, text
 
 
 def _failure(text: str) -> str:

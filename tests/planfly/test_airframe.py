@@ -1,6 +1,7 @@
 """The airframe holds what scenario and aircraft set together, and refuses what the aircraft cannot fly."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,6 +20,20 @@ def test_the_scenario_goes_before_the_aircrafts_own_numbers() -> None:
     given = load_airframe(small_scenario(flight=table))
     assert (given.airspeed, given.battery) == (22.0, 42.0)
     assert given.max_bank == pytest.approx(math.radians(21.0))
+
+
+def test_a_parameter_files_cruise_speed_goes_before_the_aircrafts(tmp_path: Path) -> None:
+    file = tmp_path / "mine.param"
+    file.write_text("AIRSPEED_CRUISE 23\n", encoding="utf-8")
+    table = {"autopilot": "ardupilot", "params": str(file)}
+    assert load_airframe(small_scenario(flight=table)).airspeed == 23.0
+    assert load_airframe(small_scenario(flight=table | {"airspeed_mps": 22.0})).airspeed == 22.0
+    file.write_text("TRIM_ARSPD_CM 4000\n", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"mine\.param: AIRSPEED_CRUISE: 40: aerosonde flies 18\.\.31"):
+        load_airframe(small_scenario(flight=table))
+    # A file that does not state it changes nothing.
+    file.write_text("WP_RADIUS 50\n", encoding="utf-8")
+    assert load_airframe(small_scenario(flight=table)).airspeed == 25.0
 
 
 @pytest.mark.parametrize(

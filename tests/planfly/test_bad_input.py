@@ -26,6 +26,9 @@ north_m = 5500
 amsl_m = 320
 """
 
+ZONE = '[[zones]]\nname = "town"\nkind = "exclusion"\n{}\n'
+YARD = "polygon_m = [[2000, 2000], [3000, 2000], [3000, 3000]]\n"
+
 WPL_HEAD = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t36.59\t-84.25\t300\t1\n"
 WPL_ROW = "{}\t0\t0\t16\t0\t0\t0\t0\t{}\t{}\t500\t1\n"
 
@@ -72,11 +75,48 @@ SCENARIOS = {
     "wind too strong": SCENARIO + "[wind]\nspeed_mps = 24\n",
     "turbulence": SCENARIO + '[wind]\nturbulence = "severe"\n',
     "control character in a name": edited('name = "small"', 'name = "sm\\u0007all"'),
+    "a zone that crosses itself": SCENARIO + ZONE.format("polygon_m = [[1, 1], [900, 900], [900, 1], [1, 900]]"),
+    "a zone of two corners": SCENARIO + ZONE.format("polygon_m = [[1, 1], [900, 900]]"),
+    "a zone with nothing inside": SCENARIO + ZONE.format("polygon_m = [[1, 1], [900, 1], [900, 1.001]]"),
+    "a zone's corner NaN": SCENARIO + ZONE.format("polygon_m = [[1, 1], [nan, 900], [900, 1]]"),
+    "a zone's radius of nothing": SCENARIO + ZONE.format("east_m = 3000\nnorth_m = 3000\nradius_m = 0"),
+    "a zone's floor above its ceiling": SCENARIO + ZONE.format(f"{YARD}floor_amsl_m = 300\nceiling_amsl_m = 200"),
+    "a zone of no shape": SCENARIO + ZONE.format(""),
+    "a zone that holds the start": SCENARIO + ZONE.format("east_m = 600\nnorth_m = 600\nradius_m = 300"),
+    "a zone that holds no destination": SCENARIO
+    + ZONE.format("east_m = 600\nnorth_m = 600\nradius_m = 900").replace("exclusion", "inclusion"),
+    "a file of zones missing": f'zones_file = "nowhere.geojson"\n{SCENARIO}',
+    "the greatest height below the clearance": SCENARIO + "[limits]\nmax_height_m = 20\n",
     "start inside a kill radius": SCENARIO
     + "[[threats]]\neast_m = 600\nnorth_m = 600\nkill_radius_m = 400\nkill_scale_m = 100\n",
 }
 
+# A file of zones that the scenario names.
+ZONE_FILES = {
+    "empty.geojson": "",
+    "list.geojson": "[1, 2, 3]",
+    "deep.geojson": "[" * 100_000,
+    "nan.geojson": '{"type": "Polygon", "coordinates": [[[8, 46], [NaN, 46], [8, 46.1]]]}',
+    "line.geojson": '{"type": "LineString", "coordinates": [[8, 46], [8.1, 46]]}',
+    "two.geojson": '{"type": "Polygon", "coordinates": [[[8, 46], [8.1, 46], [8, 46]]]}',
+    "bow.geojson": '{"type": "Polygon", "coordinates": [[[8, 46], [8.1, 46.1], [8.1, 46], [8, 46.1], [8, 46]]]}',
+    "bomb.kml": '<!DOCTYPE kml [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;&a;">]><kml>&b;</kml>',
+    "empty.kml": "<kml/>",
+    "open.kml": "<kml><Placemark>",
+    "sheet.kml": "<kml><Placemark><Polygon><altitudeMode>absolute</altitudeMode></Polygon></Placemark></kml>",
+    "other.kmz": "PK",
+}
+
+FENCE = "{}\t0\t0\t{}\t{}\t0\t0\t0\t{}\t{}\t0\t1\n"
+WAY = WPL_HEAD + WPL_ROW.format(1, "36.6", "-84.2") + WPL_ROW.format(2, "36.61", "-84.2")
+
 MISSIONS = {
+    "bow.waypoints": WAY
+    + "".join(
+        FENCE.format(3 + k, 5002, 4, lat, lon)
+        for k, (lat, lon) in enumerate(((36.5, -84.1), (36.6, -84.0), (36.6, -84.1), (36.5, -84.0)))
+    ),
+    "circle.waypoints": WAY + FENCE.format(3, 5004, 0, 36.5, -84.1),
     "empty.waypoints": "",
     "header.waypoints": "QGC WPL 120\n",
     "latitude.waypoints": WPL_HEAD + WPL_ROW.format(1, "91.0", "-84.2") + WPL_ROW.format(2, "36.6", "-84.2"),
@@ -130,6 +170,14 @@ def test_a_malformed_scenario(
     line = refused([*command, "bad.toml"], tmp_path, capsys)
     # A file that a scenario names is named itself.
     assert "bad.toml" in line or "small" in line or "nowhere.parm" in line
+
+
+@pytest.mark.parametrize("name", ZONE_FILES)
+def test_a_malformed_file_of_zones(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_text(ZONE_FILES[name], encoding="utf-8")
+    (tmp_path / "named.toml").write_text(f'zones_file = "{name}"\n{SCENARIO}', encoding="utf-8")
+    line = refused(["plan", "named.toml"], tmp_path, capsys)
+    assert name in line or "named.toml: zones[0]" in line
 
 
 @pytest.mark.parametrize("name", MISSIONS)

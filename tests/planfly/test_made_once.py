@@ -28,7 +28,7 @@ from planfly.commands.registry import COMMAND_NAMES, find_command
 from planfly.commands.served_flights import ServedFlights, ServeOptions
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
-from tests.world.elevation_files import from_origin, write_raster
+from tests.world.made.elevation_files import from_origin, write_raster
 from world.scenario import load_scenario
 
 STAGES = (

@@ -60,9 +60,9 @@ CASES = {
     "17 m/s with right angles": Case(
         (SPEED.format(17), *(wp(*place, 700) for place in ((0, 0), (0, 1500), (1500, 1500), (1500, 0)))),
         False,
+        # 17 m/s at 1,000 m are 17.8 true.  ArduPlane does not take them (AIRSPEED_MIN is 18), which makes it no mission
+        # to fly.
         ("stall",),
-        # 17 m/s at 1,000 m are 17.8 true, and its law banks less than the corner's arc would.
-        equivalent=(False, True),
     ),
     "18.5 m/s with right angles": Case(
         (SPEED.format(18.5), *(wp(*place, 700) for place in ((0, 0), (0, 1500), (1500, 1500), (1500, 0)))), True

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import world.kernels
-from world.kernels import Record, compiled, compiled_views, field_names, inlined, record_dtype
+from world.kernels import Record, compiled, field_names, inlined, record_dtype
 
 ROOT = Path(__file__).parents[2]
 INNER = record_dtype("east", "north")
@@ -36,7 +36,7 @@ def _twice(a: float) -> float:  # pragma: no cover - compiled
     return 2.0 * a
 
 
-@compiled_views
+@compiled
 def _add_twice(values: np.ndarray, out: np.ndarray) -> None:  # pragma: no cover - compiled
     for k in range(values.size):
         out[k] += _twice(values[k])

@@ -14,7 +14,7 @@ from pyproj import Transformer
 from rasterio.transform import Affine
 from scipy.interpolate import RegularGridInterpolator
 
-from tests.world.elevation_files import (
+from tests.world.made.elevation_files import (
     BOUNDS,
     COLS,
     MIDDLE,

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.world.elevation_files import WEST, assert_refused, write_npz
+from tests.world.made.elevation_files import WEST, assert_refused, write_npz
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import rasterio
 
-from tests.world.elevation_files import (
+from tests.world.made.elevation_files import (
     BOUNDS,
     COLS,
     MIDDLE,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.world.made_scenario import made_spec, same_scenario
+from tests.world.made.made_scenario import made_spec, same_scenario
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo
 from world.scenario import embedded_names, embedded_scenarios, from_spec, load_scenario

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.world.made_scenario import SMALL, THREAT, refused, with_fault
+from tests.world.made.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario import load_scenario
 from world.scenario_file import check_scenario, parse_scenario
@@ -70,7 +70,7 @@ def test_missing_and_unreadable_files(tmp_path: Path, monkeypatch: pytest.Monkey
     with pytest.raises(ScenarioError, match="cannot be read"):
         load_scenario(str(tmp_path))
     (tmp_path / "big.toml").write_bytes(b"#" * (16 * 2**20 + 1))
-    with pytest.raises(ScenarioError, match="16 MiB"):
+    with pytest.raises(ScenarioError, match="a scenario file has at most 16,777,216"):
         load_scenario(str(tmp_path / "big.toml"))
 
 

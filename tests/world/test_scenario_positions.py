@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.world.made_scenario import THREAT, refused, with_fault
+from tests.world.made.made_scenario import THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.frames import GeoOrigin
 from world.scenario_positions import check_inside, make_threats, map_position

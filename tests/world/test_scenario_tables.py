@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.world.made_scenario import SMALL, THREAT, refused, with_fault
+from tests.world.made.made_scenario import SMALL, THREAT, refused, with_fault
 from world.errors import ScenarioError
 from world.scenario_file import check_scenario, parse_scenario
 from world.scenario_tables import DEFAULT_AUTOPILOT, FlightTable, ScenarioFile
@@ -20,11 +20,14 @@ def test_every_default() -> None:
         "description": "",
         "origin": None,
         "threats": [],
+        "zones": None,
+        "zones_file": None,
         "limits": {
             "max_turn_deg": "aircraft",
             "max_climb_deg": "aircraft",
             "max_dive_deg": "aircraft",
             "min_clearance_m": 30.0,
+            "max_height_m": None,
             "corridor_m": None,
         },
         "planner": {
@@ -166,10 +169,12 @@ def test_numbers_may_be_whole_and_ranges_include_their_ends() -> None:
 
 def test_every_number_has_a_range() -> None:
     # The range is what keeps NaN out.
-    def tried(model: Any, path: tuple[str, ...] = ()) -> None:
+    def tried(model: Any, path: tuple[str | int, ...] = ()) -> None:
         for key, value in model.items():
             if isinstance(value, dict):
                 tried(value, (*path, key))
+            elif key == "zones":
+                tried(value[0], (*path, key, 0))
             elif isinstance(value, float):
                 data = full.model_dump(mode="json", exclude_none=True)
                 place = data
@@ -185,7 +190,9 @@ def test_every_number_has_a_range() -> None:
             + "course_deg = 5.0\n[origin]\nlat_deg = 46.0\nlon_deg = 8.0\n"
             + "[planner]\nacross_m = 500.0\n[planner.goals]\nlength_ratio = 2.0\nkill_exposure = 1.0\n"
             + "[flight]\nairspeed_mps = 25.0\nbattery_wh = 700.0\n"
-            + "[limits]\nmax_turn_deg = 60.0\nmax_climb_deg = 9.0\nmax_dive_deg = 9.0\n"
+            + "[limits]\nmax_turn_deg = 60.0\nmax_climb_deg = 9.0\nmax_dive_deg = 9.0\nmax_height_m = 120.0\n"
+            + '[[zones]]\nname = "z"\nkind = "exclusion"\neast_m = 0.0\nnorth_m = 0.0\nradius_m = 9.0\n'
+            + "floor_amsl_m = 9.0\nceiling_agl_m = 9.0\n"
         )
     )
     tried(full.model_dump(mode="json", exclude_none=True))

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.world.made_scenario import made_spec, same_scenario
+from tests.world.made.made_scenario import made_spec, same_scenario
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
 from world.scenario_variants import fixed_ends, over_terrain, with_flight, with_planner, with_threats, with_wind

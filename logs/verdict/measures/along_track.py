@@ -42,7 +42,7 @@ def passages(time: Floats, position: Floats, centre: Floats, radius: float) -> l
 
     time: (t,) s.  position: (t, 3).  centre: (3,).  A point on the surface is inside.
     """
-    if len(time) < 2 or not radius > 0.0 or _far(position, centre, radius):
+    if not radius > 0.0 or _far(position, centre, radius):
         return []
     closest, enter, leave = _windows(np.ascontiguousarray(position), np.ascontiguousarray(centre), float(radius))
     step = np.diff(time)

@@ -101,7 +101,7 @@ def path_spheres(
 @compiled
 def _boxes(points: Floats) -> _Boxes:  # pragma: no cover - compiled
     segments = max(0, points.shape[0] - 1)
-    count = (segments + _BLOCK - 1) // _BLOCK
+    count = -(-segments // _BLOCK)
     out = _Boxes(np.empty((count, 3)), np.empty((count, 3)), np.empty(count))
     for block in range(count):
         first, last = block * _BLOCK, min(segments, (block + 1) * _BLOCK)

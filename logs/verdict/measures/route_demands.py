@@ -11,6 +11,7 @@ from flight.ardupilot.pilot import true_by_equivalent
 from flight.guidance.fly_by_path import FlyByPath, path_polyline
 from flight.mission.route import Route
 from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.measures.airspace import Airspace, airspace_of
 from logs.verdict.measures.turn_demands import TurnDemands, performance_tables, turn_demands
 from logs.verdict.places import Place
 from logs.verdict.tolerances import LARGEST_OFFSET
@@ -51,6 +52,7 @@ class RouteDemands:
     climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
     ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
     envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
+    airspace: the zones of scenario and mission.
     """
 
     setup: FlightSetup
@@ -73,6 +75,7 @@ class RouteDemands:
     ground_speed: Floats
     path: PlannedPath
     envelope: bool
+    airspace: Airspace
 
     @property
     def limits(self) -> Limits:
@@ -99,7 +102,7 @@ class RouteDemands:
         for i in range(1, len(out) - 1):
             if self.fly_by_offset[i] > 0.0:
                 inward = self.leg_unit(i) - self.leg_unit(i - 1)
-                out[i, :2] += self.fly_by_offset[i] * inward / max(1e-9, math.hypot(inward[0], inward[1]))
+                out[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
                 # Halfway between the heights at the arc's ends.
                 tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
                 out[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
@@ -140,6 +143,7 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
         ground_speed=speeds,
         path=_planned_path(setup.path, route, speeds),
         envelope=envelope,
+        airspace=airspace_of(setup),
     )
 
 

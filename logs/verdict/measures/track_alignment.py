@@ -192,7 +192,7 @@ def _align(
     By dynamic programming; of equal assignments the earliest.  Also which marks no row of their chord captures.
     """
     last = position.shape[0] - 1
-    chords = (last + step - 1) // step
+    chords = -(-last // step)
     count = marks.shape[0]
     best = np.zeros(chords)
     fresh = np.zeros((count, chords), dtype=np.uint8)

@@ -46,7 +46,7 @@ class TurnMeasure:
 
 def measure_turn(demands: RouteDemands, aligned: AlignedTrack, i: int) -> TurnMeasure:
     """Measure the turn at inner waypoint i."""
-    if not aligned.flew(i - 1) or not aligned.passed[i] or aligned.rows[i + 1] <= aligned.rows[i]:
+    if not aligned.flew(i - 1) or not aligned.flew(i):
         return TurnMeasure()
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))

@@ -26,7 +26,7 @@ Floats = NDArray[np.float64]
 class Circle:
     """One loiter of a route.
 
-    first, last: its corners' waypoints.
+    first, last: its corners' waypoints, none of them an end of the route: a circle is joined and left there.
     middle: (2,) m.
     radius: m.
     turns: how often it is flown around.
@@ -58,8 +58,6 @@ def circles(demands: RouteDemands) -> list[Circle]:
 
 def _middle(demands: RouteDemands, i: int) -> Floats:
     """Middle of the circle that a corner's arc is part of, (2,) m."""
-    if not 0 < i < demands.legs:
-        return np.array(demands.points[i, :2])
     ux, uy = demands.leg_unit(i - 1)
     side = math.copysign(1.0, demands.turns[i])
     tangent = tangent_length(abs(float(demands.turns[i])), float(demands.radius[i]))
@@ -94,8 +92,8 @@ def _badness(item: Finding) -> tuple[int, float]:
 
 
 def _loiter(demands: RouteDemands, aligned: AlignedTrack | None, circle: Circle, at: list[Finding]) -> Finding:
-    inner = np.arange(max(1, circle.first), min(demands.legs - 1, circle.last) + 1)
-    known = bool(inner.size and np.isfinite(demands.turn_limit[inner]).all())
+    inner = slice(circle.first, circle.last + 1)
+    known = bool(np.isfinite(demands.turn_limit[inner]).all())
     tightest = float(demands.tightest[inner].max()) if known else math.nan
     bad = [item for item in at if item.ok is False]
     faults = _too_small(demands, circle, tightest) if known else []

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.ardupilot.speed_commands import takes_speed
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
@@ -38,6 +39,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     asked = float(demands.setup.route.airspeed[leg])
     true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
+    said += _not_taken(demands, asked)
     said += _no_room(demands, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
@@ -45,7 +47,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     unflown = not geometric and (aligned is None or not aligned.flew(leg))
     if unflown:
         said.append("the leg was not flown")
-    elif not geometric and aligned is not None:
+    elif aligned is not None:
         measured = _measured(demands, aligned, leg)
         if measured is None:
             mean = _reached(aligned, leg, commanded)
@@ -76,6 +78,15 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
         method="commanded airspeed in the envelope",
         facts=facts,
     )
+
+
+def _not_taken(demands: RouteDemands, asked: float) -> list[str]:
+    """That ArduPlane does not take a commanded speed (m/s, equivalent)."""
+    parameters = demands.setup.parameters
+    if parameters is None or takes_speed(asked, parameters):
+        return []
+    least, most = parameters.airspeed_min, parameters.airspeed_max
+    return [f"ArduPlane takes speeds from AIRSPEED_MIN {least:g} to AIRSPEED_MAX {most:g} m/s, and ignores this one"]
 
 
 def _no_room(demands: RouteDemands, leg: int, commanded: float) -> list[str]:
@@ -111,9 +122,9 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
     return np.asarray((total[width:] - total[:-width]) / width)
 
 
-def _by_the_air(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, off: float) -> bool:
+def _by_the_air(demands: RouteDemands, aligned: AlignedTrack, leg: int, off: float) -> bool:
     """Whether rising or sinking air took the speed on a leg where the aircraft showed that it can more than it asks."""
-    if aligned is None or off * demands.slopes[leg] >= 0.0:
+    if off * demands.slopes[leg] >= 0.0:
         return False
     ability = measure_ability(demands, aligned, leg)
     return ability is not None and ability.covers(float(demands.slopes[leg]))
@@ -138,9 +149,7 @@ def _commanded(demands: RouteDemands, leg: int, commanded: float) -> tuple[float
 
 
 def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
-    """Mean airspeed of a leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
-    if not aligned.flew(leg):
-        return None
+    """Mean airspeed of a flown leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
     rows = steady_rows(demands, aligned, leg)
     time = aligned.track.time[rows]
     if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(demands.runs[leg]) / SLOWEST):

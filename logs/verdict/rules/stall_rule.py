@@ -41,10 +41,17 @@ class _Margin:
 
 
 def stall_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
-    """One finding: the least margin of airspeed over the stall in a bank; none for a route without a turn."""
+    """One finding: the least margin of airspeed over the stall in a bank; none for a route without a turn.
+
+    A route that asks for a bank in which its speed is below the stall fails in flight too, at whatever speed it was
+    flown: an autopilot that did not take the speed, or banked less, does not make it one to fly.
+    """
+    planned = _planned(demands)
     if geometric:
-        return _planned(demands)
-    return [] if aligned is None else _flown(demands, aligned)
+        return planned
+    if aligned is None:
+        return []
+    return [found for found in planned if found.ok is False] or _flown(demands, aligned)
 
 
 def _planned(demands: RouteDemands) -> list[Finding]:

@@ -96,7 +96,7 @@ def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:
 
 def steady(**values: Any) -> Record:
     """Memory of steady flight: what the sensor reads is what is demanded."""
-    return memory(**({"airspeed": 25.0, "flown": True, "last_velocity_north": 25.0} | values))
+    return memory(**({"airspeed": 25.0, "airspeed_read": 25.0, "flown": True, "last_velocity_north": 25.0} | values))
 
 
 def reading(**values: Any) -> Record:
@@ -166,3 +166,35 @@ def test_the_airspeed_demand_changes_within_what_the_energy_allows() -> None:
     own = steady()
     weigh_energies(reading(), flying(), parameters(AIRSPEED_MAX=40.0), own, 30.0, 1.0, DT)
     assert own.airspeed_demand == pytest.approx(25.0 + 0.5 * 5.0 * GRAVITY / 25.0 * DT)
+
+
+def test_what_a_pull_up_turns_the_velocity_by_counts_as_acceleration_along_the_nose() -> None:
+    """A nose 10 degrees up, and a climb that begins with 2 m/s^2: sin 10 of that is felt along the nose."""
+    own = steady()
+    weighed(own, reading(pitch=math.radians(10.0)), flying(climb=0.2))
+    lost = 1.0 - DT / (DT + 5.0)
+    assert own.acceleration == pytest.approx(2.0 * math.sin(math.radians(10.0)) * lost)
+    # On the level it is not.
+    own = steady()
+    weighed(own, reading(), flying(climb=0.2))
+    assert own.acceleration == pytest.approx(0.0)
+
+
+def test_the_airspeed_is_a_smoothed_reading_of_before() -> None:
+    """The sensor reads 1 m/s more from now on: 0.3 of what is missing at each turn, and none of it at the first."""
+    own = steady()
+    for k in range(1, 4):
+        held = own.airspeed
+        weighed(own, reading(airspeed=26.0 / AIRSPEED_READING), flying())
+        assert own.airspeed_read == pytest.approx(26.0 - 0.7**k)
+        if k == 1:
+            assert own.airspeed == held
+
+
+@pytest.mark.parametrize(("bank_deg", "prevents", "least"), [(30.0, 1.0, 19.34), (30.0, 0.0, 18.0), (0.0, 1.0, 18.0)])
+def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, prevents: float, least: float) -> None:
+    """18 m/s over the root of cos 30: as ArduPlane's log of a turn shows it, at once (19.32 m/s; TECS.spdem)."""
+    own = steady(airspeed_demand=18.0, side_acceleration=GRAVITY * math.tan(math.radians(bank_deg)))
+    values = parameters(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0, STALL_PREVENTION=prevents)
+    weigh_energies(reading(), flying(), values, own, 18.0, 1.0, DT)
+    assert own.airspeed_demand == pytest.approx(least, abs=0.005)

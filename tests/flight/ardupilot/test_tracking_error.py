@@ -8,6 +8,7 @@ from aircraft.catalog import load_aircraft
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
 from flight.ardupilot.tracking_error import LEAST_ACCEPTANCE, WIND_SPREAD, tracking_error
+from world.wind import Turbulence
 
 # s by which a bank follows its demand, as ArduPlane's flights show it; and by which it turns late on the mean: it looks
 # ten times a second, and demands the next leg's bank at the look after that.
@@ -84,6 +85,18 @@ def test_parameters_decide(parameters: ArduPilotParameters, error: TrackingError
     climbs = tracking_error(parameters.changed(TECS_CLMB_MAX=4.0), 25.0, "gnss")
     assert climbs.climb_rate == pytest.approx(3.6)
     assert climbs.sink_rate == error.sink_rate
+
+
+@pytest.mark.parametrize(
+    ("turbulence", "climb", "sink"), [("none", 0.9, 0.9), ("light", 0.65, 0.81), ("moderate", 0.45, 0.72)]
+)
+def test_gusts_leave_less_to_climb_with(
+    parameters: ArduPilotParameters, turbulence: Turbulence, climb: float, sink: float
+) -> None:
+    """Of the 5.6 m/s of climb and sink that the Aerosonde's parameters state."""
+    left = tracking_error(parameters, 25.0, "gnss", turbulence=turbulence)
+    assert left.climb_rate == pytest.approx(climb * 5.6)
+    assert left.sink_rate == pytest.approx(sink * 5.6)
 
 
 def test_navigation_takes_room(parameters: ArduPilotParameters, error: TrackingError) -> None:

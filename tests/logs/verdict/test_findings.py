@@ -5,6 +5,7 @@ from dataclasses import asdict, replace
 
 import pytest
 
+from flight.ardupilot.parameters import parameters_of
 from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
@@ -37,6 +38,16 @@ def test_a_real_autopilot_that_flew_is_data_too(setup: FlightSetup, track: Track
         "changed": {"WP_RADIUS": 60.0}, "unused": ["FOO"],
     }  # fmt: skip
     assert json.loads(verdict_json(judge(setup, track)))["flown_by"] is None
+
+
+def test_parameters_are_data_with_who_states_them(setup: FlightSetup, track: Track) -> None:
+    assert json.loads(verdict_json(judge(setup, track)))["parameters"] is None
+    mine = parameters_of("LIM_ROLL_CD 3000\nFOO 1\n", "mine.parm")
+    data = json.loads(verdict_json(judge(replace(setup, parameters=mine), track)))["parameters"]
+    assert (data["file"], data["unused"], data["not_flown"]) == ("mine.parm", ["FOO"], ["RTL_ALTITUDE", "RTL_RADIUS"])
+    values = {value["name"]: (value["value"], value["origin"]) for value in data["values"]}
+    assert values["ROLL_LIMIT_DEG"] == (30.0, "file")
+    assert values["WP_RADIUS"] == (90.0, "default")
 
 
 def test_each_rule_names_its_places(setup: FlightSetup, track: Track) -> None:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from flight.ardupilot.parameters import default_parameters
+from flight.simulation.autopilot_program import AutopilotProgram
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.judge_flight import judge_flight, judge_geometry
@@ -68,6 +69,14 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
     undecided = aside(autopilot, 70.0, FlownBeside(PASSED))
     assert undecided.lines[1].endswith("cannot: no single parameter that was tried would pass")
+
+
+def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
+    program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0" * 64, {}, {})
+    real = replace(autopilot, program=program)
+    said = aside(real, 70.0, FlownBeside(PASSED, DECIDING)).lines[1]
+    assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the flight of its law")
+    assert aside(real, 70.0, FlownBeside(PASSED)).lines[1].endswith("with these parameters cannot")
 
 
 def test_where_the_aircraft_fails_too_no_parameter_is_blamed(autopilot: FlightSetup) -> None:

@@ -95,3 +95,6 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
         f"Parameters: 1 of the file, 0 of the aircraft, {known} ArduPlane's defaults;"
         " not used: FOO0, FOO1, FOO2, FOO3, +2 more"
     ) in lines
+    returns = parameters_of("RTL_RADIUS 80\nALT_HOLD_RTL 12000\n", "mine.parm")
+    lines = summary_lines([], replace(setup, parameters=returns), "flown", levels)
+    assert any(line.endswith("defaults; read, not flown: RTL_ALTITUDE, RTL_RADIUS") for line in lines)

@@ -13,7 +13,7 @@ from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_KILL_MARGIN, Problem, make_problem
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.plan import Objective, Violation
-from tests.planner.evaluation.straying import straying
+from tests.planner.straying import straying
 from world.frames import polymap
 from world.scenario import Scenario
 

@@ -13,7 +13,7 @@ from aircraft.path_limits import Limits, downwind
 from planner.evaluation.height_lags import HEIGHT_LAG, below_at, measure_lags
 from planner.evaluation.leg_geometry import LEG, measure_legs
 from planner.evaluation.problem import make_problem
-from tests.planner.evaluation.straying import straying
+from tests.planner.straying import straying
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]

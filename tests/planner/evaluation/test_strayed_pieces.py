@@ -13,7 +13,7 @@ from planner.evaluation.certify_kernels import heights_above_ground, missile_dis
 from planner.evaluation.problem import make_problem
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.evaluation.strayed_pieces import strayed_pieces
-from tests.planner.evaluation.straying import straying
+from tests.planner.straying import straying
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]

@@ -49,3 +49,15 @@ def test_garbage_positions_meet_nothing() -> None:
     assert np.isnan(low[1:]).all()
     stays = passages(np.arange(5.0), position, np.zeros(3), 60.0)
     assert [(stay.start, stay.end) for stay in stays] == [(0.0, 1.0)]
+
+
+def test_no_sphere_and_no_way_have_no_stay() -> None:
+    way = np.array([[-100.0, 0.0, 0.0], [100.0, 0.0, 0.0]])
+    assert len(passages(np.arange(2.0), way, np.zeros(3), 50.0)) == 1
+    for radius in (0.0, -50.0, math.nan):
+        assert passages(np.arange(2.0), way, np.zeros(3), radius) == []
+    for rows in (0, 1):
+        assert passages(np.arange(2.0)[:rows], np.zeros((rows, 3)), np.zeros(3), 50.0) == []
+    ground = flat_terrain(np.array([[-1e3, 1e3], [-1e3, 1e3]]), 5.0, 100.0)
+    for rows in (0, 1):
+        assert [one.size for one in segment_clearances(ground, np.zeros((rows, 3)))] == [0, 0]

@@ -54,3 +54,13 @@ def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
     demands = demands_of([*points, [0.0, 3000.0, 312.0]])
     assert [step(demands, leg) for leg in (1, 2, 3, 4)] == [None] * 4
     assert math.degrees(demands.slopes[1]) == pytest.approx(math.degrees(math.atan2(3, 10)))
+
+
+@pytest.mark.parametrize("circle", [1, 2])
+def test_a_way_past_one_corner_of_a_circle_is_no_jog(circle: int) -> None:
+    """12 m aside, so that both corners have to be left out."""
+    demands = demands_of([[0, 0, 300], [0, 1000, 300], [12, 1000, 300], [12, 2000, 300]])
+    arcs = demands.setup.route.arcs.copy()
+    arcs[circle] = 3.0
+    object.__setattr__(demands.setup.route, "arcs", arcs)
+    assert jog(demands, 1) is None

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from aircraft.path_limits import BLEND_ACCELERATION
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.places import Place
@@ -55,3 +56,39 @@ def test_waypoints_are_places_with_their_items(setup: FlightSetup) -> None:
     items[1] = -1
     demands = route_demands(replace(setup, route=replace(setup.route, items=items)))
     assert [demands.waypoint(k) for k in (1, 2)] == [Place("waypoint", 1), Place("waypoint", 2, item=2)]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_apex_lies_inside_its_corner_halfway_between_the_heights_at_its_arcs_ends(side: float) -> None:
+    turn = math.radians(60.0)
+    east, north = side * 2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn)
+    setup = make_setup([[0, 0, 300], [0, 2000, 300 + 2000 * 0.10], [east, north, 300 + 2000 * 0.04]])
+    tangent = bank_radius() * math.tan(0.5 * turn)
+    inside = bank_radius() * (1.0 / math.cos(0.5 * turn) - 1.0)
+    # The bisector of the corner's inside points 120 degrees to the right, or left, of north.
+    toward = math.radians(120.0)
+    apex = route_demands(setup).apexes()[1]
+    assert apex[:2] == pytest.approx([side * inside * math.sin(toward), 2000.0 + inside * math.cos(toward)], abs=1e-6)
+    # The second leg falls by 0.06: 120 m in 2 km.
+    ends = 500.0 - 0.10 * tangent, 500.0 - 0.06 * tangent
+    assert apex[2] == pytest.approx(0.5 * sum(ends), abs=1e-6)
+
+
+def test_an_apex_of_a_corner_without_room_has_the_slopes_of_its_shorter_leg() -> None:
+    points = [[0, 0, 300], [0, 2000, 300], [40, 2000, 304], [40, 4000, 304]]
+    apex = route_demands(make_setup(points)).apexes()[1]
+    assert apex[2] == pytest.approx(300.0 + 0.5 * 40.0 * 0.1, abs=1e-6)
+
+
+def test_a_slopes_blend_is_a_parabola_about_the_waypoint_or_about_each_end_of_its_arc() -> None:
+    """Of v^2 / (2 a) times the change of slope, at the highest ground speed: 25 + 5 m/s."""
+    parabola = 30.0**2 / (2.0 * BLEND_ACCELERATION)
+    wind = {"speed_mps": 5.0, "from_deg": 180.0}
+    straight = make_setup([[0, 0, 300], [0, 2000, 380], [0, 4000, 340]], wind=wind)
+    assert route_demands(straight).blend.tolist() == pytest.approx([0.0, 0.06 * parabola, 0.0])
+    # Both tangents, of 0.04 and -0.01, are joined by an arc that is shorter than they are.
+    turning = make_setup([[0, 0, 300], [0, 2000, 380], [2000, 2000, 360]], wind=wind)
+    demands = route_demands(turning)
+    radius = float(demands.radius[1])
+    on_arc = (0.04 - 0.01) * radius / (radius * 0.5 * math.pi)
+    assert demands.blend[1] == pytest.approx(max(abs(on_arc - 0.04), abs(on_arc + 0.01)) * parabola)

@@ -5,10 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from logs.verdict.measures import slopes
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.measures.slopes import Ability, SlopeMeasure, lifted_speed, measure_slope
 from logs.verdict.measures.track_alignment import lay_track
-from tests.synthetic import Profile, fly_path, make_setup
+from tests.synthetic import Profile, edited, fly_path, make_setup
 
 CLIMB = [[0, 0, 300], [0, 1000, 300], [0, 3000, 510], [0, 4500, 510]]
 
@@ -56,3 +57,42 @@ def test_rising_air_lends_speed_that_fades() -> None:
     gained = lifted_speed(time, speed, rising, time.size)
     assert gained.max() == pytest.approx(9.81 / 25.0 * 5.0, rel=0.25)
     assert gained[-1] < 0.05 * gained.max()
+
+
+@pytest.mark.parametrize(("run", "short"), [(190.0, True), (210.0, False)])
+def test_a_leg_within_a_hundred_metres_of_both_its_turns_is_short(run: float, short: bool) -> None:
+    """And a level leg's height is measured between its turns all the same."""
+    setup = make_setup([[0, 0, 300], [0, 1000, 300], [0, 1000 + run, 300], [0, 2500, 300]])
+    demands = route_demands(setup)
+    aligned = lay_track(demands, fly_path(setup, up=lambda s: 0.0 * s + 4.0))
+    assert aligned is not None
+    measure = measure_slope(demands, aligned, 1)
+    assert measure.short is short
+    assert measure.height_error == pytest.approx(4.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("throttle", "off"), [(0.5, -3.0), (-0.7, 3.0)])
+def test_speed_that_a_gust_along_the_track_took_is_not_lost(throttle: float, off: float) -> None:
+    """The airspeed is 3 m/s off and the speed over the ground 1 m/s: the lesser counts."""
+    setup = make_setup(CLIMB)
+    demands = route_demands(setup)
+
+    def measure(airspeed: float, ground: float) -> SlopeMeasure:
+        track = fly_path(setup, throttle=lambda s: 0.0 * s + throttle, airspeed=lambda s: 0.0 * s + ground)
+        aligned = lay_track(demands, edited(track, airspeed=np.full_like(track.airspeed, 25.0 + airspeed)))
+        assert aligned is not None
+        return measure_slope(demands, aligned, 1)
+
+    for airspeed, ground, lost in ((off, off / 3.0, 1.0), (off / 3.0, off, 1.0), (off, 0.0, 0.0), (off, off, 3.0)):
+        found = measure(airspeed, ground)
+        assert (found.slow if off < 0.0 else found.fast) == pytest.approx(lost, abs=0.02)
+        assert (found.fast if off < 0.0 else found.slow) == 0.0
+
+
+@pytest.mark.parametrize(("span", "value"), [(0.9e-3, 2.0 - 0.5 * 0.09), (1.15e-3, 2.0)])
+def test_heights_within_a_decimetre_are_one(span: float, value: float) -> None:
+    """A rate of 2 at the top that falls below it; heights are in hundreds of metres."""
+    x, y = np.tile([-1.0, 1.0], 500), np.linspace(-span, 0.0, 1000)
+    found = slopes._plane_at_origin(2.0 + 100.0 * y, x, y, 10.0)
+    assert found is not None
+    assert found[0] == pytest.approx(value, abs=1e-3)

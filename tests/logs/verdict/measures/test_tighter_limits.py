@@ -8,9 +8,9 @@ import pytest
 
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_demands import route_demands
-from logs.verdict.measures.tighter_limits import steep_arc
+from logs.verdict.measures.tighter_limits import slope_limit, steep_arc, turn_limit
 from tests.logs.verdict.judging import leg, of
-from tests.synthetic import CALM_CLIMB, make_setup
+from tests.synthetic import CALM_CLIMB, CALM_DESCENT, bank_radius, make_setup
 
 # Degrees of climb of both legs: each is within what the aircraft can there, the arc between them is not.
 SLOPE = 10.5
@@ -44,3 +44,32 @@ def test_the_other_legs_limit_counts_too(from_deg: float) -> None:
     found = steep_arc(route_demands(setup), 0)
     assert found is not None
     assert abs(found.limit - sum(limits) / 2.0) < 1e-4
+
+
+@pytest.mark.parametrize(("speeds", "steep"), [([25.0, 25.0], True), ([25.0, 34.0], False), ([34.0, 25.0], False)])
+def test_an_arc_beside_a_leg_that_cannot_climb_at_all_is_not_judged(speeds: list[float], steep: bool) -> None:
+    """At 34 m/s the aircraft sinks at full throttle: the leg fails by its speed."""
+    demands = route_demands(make_setup(corner(100.0, (11.0, 11.0)), speeds=speeds))
+    assert (demands.climb > 0.0).all() == (34.0 not in speeds)
+    assert (steep_arc(demands, 0) is not None) is steep
+
+
+@pytest.mark.parametrize(("climb", "dive"), [(9.0, 6.0), (15.0, 9.0)])
+def test_the_tighter_of_scenario_and_aircraft(climb: float, dive: float) -> None:
+    """The aircraft has 13.7 degrees up and 7.8 down."""
+    setup = make_setup(corner(20.0, (4.0, -4.0)), limits={"max_climb_deg": climb, "max_dive_deg": dive})
+    demands = route_demands(setup)
+    for number, (fixed, own) in enumerate(((climb, CALM_CLIMB), (dive, CALM_DESCENT))):
+        limit, source = slope_limit(demands, number)
+        assert math.degrees(limit) == pytest.approx(min(fixed, own))
+        assert source == ("scenario" if fixed < own else "aircraft")
+
+
+@pytest.mark.parametrize(("fixed", "source"), [(70.0, "scenario"), (175.0, "aircraft")])
+def test_the_tighter_turn(fixed: float, source: str) -> None:
+    """Legs of 400 m hold an arc of R tan(turn / 2) = 400 m."""
+    points = [[0, 0, 300], [0, 400, 300], [400, 400, 300]]
+    demands = route_demands(make_setup(points, limits={"max_turn_deg": fixed}))
+    own = 2.0 * math.degrees(math.atan(400.0 / bank_radius()))
+    assert turn_limit(demands, 1) == (pytest.approx(math.radians(min(fixed, own))), source)
+    assert turn_limit(route_demands(make_setup(points), envelope=False), 1) == (math.inf, "none")

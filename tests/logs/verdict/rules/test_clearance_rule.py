@@ -1,5 +1,7 @@
 """Clearance along the planned and the flown path, and less the terrain's stated error, where one is stated."""
 
+import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -106,3 +108,39 @@ def test_a_bad_value_is_refused(value: str, said: str) -> None:
     with pytest.raises(ScenarioError, match=r"terrain\.vertical_error_m") as caught:
         parse_scenario(text, "x.toml")
     assert said in str(caught.value)
+
+
+@pytest.mark.parametrize("share", [0.25, 0.7])
+def test_the_lowest_point_between_two_rows_is_told_with_its_time_and_place(share: float) -> None:
+    """Rows 5 s and 125 m apart on a course of 60 degrees, and a summit under a point between the eighth and ninth."""
+    ahead = np.array([math.sin(math.radians(60.0)), math.cos(math.radians(60.0))])
+    run = (8.0 + share) * 125.0
+    east, north = (run * ahead).tolist()
+    hill = {"kind": "peaks", "peak": [{"east_m": east, "north_m": north, "height_m": 240.0, "sigma_m": 150.0}]}
+    setup = make_setup([[0, 0, 300], [*(1500.0 * ahead), 300], [*(3000.0 * ahead), 300]], terrain=hill)
+    item = of(judge(setup, fly_path(setup, rate=0.2)), "clearance", leg(0))
+    told = re.search(r"at ([\d.]+) s, east (\d+) m, north (\d+) m", item.reason)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(run / 25.0, abs=0.5)
+    assert (float(told[2]), float(told[3])) == (pytest.approx(east, abs=12.0), pytest.approx(north, abs=12.0))
+
+
+@pytest.mark.parametrize(("high", "ok"), [(300.0, None), (25.0, False)])
+def test_where_a_flight_leaves_the_known_terrain_is_told(high: float, ok: bool | None) -> None:
+    """Known along half of a leg of 5 km; too low before that is a fault all the same."""
+    low = {"kind": "peaks", "peak": [{"east_m": 1000.0, "north_m": 0.0, "height_m": 1.0, "sigma_m": 50.0}]}
+    setup = make_setup([[0, 0, high], [0, 5000, high]], terrain=low)
+    ground = setup.scenario.terrain
+    assert ground is not None
+    heights = ground.heights.copy()
+    heights[len(heights) // 2 :] = np.nan
+    cut = replace(setup, scenario=replace(setup.scenario, terrain=replace(ground, heights=heights)))
+    item = of(judge(cut, fly_path(setup)), "clearance", leg(0))
+    assert item.ok is ok
+    assert item.flown == pytest.approx(high, abs=0.1)
+    known = replace(ground, heights=heights).height(np.zeros(5000), np.arange(5000.0))
+    assert np.isfinite(known[0])
+    north = float(item.reason.split("off the known terrain at ")[1].split("north ")[1].split(" m")[0])
+    assert north == pytest.approx(int(np.flatnonzero(np.isnan(known))[0]), abs=2.0)
+    planned = of(judge_geometry(cut), "clearance", leg(0))
+    assert (planned.ok, planned.planned) == (None, None)

@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
@@ -69,3 +70,19 @@ def test_one_moved_row_is_a_contradiction(setup: FlightSetup, track: Track) -> N
     verdict = judge(setup, edited(track, position=position))
     assert not verdict.complete
     assert "contradict" in of(verdict, "completion").reason
+
+
+@pytest.mark.parametrize("row", [700, 5000])
+def test_where_a_record_contradicts_itself_is_told(setup: FlightSetup, track: Track, row: int) -> None:
+    """One row moved 3 m aside at 60 rows a second: 180 m/s on both sides of it, of which the first is told."""
+    position = track.position.copy()
+    position[row, 2] += 3.0
+    reason = of(judge(setup, edited(track, position=position)), "completion").reason
+    told = float(reason.split("contradict each other at ")[1].split(" s")[0])
+    assert told in (round(float(track.time[row - 1]), 2), round(float(track.time[row]), 2))
+
+
+def test_what_is_missing_of_a_record_is_told(setup: FlightSetup, track: Track) -> None:
+    holed = join_tracks([track.rows(0, 3000), track.rows(3100, 6000), track.rows(6040, len(track))])
+    wanted = f"rows are missing from {track.time[2999]:.1f} s to {track.time[3100]:.1f} s"
+    assert wanted in of(judge(setup, holed), "completion").reason

@@ -24,3 +24,24 @@ def test_departures(setup: FlightSetup, track: Track, column: str, value: float,
     item = of(verdict, "departure")
     assert item.ok is False
     assert word in item.reason
+
+
+def test_the_steepest_bank_and_the_lowest_airspeed_are_told(setup: FlightSetup, track: Track) -> None:
+    columns = copied(track)
+    columns["attitude"][3000, 0] = math.radians(-52.0)
+    columns["airspeed"][5000] = 17.5
+    item = of(judge(setup, Track(**columns)), "departure")
+    assert (item.ok, item.reason) == (True, "bank at most 52°, airspeed at least 17.5 m/s")
+    assert (item.flown, item.margin, item.limit) == pytest.approx((52.0, 23.0, 75.0))
+
+
+def test_the_first_row_of_each_departure_is_told(setup: FlightSetup, track: Track) -> None:
+    columns = copied(track)
+    for row, bank, speed in ((3000, 80.0, 14.0), (3600, 85.0, 12.0)):
+        columns["attitude"][row, 0] = math.radians(bank)
+        columns["airspeed"][row] = speed
+    reason = of(judge(setup, Track(**columns)), "departure").reason
+    assert reason.startswith("bank 80° at 50.0 s; airspeed 14.0 m/s at 50.0 s, below 15.0 m/s")
+    columns = copied(track)
+    columns["position"][3000:3600, 2] = -5.0
+    assert "ground contact at 50.0 s" in of(judge(setup, Track(**columns)), "departure").reason

@@ -1,5 +1,7 @@
 """What PX4's feasibility checker refuses, found by the names of its checks, and which of it no autopilot flies."""
 
+from dataclasses import replace
+
 import pytest
 
 from logs.verdict.findings import Finding
@@ -126,8 +128,6 @@ def test_what_px4_only_remarks_on_does_not_fail() -> None:
 
 def test_geofence() -> None:
     """A square of 2 km around the origin, and a hole in it that the route's second place lies in."""
-    from dataclasses import replace
-
     from flight.mission.items import MissionItem
     from world.frames import to_geo
 
@@ -155,3 +155,11 @@ def test_geofence() -> None:
         assert finding.ok == (words is None)
         assert "(PX4 checkGeofence)" in finding.reason
         assert words is None or words in finding.reason
+
+
+def test_without_a_home_there_is_no_distance_to_the_first_waypoint() -> None:
+    setup = setup_of(*GOOD)
+    nowhere = replace(setup, mission=replace(setup.mission, home=None))
+    (finding,) = [item for item in judge_geometry(nowhere).findings if item.check == "checkDistanceToFirstWaypoint"]
+    assert finding.ok
+    assert "no home, so no distance to the first waypoint" in finding.reason

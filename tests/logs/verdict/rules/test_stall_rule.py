@@ -147,3 +147,26 @@ def test_in_wind_the_bank_limit_holds_on_the_way_downwind() -> None:
     scenario = make_scenario(CORNER, wind={"speed_mps": 8.0, "from_deg": 180.0})
     demands = route_demands(make_setup(CORNER, scenario=scenario))
     assert planned_bank(demands, 1, 25.0) == pytest.approx(math.radians(30.0))
+
+
+@pytest.mark.parametrize(("speeds", "at"), [([18.0, 20.0, 25.0, 25.0], 1), ([25.0, 25.0, 20.0, 18.0], 3)])
+def test_the_turn_with_the_least_margin_is_told(speeds: list[float], at: int) -> None:
+    """Three right angles: each at the slower of its legs' airspeeds, on the arc of the faster."""
+    square = [[0, 0, 300], [0, 2000, 300], [2000, 2000, 300], [2000, 4000, 300], [4000, 4000, 300]]
+    item = of(judge_geometry(make_setup(square, speeds=speeds)), "stall", FLIGHT)
+    bank = math.atan(math.tan(math.radians(30.0)) * (18.0 / 20.0) ** 2)
+    assert item.planned == 18.0
+    assert item.limit == pytest.approx(16.0 / math.sqrt(math.cos(bank)), abs=1e-3)
+    assert f"18.0 m/s at waypoint {at}, stall" in item.reason
+
+
+def test_the_moment_of_the_least_margin_is_told() -> None:
+    setup = make_setup([[0, 0, 300], [0, 2000, 300]])
+    columns = copied(fly_path(setup))
+    columns["airspeed"][1000:1180] = 20.0
+    columns["airspeed"][3000:3120] = 17.0
+    item = of(judge_flight(setup, Track(**columns), "completed"), "stall")
+    assert (item.flown, item.margin) == (pytest.approx(17.0), pytest.approx(1.0))
+    # The first mean that lies within rows 3,000 to 3,119; half of its rows later is its middle.
+    moment = float(item.reason.split("at ")[1].split(" s")[0])
+    assert 3000 / 60.0 <= moment <= 3120 / 60.0

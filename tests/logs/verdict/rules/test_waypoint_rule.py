@@ -125,3 +125,19 @@ def test_a_height_off_the_plan_is_told_and_no_miss(setup: FlightSetup, high: flo
     assert [(fact.what, fact.unit) for fact in item.facts] == [("height error", "m")]
     assert item.facts[0].value == pytest.approx(high, abs=1.0)
     assert f"{abs(item.facts[0].value):.1f} m {'above' if high > 0.0 else 'below'}" in item.reason
+
+
+@pytest.mark.parametrize(("aside", "ok", "margin"), [(15.0, True, 5.0), (30.0, False, -10.0)])
+def test_a_waypoints_margin_is_what_is_left_of_its_radius(aside: float, ok: bool, margin: float) -> None:
+    setup = accepting(make_setup(STRAIGHT), 20.0)
+    item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
+    assert (item.ok, item.margin) == (ok, pytest.approx(margin, abs=0.02))
+    assert ("20 m, and 0.6 m for navigation and gusts, count as reached (the mission's)" in item.reason) is not ok
+
+
+def test_past_the_line_beside_it_there_is_no_margin() -> None:
+    setup = replace(accepting(make_setup(STRAIGHT), 10.0), parameters=default_parameters())
+    for aside, margin in ((50.0, None), (4.0, 6.0)):
+        item = of(judge(setup, fly_path(setup, across=bump(3000.0, aside, 150.0))), "waypoint", waypoint(1))
+        assert item.ok
+        assert item.margin == (None if margin is None else pytest.approx(margin, abs=0.02))

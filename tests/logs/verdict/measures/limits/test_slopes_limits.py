@@ -173,3 +173,27 @@ def test_an_aircraft_that_has_nearly_stopped_gains_as_one_at_ten_metres_a_second
     airspeed = np.full(time.size, speed, dtype=np.float32)
     gained = lifted_speed(time, airspeed, np.ones(time.size, dtype=np.float32), time.size)
     assert gained[-1] == pytest.approx(GRAVITY * 0.19 / 10.0, rel=0.02)
+
+
+@pytest.mark.parametrize(("from_deg", "ground"), [(180.0, 33.0), (0.0, 17.0)])
+def test_an_ability_is_that_of_flight_relative_to_the_air(from_deg: float, ground: float) -> None:
+    """From 24 to 26 m/s within 200 m of a level leg: the rate v a / g, of the airspeed, at 25 m/s in the wind's slope.
+
+    Over the ground its angle is atan of the rate over the ground speed.
+    """
+    setup = make_setup(LEVEL, wind={"speed_mps": 8.0, "from_deg": from_deg})
+
+    def there(s: np.ndarray) -> np.ndarray:
+        return (s > THERE) & (s < THERE + 300.0)
+
+    track = fly_path(
+        setup,
+        throttle=lambda s: 0.4 * there(s),
+        airspeed=lambda s: np.clip((s - THERE) / 150.0 - 1.0, -1.0, 1.0),
+    )
+    found = measure_ability(*laid(setup, track), 1)
+    assert found is not None
+    # dv/dt = dv/ds ds/dt: 1 m/s in each 150 m at the ground speed.
+    rate = 25.0 * ground / 150.0 / GRAVITY
+    level = math.sqrt(25.0**2 - rate**2) + ground - 25.0
+    assert found.slope == pytest.approx(math.atan2(rate, level), rel=0.02)

@@ -1,0 +1,108 @@
+"""A path as moves: straight pieces and arcs of one curvature each, with heights that are a parabola over the way.
+
+The planned path's moves are its pieces themselves, not chords of them; a flown track's are the straight ways from row
+to row.  What judges moves judges both.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.guidance.fly_by_path import FlyByPath, arc_point
+from flight.guidance.path_kernels import profile
+from flight.simulation.track import Track
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from world.kernels import Record, Records, compiled, record_dtype
+
+Floats = NDArray[np.float64]
+
+# A move.  east, north, up: m, of its beginning.  course_east, course_north: the unit vector of its course there, both 0
+# of a move straight up or down.  length: m, horizontal.  curvature: 1/m, positive to the right.  climb, bend: m; at the
+# share f of a move the height is up + climb * f + bend * f * f.  time, lasts: s.  leg: of the route.
+MOVE = record_dtype(
+    "east",
+    "north",
+    "up",
+    "course_east",
+    "course_north",
+    "length",
+    "curvature",
+    "climb",
+    "bend",
+    "time",
+    "lasts",
+    ("leg", np.int64),
+)
+
+
+@compiled
+def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """East, north and up (m) at a share of a move."""
+    run = share * move.length
+    ahead, aside = run, 0.0
+    if move.curvature != 0.0:
+        turned = move.curvature * run
+        ahead, aside = math.sin(turned) / move.curvature, (1.0 - math.cos(turned)) / move.curvature
+    return (
+        move.east + ahead * move.course_east + aside * move.course_north,
+        move.north + ahead * move.course_north - aside * move.course_east,
+        move.up + (move.climb + move.bend * share) * share,
+    )
+
+
+def planned_moves(demands: RouteDemands) -> Records:
+    """Moves of a route's fly-by path, passed at each leg's ground speed, or its airspeed where there is none."""
+    speeds = np.where(np.isfinite(demands.ground_speed), demands.ground_speed, demands.route.airspeed)
+    return path_moves(demands.setup.path, speeds)
+
+
+def path_moves(path: FlyByPath, speeds: Floats) -> Records:
+    """Moves of a fly-by path that is passed at a speed on each leg, (legs,) m/s."""
+    nodes = path.nodes
+    breaks = np.concatenate([nodes["distance"] - nodes["half_length"], nodes["distance"] + nodes["half_length"]])
+    rows, clock = [], 0.0
+    for piece in path.pieces:
+        start, end = float(piece.start), float(piece.start + piece.length)
+        inner = breaks[(breaks > start) & (breaks < end)]
+        changes = [piece.leg_change] if start < piece.leg_change < end else []
+        cuts = np.unique(np.concatenate([[start], inner, changes, [end]]))
+        for first, last in pairwise(cuts.tolist()):
+            middle, half = 0.5 * (first + last), 0.5 * (last - first)
+            # Taken at its middle: at its ends another parabola, or another leg, may begin.
+            height, slope, bend = profile(nodes, middle)
+            east, north = arc_point(piece, first - start)
+            course = piece.course + piece.curvature * (first - start)
+            up = height - slope * half + 0.5 * bend * half * half
+            leg = int(piece.leg) + int(middle > piece.leg_change)
+            length, lasts = last - first, (last - first) / speeds[leg]
+            climb, curved = (slope - bend * half) * length, 0.5 * bend * length * length
+            rows.append(
+                (east, north, up, math.sin(course), math.cos(course), length, piece.curvature, climb, curved,
+                 clock, lasts, leg)
+            )  # fmt: skip
+            clock += lasts
+    return np.array(rows, MOVE)
+
+
+def flown_moves(aligned: AlignedTrack) -> Records:
+    """Moves of a flown track, one from each row to the next."""
+    return track_moves(aligned.track, aligned.rows)
+
+
+def track_moves(track: Track, rows: NDArray[np.int64]) -> Records:
+    """Moves of a track of t rows; rows: (w,) the one at each waypoint."""
+    step = np.diff(track.position, axis=0)
+    moves: Records = np.zeros(len(step), MOVE)
+    for axis, name in enumerate(("east", "north", "up")):
+        moves[name] = track.position[:-1, axis]
+    run = np.hypot(step[:, 0], step[:, 1])
+    moves["course_east"] = np.divide(step[:, 0], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["course_north"] = np.divide(step[:, 1], run, out=np.zeros_like(run), where=run > 0.0)
+    moves["length"], moves["climb"] = run, step[:, 2]
+    moves["time"], moves["lasts"] = track.time[:-1], np.diff(track.time)
+    # What came before the first leg belongs to it, and what came after the last to that.
+    moves["leg"] = np.searchsorted(rows[1:-1], np.arange(len(step)), side="right")
+    return moves

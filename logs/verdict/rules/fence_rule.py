@@ -1,0 +1,129 @@
+"""The fence rule: how far planned path and flight go into zones to keep out of, or out of zones to stay in.
+
+The zones are the scenario's and the mission's own fence.  The path's line is judged, its arcs, circles and jumps
+included; that the corridor about it reaches further is told beside.
+"""
+
+import math
+
+from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
+from logs.verdict.measures.airspace import Airspace
+from logs.verdict.measures.path_moves import flown_moves, planned_moves
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.places import FLIGHT, MISSION
+from logs.verdict.tolerances import ROUNDING
+from logs.verdict.wording import place_text
+from world.kernels import Record, Records
+
+_METHOD = "every point of each piece, arc and row"
+
+
+def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge each zone that plan or flight violates, or say that there is none; nothing where there are no zones."""
+    airspace = demands.airspace
+    out = []
+    if airspace.fault:
+        out.append(make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fault}"))
+    if not airspace.zones:
+        return out
+    if not geometric and aligned is None:
+        return [*out, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
+    terrain = demands.setup.scenario.terrain
+    planned = path_zones(planned_moves(demands), airspace.records, terrain)
+    flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
+    touched = []
+    for z in range(len(airspace.zones)):
+        visits = [planned[z]] if flown is None else [planned[z], flown[z]]
+        if any(visit.depth > 0.0 or visit.unknown for visit in visits):
+            touched.append(_touched(airspace, z, planned[z], None if flown is None else flown[z]))
+    if not any(item.ok is False for item in touched):
+        touched.insert(0, _kept(airspace, planned if flown is None else flown, demands.setup.corridor))
+    return out + touched
+
+
+def _kept(airspace: Airspace, visits: Records, corridor: float) -> Finding:
+    """Every zone that could be judged was kept to."""
+    count = len(airspace.zones)
+    nearest = int(visits["depth"].argmax())
+    margin = -float(visits[nearest].depth)
+    reason = f"none of {count} zones is violated" if count > 1 else "the zone is not violated"
+    facts = []
+    if math.isfinite(margin) and not visits[nearest].unknown:
+        facts = [Fact("nearest", margin, "m"), Fact("less the corridor", margin - corridor, "m")]
+        name = place_text(airspace.place(nearest))
+        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_where(visits[nearest], 'at')}"
+        if margin < corridor:
+            reason += f", within the corridor of {corridor:.0f} m about the legs"
+    return make_finding(
+        "fence",
+        FLIGHT,
+        ok=True,
+        reason=reason,
+        planned=0.0,
+        flown=0.0,
+        limit=0.0,
+        source="zones",
+        tolerance=ROUNDING,
+        margin=margin,
+        unit="m",
+        method=_METHOD,
+        facts=facts,
+    )
+
+
+def _touched(airspace: Airspace, z: int, planned: Record, flown: Record | None) -> Finding:
+    zone = airspace.zones[z]
+    visit = planned if flown is None else flown
+    ok: bool | None = visit.depth <= ROUNDING
+    if ok and visit.unknown:
+        ok = None
+    wrong, stay = ("inside", "enters it") if zone.kind == "exclusion" else ("outside", "leaves it")
+    faults, notes = [], []
+    if visit.depth > ROUNDING:
+        faults.append(
+            message(
+                f"{visit.depth:.1f} m {wrong}",
+                f" at {_where(visit, 'at')}, for {visit.beyond:.1f} s in all:"
+                f" {stay} at {_where(visit, 'entry')} and is back at {_where(visit, 'exit')}"
+                + (f"; {visit.entries} times" if visit.entries > 1 else ""),
+            )
+        )
+    elif visit.depth > 0.0:
+        notes.append("touches it")
+    if visit.unknown:
+        notes.append("the ground that it counts from is not known all along")
+    if flown is not None and planned.depth > ROUNDING:
+        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(planned, 'at')}")
+    return make_finding(
+        "fence",
+        airspace.place(z),
+        ok=ok,
+        reason=reason_of(faults, notes),
+        faults=faults,
+        planned=max(0.0, planned.depth),
+        flown=None if flown is None else max(0.0, flown.depth),
+        limit=0.0,
+        source="mission" if z >= airspace.of_scenario else "scenario",
+        tolerance=ROUNDING,
+        margin=-visit.depth,
+        unit="m",
+        method=_METHOD,
+        facts=_facts(visit) if visit.depth > ROUNDING else (),
+    )
+
+
+def _facts(visit: Record) -> list[Fact]:
+    """When and where a path goes wrong and is right again, in numbers."""
+    facts = [Fact("time beyond", visit.beyond, "s"), Fact("entries", float(visit.entries), "1")]
+    for event in ("entry", "exit"):
+        for what, unit in (("time", "s"), ("east", "m"), ("north", "m"), ("up", "m"), ("leg", "1")):
+            facts.append(Fact(f"{event} {what}", float(visit[f"{event}_{what}"]), unit))
+    return facts
+
+
+def _where(visit: Record, event: str) -> str:
+    """When and where a path was at an event of a visit, in words."""
+    time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
+    return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL (leg {visit[f'{event}_leg']})"

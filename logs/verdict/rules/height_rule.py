@@ -1,0 +1,138 @@
+"""The height rule: the greatest height above ground on each leg, and the scenario's ceiling, planned and flown.
+
+It stands where the scenario has a `max_height_m`; a ceiling alone is the bounds rule's.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from logs.verdict.findings import Finding, make_finding, message, reason_of
+from logs.verdict.measures.path_sweeps import path_clearance
+from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT, Place
+from logs.verdict.tolerances import HEIGHT_ROUNDING
+from world.terrain import Terrain
+
+Floats = NDArray[np.float64]
+
+
+def height_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+    """Judge the greatest height above ground on each leg; nothing where the scenario has no limit of it."""
+    scenario = demands.setup.scenario
+    limit, ground = scenario.limits.max_height_m, scenario.terrain
+    if limit is None:
+        return []
+    if ground is None:
+        reason = "no terrain was given, so heights above ground are not known"
+        return [make_finding("height", FLIGHT, ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
+    path = demands.path
+    way = _Way(path.points, path.times, *greatest_heights(ground, path.points))
+    planned = [_highest(way, np.flatnonzero(path.legs == leg)) for leg in range(demands.legs)]
+    if geometric:
+        return [_finding(demands, leg, limit, planned[leg], planned[leg], "fly-by path") for leg in range(demands.legs)]
+    flown: list[_Highest | None] = [None] * demands.legs
+    if aligned is not None:
+        track = aligned.track
+        way = _Way(track.position, track.time, *greatest_heights(ground, track.position))
+        flown = [
+            _highest(way, _segments(demands, aligned, leg)) if aligned.flew(leg) else None
+            for leg in range(demands.legs)
+        ]
+    return [_finding(demands, leg, limit, planned[leg], flown[leg], "flown track") for leg in range(demands.legs)]
+
+
+def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
+    """Greatest height above ground on each segment of points (n, 3), m, and the fraction of it there; (n - 1,) each.
+
+    Exact for the bilinear ground, as the least height is: it is the least of the same world upside down.  NaN where a
+    segment leaves the raster or its data.
+    """
+    upside_down = points * np.array([1.0, 1.0, -1.0])
+    low, at = path_clearance(-terrain.heights, terrain.to_pixel.record, upside_down)
+    return -low, at
+
+
+@dataclass(frozen=True, slots=True)
+class _Way:
+    """Points (n, 3) m with their times (n,) s; of each segment the greatest height above ground, and where it is."""
+
+    points: Floats
+    times: Floats
+    greatest: Floats
+    fraction: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class _Highest:
+    """Of a leg, m: the greatest height above ground, NaN where none is known, and above the sea.
+
+    where: when and where the first is, in words.  known: whether the ground is, all along.
+    """
+
+    height: float
+    amsl: float
+    where: str
+    known: bool
+
+
+def _highest(way: _Way, segments: NDArray[np.intp]) -> _Highest | None:
+    """What some segments of a way come to; None for none."""
+    if not segments.size:
+        return None
+    amsl = float(max(way.points[segments, 2].max(), way.points[segments + 1, 2].max()))
+    heights = way.greatest[segments]
+    known = np.isfinite(heights)
+    if not known.any():
+        return _Highest(math.nan, amsl, "", False)
+    k = int(segments[np.nanargmax(heights)])
+    time, place = ((1.0 - way.fraction[k]) * one[k] + way.fraction[k] * one[k + 1] for one in (way.times, way.points))
+    where = f"at {time:.1f} s, east {place[0]:.0f} m, north {place[1]:.0f} m"
+    return _Highest(float(way.greatest[k]), amsl, where, bool(known.all()))
+
+
+def _segments(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
+    """Segments of the track on a leg: the first leg has what came before it, the last what came after."""
+    first = 0 if leg == 0 else int(aligned.rows[leg])
+    last = len(aligned.track) - 1 if leg + 1 == demands.legs else int(aligned.rows[leg + 1])
+    return np.arange(first, last)
+
+
+def _finding(
+    demands: RouteDemands, leg: int, limit: float, planned: _Highest | None, judged: _Highest | None, by: str
+) -> Finding:
+    faults, facts, ok = [], [], None
+    if judged is None:
+        facts.append("the leg was not flown")
+    else:
+        ceiling = demands.setup.scenario.ceiling
+        high = f"{judged.height:.1f} m above ground {judged.where}"
+        if judged.height > limit + HEIGHT_ROUNDING:
+            faults.append(message(high, f"; {limit:g} m are allowed"))
+        elif math.isfinite(judged.height):
+            facts.append(f"{high} at the highest")
+        if judged.amsl > ceiling + HEIGHT_ROUNDING:
+            faults.append(message(f"{judged.amsl:.1f} m AMSL", f", above the scenario's ceiling of {ceiling:.0f} m"))
+        if not judged.known:
+            facts.append("part of the ground below it is not known")
+        ok = False if faults else True if judged.known else None
+    if planned is not None and planned is not judged and planned.height > limit + HEIGHT_ROUNDING:
+        facts.append(f"the planned path comes up to {planned.height:.1f} m")
+    return make_finding(
+        "height",
+        Place("leg", leg),
+        ok=ok,
+        reason=reason_of(faults, facts),
+        faults=faults,
+        planned=None if planned is None else planned.height,
+        flown=None if judged is None or judged is planned else judged.height,
+        limit=limit,
+        source="scenario",
+        tolerance=HEIGHT_ROUNDING,
+        margin=None if judged is None else limit - judged.height,
+        unit="m",
+        method=f"exact along the {by}",
+    )

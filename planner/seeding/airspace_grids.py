@@ -1,0 +1,251 @@
+"""Cheapest routes over grids among zones and within a band of heights above ground, in the rotated frame.
+
+A dynamic programme over forward steps, as `planner.seeding.grid_kernels` is, but its layers follow the ground where a
+greatest height above it is to be kept, and each step is asked by itself whether it passes a zone: what lies between two
+cells may be narrower than they are apart.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.airspace.kept_zones import KeptZones, first_near
+from planner.airspace.zone_depths import inside_depth
+from planner.airspace.zone_reach import MapSegment, line_between, reach_of
+from planner.evaluation.clearance_buffer import clearance_at, required_below, required_clearance
+from planner.evaluation.encoding import RotatedFrame
+from planner.evaluation.leg_constraints import slope_limits
+from planner.evaluation.problem_arrays import ProblemArrays
+from planner.seeding.grid_kernels import SIDEWAYS
+from planner.seeding.grid_prices import KILL_COST, find_obstacles, position_of
+from world.kernels import Record, Records, compiled
+from world.terrain import ground_height
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int32]
+
+# A m of way at the edge of the band costs this share more than in its middle: legs are longer than a grid's steps.
+EDGE_COST = 0.3
+# A place on a grid: its ground, and the lowest and highest that a path may be there, m; lowest > highest for none.
+COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
+
+
+class AirspaceGrid(NamedTuple):
+    """One resolution: places across (m from the line) at each of stages + 1 places along, and layers of height.
+
+    pitch: between layers, m.  The first layer is at the lowest height allowed where `follows`, else at `floor` (m).
+    """
+
+    stages: int
+    across: Floats
+    layers: int
+    pitch: float
+    follows: bool
+    floor: float
+
+
+class _Passage(NamedTuple):
+    """Heights closed to a step, m: from low to high; low > high for none."""
+
+    low: float
+    high: float
+
+
+@compiled
+def _column(
+    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
+) -> None:  # pragma: no cover - compiled
+    """Fill the `COLUMN` record of a place."""
+    east, north = position_of(frame, along, across)
+    column.lowest, column.highest = math.inf, -math.inf
+    if not (data.west <= east <= data.east and data.south <= north <= data.north):
+        return
+    ground = ground_height(data.heights, data.to_pixel, east, north)
+    if math.isnan(ground):
+        return
+    column.ground = ground
+    column.lowest = max(data.floor, ground + clearance_at(required_clearance(data), east, north))
+    column.highest = data.ceiling
+    if grid.follows:
+        column.highest = min(data.ceiling, ground - clearance_at(required_below(data), east, north))
+    zones = data.airspace.zones
+    for z in range(zones.inclusions):
+        zone, keeps = zones.records.zones[z], zones.kept[z]
+        column.lowest = max(column.lowest, zone.floor + keeps.beyond + (ground if zone.floor_above_ground else 0.0))
+        top = zone.ceiling - keeps.beyond + (ground if zone.ceiling_above_ground else 0.0)
+        column.highest = min(column.highest, top)
+
+
+@compiled
+def _passage(
+    zones: KeptZones, line: MapSegment, beside: float, ground: float
+) -> _Passage:  # pragma: no cover - compiled
+    """Heights that zones close to a level line; beside: m kept from them beside their margins."""
+    low, high = math.inf, -math.inf
+    for z in range(zones.inclusions):
+        wanted = zones.kept[z].beside + beside
+        reach = reach_of(zones.records, z, line, wanted)
+        if not reach.inside or reach.distance < wanted:
+            return _Passage(-math.inf, math.inf)
+    most = zones.beside + beside
+    to_east, to_north = line.east + line.run * line.course_east, line.north + line.run * line.course_north
+    west, east = min(line.east, to_east) - most, max(line.east, to_east) + most
+    south, north = min(line.north, to_north) - most, max(line.north, to_north) + most
+    for z in range(first_near(zones, west), zones.kept.shape[0]):
+        zone, keeps = zones.records.zones[z], zones.kept[z]
+        if zone.west > east:
+            break
+        if zone.east < west or zone.south > north or zone.north < south:
+            continue
+        depth, _, _ = inside_depth(zones.records, z, line, keeps.beside + beside)
+        if depth > 0.0:
+            low = min(low, zone.floor - keeps.beyond + (ground if zone.floor_above_ground else 0.0))
+            high = max(high, zone.ceiling + keeps.beyond + (ground if zone.ceiling_above_ground else 0.0))
+    return _Passage(low, high)
+
+
+@compiled
+def _slopes(data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float) -> Floats:  # pragma: no cover
+    """Tangents (sideways, 2) of the steepest climb and dive of each step at a height, m."""
+    out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
+    a[0], a[1] = frame.east, frame.north
+    a[2], b[2] = amsl, amsl
+    for side in range(-SIDEWAYS, SIDEWAYS + 1):
+        b[0], b[1] = position_of(frame, step, side * step)
+        climb, dive = slope_limits(data, a, b)
+        out[side + SIDEWAYS, 0], out[side + SIDEWAYS, 1] = math.tan(climb), math.tan(dive)
+    return out
+
+
+@compiled
+def _set_cell_prices(
+    grid: AirspaceGrid, columns: Records, obstacles: Records, along: float, extra: Floats, price: Floats
+) -> None:  # pragma: no cover - compiled
+    """Cost per m of a stage's cells price (across, layers); inf where a path may not be."""
+    for y in range(grid.across.size):
+        column = columns[y]
+        first = column.lowest if grid.follows else grid.floor
+        middle, half = 0.5 * (column.lowest + column.highest), 0.5 * (column.highest - column.lowest)
+        for z in range(grid.layers):
+            up = first + z * grid.pitch
+            if not column.lowest <= up <= column.highest:
+                price[y, z] = math.inf
+                continue
+            price[y, z] = 1.0 + extra[y]
+            if grid.follows:
+                price[y, z] += EDGE_COST * ((up - middle) / max(half, 1e-6)) ** 2
+            for k in range(obstacles.shape[0]):
+                obstacle = obstacles[k]
+                away2 = (along - obstacle.along) ** 2 + (grid.across[y] - obstacle.across) ** 2
+                away2 += (up - obstacle.up) ** 2
+                if away2 < obstacle.radius * obstacle.radius:
+                    price[y, z] += KILL_COST * (3.0 - 2.0 * math.sqrt(away2) / obstacle.radius)
+
+
+@compiled
+def _step_on(
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: AirspaceGrid,
+    stage: int,
+    before: Records,
+    columns: Records,
+    cost: Floats,
+    price: Floats,
+    after: Floats,
+    came: Codes,
+) -> None:  # pragma: no cover - compiled
+    """Relax one stage: costs (across, layers) before and after it, and the cell (across x layers) that each came from.
+
+    before, columns: `COLUMN` records (across,) of the stage before and of this one.
+    """
+    step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
+    beside = float(data.tracking.across)
+    slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]))
+    for y in range(wide):
+        if not np.isfinite(cost[y]).any():
+            continue
+        east, north = position_of(frame, (stage - 1) * step, grid.across[y])
+        first = before[y].lowest if grid.follows else grid.floor
+        for side in range(-SIDEWAYS, SIDEWAYS + 1):
+            to = y + side
+            if not 0 <= to < wide or columns[to].lowest > columns[to].highest:
+                continue
+            to_first = columns[to].lowest if grid.follows else grid.floor
+            run = step * math.sqrt(1.0 + side * side)
+            to_east, to_north = position_of(frame, stage * step, grid.across[to])
+            closed = _Passage(math.inf, -math.inf)
+            if zones.kept.shape[0] > 0:
+                closed = _passage(zones, line_between(east, north, to_east, to_north), beside, before[y].ground)
+            climb, dive = slopes[side + SIDEWAYS, 0] * run, slopes[side + SIDEWAYS, 1] * run
+            for z in range(grid.layers):
+                if cost[y, z] == math.inf:
+                    continue
+                up = first + z * grid.pitch
+                lowest = max(0, math.ceil((up - dive - to_first) / grid.pitch))
+                highest = min(grid.layers - 1, math.floor((up + climb - to_first) / grid.pitch))
+                for z2 in range(lowest, highest + 1):
+                    rise = to_first + z2 * grid.pitch - up
+                    if max(up, up + rise) > closed.low and min(up, up + rise) < closed.high:
+                        continue
+                    total = cost[y, z] + math.sqrt(run * run + rise * rise) * price[to, z2]
+                    if total < after[to, z2]:
+                        after[to, z2] = total
+                        came[to, z2] = y * grid.layers + z
+
+
+@compiled
+def cheapest_airspace_route(
+    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, extra: Floats, bound: float
+) -> tuple[Floats, float]:  # pragma: no cover - compiled
+    """Points (stages + 1, 3) along, across and up of the cheapest route over a grid, and its cost; none: (0, 3), inf.
+
+    extra: (stages + 1, across) added to the cost per m.  bound: the most that it may cost.
+    """
+    stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
+    home = int(np.argmin(np.abs(grid.across)))
+    obstacles = find_obstacles(data, frame, step)
+    columns = np.zeros((stages + 1, wide), dtype=COLUMN)
+    cells = np.full((stages + 1, wide, grid.layers), -1, dtype=np.int32)
+    cost, after = np.full((wide, grid.layers), math.inf), np.full((wide, grid.layers), math.inf)
+    price = np.full((wide, grid.layers), math.inf)
+    for y in range(wide):
+        _column(data, frame, grid, 0.0, grid.across[y], columns[0, y])
+    cost[home, _layer(grid, columns[0, home], data.start[2])] = 0.0
+    for stage in range(1, stages + 1):
+        along = stage * step
+        for y in range(wide):
+            _column(data, frame, grid, along, grid.across[y], columns[stage, y])
+        _set_cell_prices(grid, columns[stage], obstacles, along, extra[stage], price)
+        if stage == stages:
+            price[home, _layer(grid, columns[stage, home], data.destination[2])] = 1.0
+        after[:] = math.inf
+        _step_on(data, frame, grid, stage, columns[stage - 1], columns[stage], cost, price, after, cells[stage])
+        for y in range(wide):
+            left = math.sqrt((frame.length - along) ** 2 + grid.across[y] ** 2)
+            for z in range(grid.layers):
+                if after[y, z] + left > bound:
+                    after[y, z] = math.inf
+        cost, after = after, cost
+    points = np.empty((stages + 1, 3))
+    y, z = home, _layer(grid, columns[stages, home], data.destination[2])
+    total = cost[y, z]
+    if total == math.inf:
+        return np.empty((0, 3)), math.inf
+    for stage in range(stages, -1, -1):
+        first = columns[stage, y].lowest if grid.follows else grid.floor
+        points[stage, 0], points[stage, 1], points[stage, 2] = stage * step, grid.across[y], first + z * grid.pitch
+        if stage > 0:
+            code = cells[stage, y, z]
+            y, z = code // grid.layers, code % grid.layers
+    return points, total
+
+
+@compiled
+def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: no cover - compiled
+    """The layer that is nearest to a height, m."""
+    first = column.lowest if grid.follows else grid.floor
+    layer: int = min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
+    return layer

@@ -1,0 +1,1 @@
+"""Benchmarks among zones and within bands of heights above ground."""

@@ -1,0 +1,84 @@
+"""``python -m tests.kernels``: compile what most tests run, once, before each of pytest's workers would.
+
+The planner's kernels in one process and those of flights, verdicts and reports in another: they are not each other's.
+They stay in the cache for all later processes; where they are there already this takes seconds.
+"""
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+# A climb and a corner over the level field of FIELD.
+MISSION = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0.0\t1
+1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100.0\t1
+2\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.0\t110.0\t1
+3\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.006\t110.0\t1
+"""
+FIELD = """name = "field"
+[terrain]
+kind = "flat"
+amsl_m = 0
+[area]
+east_m = [-3000, 3000]
+north_m = [-3000, 3000]
+ceiling_amsl_m = 600
+[start]
+east_m = 0
+north_m = 0
+height_m = 100
+[destination]
+east_m = 500
+north_m = 0
+height_m = 100
+[[threats]]
+name = "post"
+east_m = 2000
+north_m = -2000
+amsl_m = 50
+kill_radius_m = 100
+kill_scale_m = 50
+[wind]
+speed_mps = 3
+from_deg = 250
+turbulence = "light"
+"""
+FLY = ("fly", "field.waypoints", "--scenario", "field.toml", "--overwrite")
+# Commands one after the other, of each process.
+PROCESSES = (
+    (("plan", "tight", "--out", "plan.json"),),
+    (
+        (*FLY, "--log", "ardupilot.mcap"),
+        (*FLY, "--log", "path.mcap", "--guidance", "path"),
+        (*FLY, "--log", "l1.mcap", "--guidance", "l1"),
+        (*FLY, "--log", "field.mcap", "--guidance", "vector-field"),
+        ("replay", "path.mcap"),
+        ("report", "path.mcap", "--out", "report"),
+    ),
+)
+
+
+def main() -> int:
+    """Run them; 1 where a command fails otherwise than by its verdict."""
+    if len(sys.argv) > 1:
+        return _run(PROCESSES[int(sys.argv[1])])
+    with tempfile.TemporaryDirectory(prefix="planfly-kernels-") as name:
+        folder = Path(name)
+        (folder / "field.toml").write_text(FIELD, encoding="utf-8")
+        (folder / "field.waypoints").write_text(MISSION, encoding="utf-8")
+        environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        command = [sys.executable, "-m", "tests.kernels"]
+        started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]
+        return max(one.wait() for one in started)
+
+
+def _run(commands: tuple[tuple[str, ...], ...]) -> int:
+    from planfly.cli import main as planfly
+
+    return int(any(planfly(list(argv)) not in (0, 4) for argv in commands))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,188 @@
+"""How a path meets a zone, by plain sums: depths, times, places of entry and exit, on lines and arcs, over slopes."""
+
+import math
+
+import numpy as np
+import pytest
+
+from logs.verdict.measures.path_moves import MOVE
+from logs.verdict.measures.zone_visits import path_zones
+from world.airspace.zone_kernels import zone_records
+from world.airspace.zones import Cylinder, Polygon, Zone, ZoneLevel, make_polygon
+from world.kernels import Record, Records
+from world.terrain import Terrain, flat_terrain, gridded
+
+BOX = ((0.0, 0.0), (400.0, 0.0), (400.0, 200.0), (0.0, 200.0))
+
+
+def move(
+    east: float, north: float, up: float, *, course: float = 90.0, length: float = 0.0, lasts: float = 10.0,
+    curvature: float = 0.0, climb: float = 0.0, bend: float = 0.0, time: float = 0.0, leg: int = 0,
+) -> tuple[float, ...]:  # fmt: skip
+    u, v = (math.sin(math.radians(course)), math.cos(math.radians(course))) if length else (0.0, 0.0)
+    return (east, north, up, u, v, length, curvature, climb, bend, time, lasts, leg)
+
+
+def visit(moves: list[tuple[float, ...]], zone: Zone, terrain: Terrain | None = None) -> Record:
+    made: Records = np.array(moves, MOVE)
+    return path_zones(made, zone_records([zone]), terrain)[0]
+
+
+def box(kind: str = "exclusion", *, floor: ZoneLevel | None = None, ceiling: ZoneLevel | None = None) -> Zone:
+    return Zone("box", "exclusion" if kind == "exclusion" else "inclusion", Polygon((BOX,)), floor, ceiling)
+
+
+def slope(rise: float) -> Terrain:
+    """Ground that rises this many m per m to the east, 0 m at east 0."""
+    east, north = np.linspace(-2000.0, 2000.0, 41), np.linspace(-2000.0, 2000.0, 41)
+    return gridded(np.tile(rise * east, (41, 1)), east, north, source="slope", sha256="", datum="")
+
+
+@pytest.mark.parametrize("aside", [80.0, 20.0, 5.0, 0.5])
+def test_a_way_through_a_box(aside: float) -> None:
+    # 1,000 m to the east in 50 s: 300 m to the western edge, 400 m inside.
+    found = visit([move(-300.0, aside, 100.0, length=1000.0, lasts=50.0)], box())
+    assert found.depth == pytest.approx(min(aside, 100.0), abs=0.011)
+    assert (found.entry_time, found.exit_time) == pytest.approx((15.0, 35.0), abs=1e-4)
+    assert (found.entry_east, found.entry_north, found.exit_east) == pytest.approx((0.0, aside, 400.0), abs=2e-3)
+    assert found.beyond == pytest.approx(20.0, abs=1e-4)
+    assert (found.entries, found.unknown) == (1, False)
+
+
+@pytest.mark.parametrize("aside", [-0.05, -5.0, -300.0, 205.0])
+def test_a_way_beside_a_box(aside: float) -> None:
+    found = visit([move(-300.0, aside, 100.0, length=1000.0)], box())
+    assert found.depth == pytest.approx(aside if aside < 0.0 else 200.0 - aside, abs=0.011)
+    assert (found.entries, found.beyond) == (0, 0.0)
+
+
+def test_a_corner_that_is_cut_by_a_metre_of_way_is_found() -> None:
+    # Across the corner at (0, 0) at 45 degrees, 0.5 m inside: a metre of a 2 km way.
+    off = 0.5 * math.sqrt(0.5)
+    away = 1000.0 * math.sqrt(0.5)
+    found = visit([move(off - away, off + away, 100.0, course=135.0, length=2000.0, lasts=2000.0)], box())
+    assert found.entries == 1
+    assert found.beyond == pytest.approx(1.0, abs=1e-3)
+    # Deepest at half a metre from the corner along the diagonal: 0.35 m from either edge.
+    assert found.depth == pytest.approx(off, abs=0.011)
+
+
+def test_an_arc_between_its_chords_ends() -> None:
+    # A quarter of a circle of 500 m about (0, 0), from its north to its east; a zone of 3 m at its middle, outside by
+    # 1 m or reached by 1 m: the chord passes it at 146 m.
+    radius, middle = 500.0, 500.0 * math.sqrt(0.5)
+    arc = move(0.0, radius, 0.0, length=radius * math.pi / 2.0, curvature=1.0 / radius, lasts=100.0)
+    for out, inside in ((4.0, False), (2.0, True)):
+        place = middle * (radius + out) / radius
+        found = visit([arc], Zone("post", "exclusion", Cylinder(place, place, 3.0)))
+        assert found.depth == pytest.approx(3.0 - out, abs=0.011)
+        assert (found.entries == 1) == inside
+        assert found.at_time == pytest.approx(50.0, abs=0.5)
+
+
+def test_a_blend_between_its_ends_heights() -> None:
+    # A parabola from 100 m to 100 m that comes up to 125 m at its middle.
+    hump = move(0.0, 100.0, 100.0, length=400.0, climb=100.0, bend=-100.0)
+    for floor, depth in ((126.0, -1.0), (124.0, 1.0)):
+        found = visit([hump], box(floor=ZoneLevel(floor, "amsl")))
+        assert found.depth == pytest.approx(depth, abs=0.011)
+        # 1 m below its top the parabola is 2/25 of its length wide, the square root of 1/25 on either side of it.
+        assert found.beyond == pytest.approx(2.0 if depth > 0.0 else 0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", ["exclusion", "inclusion"])
+def test_a_climb_through_a_band(kind: str) -> None:
+    # 300 m up in 30 s, on the spot: 50 m from the nearest edge; the band is 100 m to 160 m.
+    zone = box(kind, floor=ZoneLevel(100.0, "amsl"), ceiling=ZoneLevel(160.0, "amsl"))
+    found = visit([move(50.0, 100.0, 0.0, climb=300.0, lasts=30.0)], zone)
+    if kind == "exclusion":
+        assert found.depth == pytest.approx(30.0, abs=0.011)
+        assert (found.entry_time, found.exit_time, found.beyond) == pytest.approx((10.0, 16.0, 6.0), abs=1e-3)
+    else:
+        assert found.depth == pytest.approx(140.0, abs=0.011)
+        assert (found.entries, found.entry_time, found.exit_time) == (2, 0.0, 30.0)
+        assert found.beyond == pytest.approx(24.0, abs=1e-3)
+
+
+def test_several_ways_out_of_an_inclusion() -> None:
+    # East, 100 m beyond the box on both sides, and back, on two legs.
+    there = move(-100.0, 100.0, 50.0, length=600.0, lasts=60.0)
+    back = move(500.0, 100.0, 50.0, course=270.0, length=600.0, lasts=60.0, time=60.0, leg=1)
+    found = visit([there, back], box("inclusion"))
+    assert found.depth == pytest.approx(100.0, abs=0.011)
+    # 10 s to the box; 20 s beyond it, at its end and on the way back; 10 s at the end.
+    assert (found.entries, found.beyond) == (3, pytest.approx(40.0, abs=1e-3))
+    assert (found.entry_time, found.exit_time, found.exit_leg) == (0.0, 120.0, 1)
+
+
+def test_a_hole_is_outside() -> None:
+    hole = [(100.0, 50.0), (300.0, 50.0), (300.0, 150.0), (100.0, 150.0)]
+    zone = Zone("ring", "exclusion", make_polygon([list(BOX), hole]))
+    found = visit([move(-100.0, 100.0, 0.0, length=600.0, lasts=60.0)], zone)
+    assert (found.entries, found.beyond) == (2, pytest.approx(20.0, abs=1e-3))
+    assert found.depth == pytest.approx(50.0, abs=0.011)
+
+
+def test_levels_above_a_slope() -> None:
+    # Level at 150 m over ground of 0.2 m per m: 150 m above it at the box's west, 70 m at its east.
+    way = [move(-100.0, 100.0, 150.0, length=600.0, lasts=60.0)]
+    # Below 100 m above ground from east 250 m on.
+    found = visit(way, box(ceiling=ZoneLevel(100.0, "ground")), slope(0.2))
+    assert (found.entry_east, found.exit_east) == pytest.approx((250.0, 400.0), abs=2e-3)
+    # d m below the ceiling at 5 d m from there: d m from the eastern edge too where 5 d + d = 150 m.
+    assert found.depth == pytest.approx(25.0, abs=0.011)
+    # An inclusion up to 100 m above ground is left until there.
+    wide = [(-500.0, -500.0), (900.0, -500.0), (900.0, 700.0), (-500.0, 700.0)]
+    low = Zone("low", "inclusion", make_polygon([wide]), None, ZoneLevel(100.0, "ground"))
+    held = visit(way, low, slope(0.2))
+    assert (held.exit_east, held.depth) == pytest.approx((250.0, 70.0), abs=0.011)
+
+
+def test_a_ridge_between_two_looks_is_seen() -> None:
+    # 130 m above level ground and a ceiling of 100 m above it, with one ridge of 40 m, a pixel wide, under the way.
+    east = np.linspace(-1000.0, 1000.0, 201)
+    heights = np.zeros((201, 201))
+    heights[:, 121] = 40.0  # at east 210 m
+    ridge = gridded(heights, east, east, source="ridge", sha256="", datum="")
+    found = visit(
+        [move(-100.0, 100.0, 130.0, length=600.0, lasts=600.0)], box(ceiling=ZoneLevel(100.0, "ground")), ridge
+    )
+    # 30 m of the ridge's 40 m: the uppermost quarter of its two sides of 10 m.
+    assert found.depth == pytest.approx(10.0, abs=0.011)
+    assert (found.entry_east, found.exit_east) == pytest.approx((207.5, 212.5), abs=2e-3)
+
+
+def test_unknown_ground_is_not_judged() -> None:
+    way = [move(-100.0, 100.0, 130.0, length=600.0, lasts=60.0)]
+    for terrain in (None, flat_terrain(np.array([[-5000.0, -4000.0], [0.0, 1.0]]), 0.0, 10.0)):
+        found = visit(way, box(ceiling=ZoneLevel(100.0, "ground")), terrain)
+        assert (found.unknown, found.entries) == (True, 0)
+        # Beside its shape a zone is not violated whatever the ground.
+        beside = visit([move(-100.0, -30.0, 130.0, length=600.0)], box(ceiling=ZoneLevel(100.0, "ground")), terrain)
+        assert (beside.unknown, beside.depth) == (False, pytest.approx(-30.0, abs=0.011))
+
+
+def test_of_many_zones_each_is_judged_by_itself() -> None:
+    rng = np.random.default_rng(3)
+    zones = [
+        Zone(f"z{k}", "exclusion", Cylinder(float(e), float(n), float(r)))
+        for k, (e, n, r) in enumerate(zip(*rng.uniform(-5000, 5000, (2, 300)), rng.uniform(50, 300, 300), strict=True))
+    ]
+    way = [move(-5000.0 + 10.0 * k, 0.0, 0.0, length=10.0, lasts=1.0, time=float(k)) for k in range(1000)]
+    found = path_zones(np.array(way, MOVE), zone_records(zones), None)
+    depths = []
+    for zone, one in zip(zones, found, strict=True):
+        assert isinstance(zone.shape, Cylinder)
+        beside = abs(zone.shape.north)
+        ahead = max(0.0, abs(zone.shape.east) - 5000.0)
+        depths.append(zone.shape.radius - math.hypot(beside, ahead))
+        if depths[-1] > 0.0:
+            assert one.depth == pytest.approx(depths[-1], abs=0.011)
+            chord = min(2.0 * math.sqrt(zone.shape.radius**2 - beside**2), 10_000.0)
+            inside = min(5000.0, zone.shape.east + chord / 2.0) - max(-5000.0, zone.shape.east - chord / 2.0)
+            assert one.beyond == pytest.approx(inside / 10.0, abs=0.01)
+        else:
+            # No less than it is, and not beyond the limit.
+            assert depths[-1] - 0.011 <= one.depth <= 0.0
+            assert one.entries == 0
+    assert 5 < sum(depth > 0.0 for depth in depths) < 100

@@ -1,0 +1,146 @@
+"""Zones kept to and violated, planned and flown, by plain sums on a route of straight legs."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flight.mission.items import Command, Frame, MissionItem
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.places import FLIGHT, MISSION, Place
+from tests.logs.verdict.judging import ROUTE, judge, of
+from tests.synthetic import edited, fly_path, make_setup
+from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
+
+# Beside the first leg, which leads north from 0 to 2 km at 25 m/s: its western edge is 5 m east of it.
+BESIDE = make_polygon([[(5.0, 500.0), (400.0, 500.0), (400.0, 1000.0), (5.0, 1000.0)]])
+# The same, over the leg: it is entered at 500 m and left at 1,000 m, 10 m deep.
+OVER = make_polygon([[(-10.0, 500.0), (400.0, 500.0), (400.0, 1000.0), (-10.0, 1000.0)]])
+
+
+def within_zones(*zones: Zone, **how: Any) -> FlightSetup:
+    setup = make_setup(ROUTE, **how)
+    return replace(setup, scenario=replace(setup.scenario, zones=zones))
+
+
+def findings(setup: FlightSetup, track: Track | None = None) -> list[Finding]:
+    verdict = judge_geometry(setup) if track is None else judge(setup, track)
+    return [item for item in verdict.findings if item.rule == "fence"]
+
+
+def facts(item: Finding) -> dict[str, float]:
+    return {fact.what: fact.value for fact in item.facts}
+
+
+def test_without_zones_there_is_nothing_to_say(setup: FlightSetup, track: Track) -> None:
+    assert findings(setup) == findings(setup, track) == []
+
+
+def test_a_zone_beside_the_path_is_kept_to() -> None:
+    (item,) = findings(within_zones(Zone("yard", "exclusion", BESIDE)))
+    assert (item.ok, item.place, item.planned, item.unit) == (True, FLIGHT, 0.0, "m")
+    assert item.margin == pytest.approx(5.0, abs=0.011)
+    # The corridor about the legs is 30 m wide on either side.
+    assert facts(item) == pytest.approx({"nearest": 5.0, "less the corridor": -25.0}, abs=0.011)
+    assert item.reason.startswith("the zone is not violated; the nearest, yard (exclusion), is 5.0 m away at ")
+    assert item.reason.endswith(", within the corridor of 30 m about the legs")
+
+
+def test_a_planned_path_through_a_zone() -> None:
+    far = Zone("far", "exclusion", Cylinder(9000.0, 0.0, 50.0))
+    (item,) = findings(within_zones(far, Zone("yard", "exclusion", OVER)))
+    assert (item.ok, item.place, item.limit_source) == (False, Place("exclusion", 1, name="yard"), "scenario")
+    assert item.planned == pytest.approx(10.0, abs=0.011)
+    assert item.margin == pytest.approx(-10.0, abs=0.011)
+    known = facts(item)
+    assert known["time beyond"] == pytest.approx(20.0, abs=1e-3)
+    assert (known["entry north"], known["exit north"]) == pytest.approx((500.0, 1000.0), abs=2e-3)
+    assert (known["entry time"], known["exit time"]) == pytest.approx((20.0, 40.0), abs=1e-3)
+    assert (known["entries"], known["entry leg"], known["exit leg"], known["entry up"]) == (1, 0, 0, 300.0)
+    assert item.brief == "10.0 m inside"
+    assert "enters it at 20.0 s, east 0 m, north 500 m, 300 m AMSL (leg 0)" in item.reason
+
+
+def test_a_flight_off_its_path_is_judged_by_its_track() -> None:
+    setup = within_zones(Zone("yard", "exclusion", BESIDE))
+    clean = fly_path(setup)
+    kept = of(judge(setup, clean), "fence")
+    assert (kept.ok, kept.margin) == (True, pytest.approx(5.0, abs=0.02))
+    east = edited(clean, position=clean.position + np.array([12.0, 0.0, 0.0]))
+    (item,) = findings(setup, east)
+    assert (item.ok, item.planned) == (False, 0.0)
+    assert item.flown == pytest.approx(7.0, abs=0.02)
+    assert facts(item)["time beyond"] == pytest.approx(20.0, abs=0.02)
+    # The other way round: the plan goes in, and the flight does not.
+    setup = within_zones(Zone("yard", "exclusion", OVER))
+    kept, item = findings(setup, edited(clean, position=clean.position - np.array([12.0, 0.0, 0.0])))
+    assert (kept.ok, kept.place, kept.margin) == (True, FLIGHT, pytest.approx(2.0, abs=0.02))
+    assert (item.ok, item.flown, item.place.name) == (True, 0.0, "yard")
+    assert item.reason.startswith("the planned path is 10.0 m inside at ")
+
+
+def test_what_was_planned_is_told_where_the_flight_fails_too() -> None:
+    setup = within_zones(Zone("yard", "exclusion", OVER))
+    (item,) = findings(setup, fly_path(setup))
+    assert (item.planned, item.flown) == pytest.approx((10.0, 10.0), abs=0.02)
+    assert "(the planned path is 10.0 m inside at " in item.reason
+
+
+def test_an_inclusion_that_is_left() -> None:
+    # 100 m short of the route's easternmost point, which is its end.
+    field = make_polygon([[(-500.0, -500.0), (3400.0, -500.0), (3400.0, 7000.0), (-500.0, 7000.0)]])
+    (item,) = findings(within_zones(Zone("field", "inclusion", field)))
+    assert (item.ok, item.place) == (False, Place("inclusion", 0, name="field"))
+    assert item.planned == pytest.approx(100.0, abs=0.011)
+    assert facts(item)["exit leg"] == 3
+    assert item.brief == "100.0 m outside"
+    assert "leaves it at " in item.reason
+
+
+def test_heights_above_and_below_a_band_do_not_count() -> None:
+    # The first leg is level at 300 m.
+    for floor, ceiling, ok, margin in (
+        (None, 295.0, True, 5.0), (None, 305.0, False, -5.0), (305.0, None, True, 5.0), (295.0, None, False, -5.0),
+    ):  # fmt: skip
+        low, high = (None if level is None else ZoneLevel(level, "ground") for level in (floor, ceiling))
+        (item,) = findings(within_zones(Zone("layer", "exclusion", Cylinder(0.0, 1000.0, 200.0), low, high)))
+        assert (item.ok, item.margin) == (ok, pytest.approx(margin, abs=0.011))
+
+
+def test_the_missions_own_fence_is_judged() -> None:
+    setup = make_setup(ROUTE)
+    middle = 46.0 + 1000.0 / 111_146.0  # a degree of latitude there is 111,146 m
+    params = (50.0, 0.0, 0.0, 0.0)
+    fence = MissionItem(7, int(Command.NAV_FENCE_CIRCLE_EXCLUSION), int(Frame.GLOBAL), params, middle, 8.0, 0.0)
+    setup = replace(setup, mission=replace(setup.mission, fences=(fence,)))
+    (item,) = findings(setup)
+    assert (item.ok, item.place, item.limit_source) == (False, Place("exclusion", 0, name="fence item 7"), "mission")
+    assert item.planned == pytest.approx(50.0, abs=0.02)
+    assert facts(item)["time beyond"] == pytest.approx(100.0 / 25.0, abs=1e-3)
+
+
+def test_a_fence_that_is_none_is_not_judged() -> None:
+    setup = make_setup(ROUTE)
+    fence = MissionItem(2, int(Command.NAV_FENCE_CIRCLE_EXCLUSION), int(Frame.GLOBAL), (0.0,) * 4, 46.0, 8.0, 0.0)
+    (item,) = findings(replace(setup, mission=replace(setup.mission, fences=(fence,))))
+    assert (item.ok, item.place) == (None, MISSION)
+    assert "fence item 2: radius 0 m" in item.reason
+
+
+def test_unknown_ground_is_not_judged() -> None:
+    setup = within_zones(Zone("low", "exclusion", Cylinder(0.0, 1000.0, 200.0), None, ZoneLevel(120.0, "ground")))
+    rest, item = findings(replace(setup, scenario=replace(setup.scenario, terrain=None)))
+    assert (item.ok, item.place.name) == (None, "low")
+    assert item.reason == "the ground that it counts from is not known all along"
+    assert rest.ok is True
+
+
+def test_nothing_flown_is_nothing_judged() -> None:
+    setup = within_zones(Zone("yard", "exclusion", OVER))
+    track = fly_path(setup)
+    (item,) = findings(setup, edited(track, position=np.full_like(track.position, np.nan)))
+    assert (item.ok, item.place, item.reason) == (None, FLIGHT, "nothing was flown")

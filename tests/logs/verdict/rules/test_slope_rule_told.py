@@ -1,0 +1,153 @@
+"""What the slope rule tells of a leg: climbs and dives by turns, their limits in wind, and throttle at a limit."""
+
+import math
+
+import pytest
+
+from logs.verdict.findings import Finding
+from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures.leg_fits import LegFit
+from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.slopes import Ability, SlopeMeasure
+from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.rules import slope_rule
+from logs.verdict.rules.slope_rule import slope_findings
+from tests.logs.verdict.judging import leg, of
+from tests.synthetic import fly_path, make_setup
+
+
+def hill(slope_deg: float, run: float = 2000.0) -> list[list[float]]:
+    top = 900.0 + run * math.tan(math.radians(slope_deg))
+    return [[0, 0, 900], [0, 1000, 900], [0, 1000 + run, top], [0, 2500 + run, top]]
+
+
+def judged(
+    measure: SlopeMeasure,
+    monkeypatch: pytest.MonkeyPatch,
+    slope: float,
+    *,
+    envelope: bool = False,
+    **world: object,
+) -> Finding:
+    """The finding of a leg of this slope (degrees) that is measured so."""
+    setup = make_setup(hill(slope), **world)
+    demands = route_demands(setup, envelope=envelope)
+    monkeypatch.setattr(slope_rule, "measure_slope", lambda *_: measure)
+    return slope_findings(demands, lay_track(demands, fly_path(setup, rate=5.0)))[1]
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(0.9, False), (1.1, True)])
+@pytest.mark.parametrize("limit", ["full", "idle"])
+def test_throttle_at_a_limit_is_told_from_a_second_on(
+    limit: str, seconds: float, told: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    measure = SlopeMeasure(**{f"at_{limit}": seconds}, finished=True)
+    item = judged(measure, monkeypatch, 5.0, envelope=True)
+    assert (f"throttle at {limit} for 1 s" in item.reason) is told
+    assert {fact.what: fact.value for fact in item.facts}[f"throttle at {limit}"] == seconds
+
+
+@pytest.mark.parametrize(("planned", "limit"), [(7.9, 8.0), (-4.9, 5.0)])
+@pytest.mark.parametrize(("beyond", "ok"), [(0.09, True), (0.11, False)])
+def test_a_slope_as_flown_is_within_the_limit_of_its_own_direction(
+    planned: float, limit: float, beyond: float, ok: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And a tenth of a degree that its fit may be off."""
+    flown = math.copysign(limit + beyond, planned)
+    fit = LegFit(math.radians(flown), math.radians(0.1), 1500.0, fitted=True)
+    limits = {"max_climb_deg": 8.0, "max_dive_deg": 5.0}
+    item = judged(SlopeMeasure(slope=fit, finished=True), monkeypatch, planned, limits=limits)
+    assert item.ok is ok
+    assert (item.flown, item.limit) == (pytest.approx(flown), math.copysign(limit, planned))
+    if not ok:
+        assert item.reason.startswith(f"flown {flown:+.1f}°, beyond {limit:.1f}°")
+        assert item.margin == pytest.approx(-beyond)
+
+
+@pytest.mark.parametrize(
+    ("slope", "shown", "at", "ok"),
+    [
+        (5.0, 7.0, "full", True),  # slow at full throttle in a climb that it can exceed: sinking air
+        (5.0, 5.2, "full", False),
+        (5.0, 7.0, "idle", False),
+        (-5.0, 7.0, "idle", True),
+        (-5.0, 5.2, "idle", False),
+        (-5.0, 7.0, "full", False),
+    ],
+)
+def test_air_takes_speed_where_the_aircraft_showed_more_than_the_leg_asks(
+    slope: float, shown: float, at: str, ok: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By more than three standard errors of a tenth of a degree, at the throttle limit of that direction."""
+    ability = Ability(math.radians(shown), math.radians(0.1), 20.0)
+    off = {"slow": 2.0} if at == "full" else {"fast": 2.0}
+    measure = SlopeMeasure(**{f"at_{at}": 8.0}, **off, ability=ability, finished=True)
+    item = judged(measure, monkeypatch, slope)
+    assert item.ok is ok
+    if not ok:
+        way = "slow" if at == "full" else "fast"
+        assert f"throttle at {at} for 8 s and 2.0 m/s too {way}" in item.reason
+
+
+@pytest.mark.parametrize(("slope", "what"), [(6.0, "full throttle the aircraft showed that it can climb"), (-6.0, "")])
+def test_an_ability_too_small_is_told_with_its_direction(
+    slope: float, what: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = Ability(math.radians(4.0), math.radians(0.05), 20.0)
+    for envelope in (True, False):
+        item = judged(SlopeMeasure(ability=shown, finished=True), monkeypatch, slope, envelope=envelope)
+        assert item.ok is False
+        wanted = what or "idle throttle the aircraft showed that it can sink"
+        assert f"in 20 s at {wanted} 4.0° at 25 m/s here; the leg asks for 6.0°" in item.reason
+
+
+def test_height_above_and_below_the_leg(monkeypatch: pytest.MonkeyPatch) -> None:
+    for error, side in ((12.0, "above"), (-12.0, "below")):
+        item = judged(SlopeMeasure(height_error=error, finished=True), monkeypatch, 3.0)
+        assert f"12 m {side} the leg" in item.reason
+        assert item.ok is False
+
+
+def test_a_leg_not_flown_to_its_end_is_not_judged_unless_it_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert judged(SlopeMeasure(), monkeypatch, 3.0, envelope=True).ok is None
+    assert judged(SlopeMeasure(), monkeypatch, 20.0, envelope=True).ok is False
+
+
+@pytest.mark.parametrize(
+    ("slope", "from_deg", "blows"),
+    [
+        (16.0, 180.0, "10 m/s tailwind"),
+        (-9.0, 180.0, "10 m/s tailwind"),
+        (25.0, 0.0, "10 m/s headwind"),
+        (-15.0, 0.0, "10 m/s headwind"),
+        (16.0, 270.0, "10 m/s crosswind"),
+        (16.0, 230.0, "8 m/s crosswind"),
+        (16.0, 220.0, "8 m/s tailwind"),
+    ],
+)
+def test_the_wind_on_a_steep_leg_is_named_beside_what_calm_air_allows(
+    slope: float, from_deg: float, blows: str
+) -> None:
+    """tan = 25 sin c / (sqrt((25 cos c)^2 - cross^2) + tail), c the angle in calm air: 13.7 degrees up, 7.8 down."""
+    setup = make_setup(hill(slope), wind={"speed_mps": 10.0, "from_deg": from_deg})
+    item = of(judge_geometry(setup), "slope", leg(1))
+    calm = math.radians(13.7 if slope > 0.0 else 7.8)
+    tail, cross = -10.0 * math.cos(math.radians(from_deg)), 10.0 * math.sin(math.radians(from_deg))
+    level = math.sqrt((25.0 * math.cos(calm)) ** 2 - cross**2) + tail
+    limit = math.degrees(math.atan2(25.0 * math.sin(calm), level))
+    assert abs(item.limit or 0.0) == pytest.approx(limit, abs=0.01)
+    asks = f"leg 1 {'climbs' if slope > 0.0 else 'falls'} {abs(slope):.1f}° for 2.0 km; at 25 m/s"
+    assert item.reason.startswith(asks)
+    assert f"{math.degrees(calm):.1f}° in calm air but" in item.reason
+    assert f"in this {blows}" in item.reason
+
+
+@pytest.mark.parametrize(("run", "said"), [(999.0, "for 999 m;"), (1000.0, "for 1.0 km;")])
+def test_a_kilometre_is_said_in_kilometres(run: float, said: str) -> None:
+    assert said in of(judge_geometry(make_setup(hill(20.0, run))), "slope", leg(1)).reason
+
+
+def test_a_leg_straight_up_says_its_height() -> None:
+    points = [[0, 0, 300], [0, 1500, 300], [0, 1500.45, 360], [0, 3000, 360]]
+    reason = of(judge_geometry(make_setup(points)), "slope", leg(1)).reason
+    assert reason.startswith("leg 1 climbs 60 m on the spot")

@@ -1,0 +1,224 @@
+"""Distances to zones, compiled: of a place, and along a segment, exact on straight edges and circles.
+
+Zones are records and their polygons' edges are records of one array, so that a kernel reads one zone after the other.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from world.airspace.zones import Cylinder, Zone, ZoneLevel
+from world.kernels import Record, Records, compiled, inlined, record_dtype
+
+# One zone.  round: whether it is a cylinder, of which `centre_east`, `centre_north` and `radius` say all.  first_edge,
+# last_edge: its edges in the array of edges, the last not included.  west to north: its box on the map.  floor,
+# ceiling: m, -inf and inf where there is none; above mean sea level, or above ground where the field beside it says so.
+ZONE = record_dtype(
+    ("exclusion", np.bool_),
+    ("round", np.bool_),
+    "centre_east",
+    "centre_north",
+    "radius",
+    ("first_edge", np.int64),
+    ("last_edge", np.int64),
+    "west",
+    "east",
+    "south",
+    "north",
+    "floor",
+    "ceiling",
+    ("floor_above_ground", np.bool_),
+    ("ceiling_above_ground", np.bool_),
+)
+# One edge of a polygon: from a corner to the next, m.  The inside is to its left.
+EDGE = record_dtype("east", "north", "to_east", "to_north")
+
+
+class ZoneRecords(NamedTuple):
+    """Zones for compiled code: (z,) of `ZONE` in the order they were given, and (e,) of `EDGE`, all polygons' edges."""
+
+    zones: Records
+    edges: Records
+
+
+def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
+    """Zones as the records that kernels read.
+
+    >>> records = zone_records([Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))])
+    >>> float(records.zones[0].north), len(records.edges)
+    (700.0, 0)
+    """
+    out: Records = np.zeros(len(zones), ZONE)
+    edges: list[tuple[float, float, float, float]] = []
+    for record, zone in zip(out, zones, strict=True):
+        record.exclusion = zone.kind == "exclusion"
+        record.floor, record.floor_above_ground = _level(zone.floor, -math.inf)
+        record.ceiling, record.ceiling_above_ground = _level(zone.ceiling, math.inf)
+        record.first_edge = len(edges)
+        shape = zone.shape
+        if isinstance(shape, Cylinder):
+            record.round, record.radius = True, shape.radius
+            record.centre_east, record.centre_north = shape.east, shape.north
+            record.west, record.east = shape.east - shape.radius, shape.east + shape.radius
+            record.south, record.north = shape.north - shape.radius, shape.north + shape.radius
+        else:
+            for ring in shape.rings:
+                edges += [(*corner, *after) for corner, after in zip(ring, (*ring[1:], ring[0]), strict=True)]
+            corners = np.array([corner for ring in shape.rings for corner in ring])
+            record.west, record.south = corners.min(axis=0)
+            record.east, record.north = corners.max(axis=0)
+        record.last_edge = len(edges)
+    made: Records = np.array(edges, EDGE)
+    for array in (out, made):
+        array.setflags(write=False)
+    return ZoneRecords(out, made)
+
+
+def _level(level: ZoneLevel | None, absent: float) -> tuple[float, bool]:
+    return (absent, False) if level is None else (level.height, level.datum == "ground")
+
+
+@inlined
+def box_distance(
+    records: ZoneRecords, z: int, west: float, east: float, south: float, north: float
+) -> float:  # pragma: no cover - compiled
+    """Horizontal distance between zone z's box and another box, m; 0 where they meet."""
+    zone = records.zones[z]
+    across = max(0.0, zone.west - east, west - zone.east)
+    along = max(0.0, zone.south - north, south - zone.north)
+    return math.sqrt(across * across + along * along)
+
+
+@compiled
+def edge_distance(records: ZoneRecords, z: int, east: float, north: float) -> float:  # pragma: no cover - compiled
+    """Horizontal distance from a place to zone z's outline, m; negative inside its shape."""
+    zone = records.zones[z]
+    if zone.round:
+        out = math.sqrt((east - zone.centre_east) ** 2 + (north - zone.centre_north) ** 2)
+        return float(out - zone.radius)
+    nearest2 = math.inf
+    inside = False
+    for k in range(zone.first_edge, zone.last_edge):
+        edge = records.edges[k]
+        step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
+        off_e, off_n = east - edge.east, north - edge.north
+        share = (off_e * step_e + off_n * step_n) / (step_e * step_e + step_n * step_n)
+        share = min(1.0, max(0.0, share))
+        off_e -= share * step_e
+        off_n -= share * step_n
+        away2 = off_e * off_e + off_n * off_n
+        nearest2 = away2 if away2 < nearest2 else nearest2
+        # A ray to the east: an edge counts with its lower end and without its upper.
+        if (edge.north > north) != (edge.to_north > north) and edge.east + step_e * (
+            north - edge.north
+        ) / step_n > east:
+            inside = not inside
+    return -math.sqrt(nearest2) if inside else math.sqrt(nearest2)
+
+
+@inlined
+def outside_band(zone: Record, up: float, ground: float) -> float:  # pragma: no cover - compiled
+    """Height below a zone's floor or above its ceiling, m; negative between them, by the nearer.
+
+    zone: a record of `ZONE`.  up: m above mean sea level.  ground: height of the ground there, NaN where it is not
+    known, which a zone with levels above ground makes NaN of.
+    """
+    floor: float = zone.floor + ground if zone.floor_above_ground else zone.floor
+    ceiling: float = zone.ceiling + ground if zone.ceiling_above_ground else zone.ceiling
+    below, above = floor - up, up - ceiling
+    # Written so that NaN stays.
+    return below if below > above or below != below else above
+
+
+@compiled
+def inside_share(
+    records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float, first: float, last: float
+) -> float:  # pragma: no cover - compiled
+    """Share of the segment a-b that lies inside zone z's shape on the map, of its part from ``first`` to ``last``.
+
+    first, last: shares of the segment, 0 and 1 for all of it.  Exact: the way goes in and out of a shape in turns, so
+    that the shares at which it goes out, each brought between first and last, less those at which it goes in, are the
+    share inside.  It counts a way along an edge as outside on the edge's right and inside on its left.
+    """
+    zone = records.zones[z]
+    dx, dy = bx - ax, by - ay
+    if zone.round:
+        off_e, off_n = ax - zone.centre_east, ay - zone.centre_north
+        run2, along = dx * dx + dy * dy, dx * off_e + dy * off_n
+        beside = off_e * off_e + off_n * off_n - zone.radius * zone.radius
+        if run2 == 0.0:
+            return last - first if beside <= 0.0 else 0.0
+        square = along * along - run2 * beside
+        if square <= 0.0:
+            return 0.0
+        half = math.sqrt(square) / run2
+        enter = min(last, max(first, -along / run2 - half))
+        leave = min(last, max(first, -along / run2 + half))
+        return float(leave - enter)
+    if dx == 0.0 and dy == 0.0:
+        return last - first if edge_distance(records, z, ax, ay) <= 0.0 else 0.0
+    inside = 0.0
+    for k in range(zone.first_edge, zone.last_edge):
+        edge = records.edges[k]
+        # Heights of both ends of the edge on the left of the line through the segment, times its length.
+        before = dx * (edge.north - ay) - dy * (edge.east - ax)
+        after = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
+        if (before > 0.0) == (after > 0.0):
+            continue
+        step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
+        # The edge leads from the line's left to its right, or back: with its inside on its left the line goes in, or
+        # out, there.
+        share = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
+        share = min(last, max(first, share))
+        inside += -share if before > 0.0 else share
+    return max(0.0, inside)
+
+
+@inlined
+def _between(
+    edge: Record, ax: float, ay: float, dx: float, dy: float, run2: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Squared distance of the nearer of an edge's first corner and the segment, and the share of the segment there."""
+    share = ((edge.east - ax) * dx + (edge.north - ay) * dy) / run2 if run2 > 0.0 else 0.0
+    share = min(1.0, max(0.0, share))
+    off_e, off_n = ax + share * dx - edge.east, ay + share * dy - edge.north
+    return off_e * off_e + off_n * off_n, share
+
+
+@compiled
+def segment_distance(
+    records: ZoneRecords, z: int, ax: float, ay: float, bx: float, by: float
+) -> tuple[float, float]:  # pragma: no cover - compiled
+    """Least horizontal distance from the segment a-b to zone z's shape, m, and the share of the segment where it is.
+
+    0 where the segment meets the shape, at a share inside it or on its outline; `edge_distance` says how deep.  Exact:
+    two straight pieces that do not cross are nearest at an end of one of them.
+    """
+    zone = records.zones[z]
+    dx, dy = bx - ax, by - ay
+    run2 = dx * dx + dy * dy
+    if zone.round:
+        share = ((zone.centre_east - ax) * dx + (zone.centre_north - ay) * dy) / run2 if run2 > 0.0 else 0.0
+        share = min(1.0, max(0.0, share))
+        return max(0.0, edge_distance(records, z, ax + share * dx, ay + share * dy)), share
+    from_a, from_b = edge_distance(records, z, ax, ay), edge_distance(records, z, bx, by)
+    if from_a <= 0.0:
+        return 0.0, 0.0
+    if from_b <= 0.0:
+        return 0.0, 1.0
+    best, best_at = (from_a, 0.0) if from_a <= from_b else (from_b, 1.0)
+    for k in range(zone.first_edge, zone.last_edge):
+        edge = records.edges[k]
+        away2, share = _between(edge, ax, ay, dx, dy, run2)
+        if away2 < best * best:
+            best, best_at = math.sqrt(away2), share
+        before = dx * (edge.north - ay) - dy * (edge.east - ax)
+        after = dx * (edge.to_north - ay) - dy * (edge.to_east - ax)
+        if (before > 0.0) != (after > 0.0):
+            step_e, step_n = edge.to_east - edge.east, edge.to_north - edge.north
+            share = ((edge.east - ax) * step_n - (edge.north - ay) * step_e) / (dx * step_n - dy * step_e)
+            if 0.0 <= share <= 1.0:
+                return 0.0, share
+    return best, best_at
