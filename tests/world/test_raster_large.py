@@ -11,7 +11,8 @@ import pytest
 import rasterio
 from numpy.typing import NDArray
 from rasterio.windows import Window
-from tests.world.elevation_files import from_origin
+
+from tests.world.made.elevation_files import from_origin
 
 SIDE, PITCH = 10_000, 1.0 / 3600.0
 WEST, NORTH = 8.0, 48.0
