@@ -16,6 +16,8 @@ def place_text(place: Place) -> str:
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
+    >>> place_text(Place("exclusion", 0, name="town"))
+    'town (exclusion)'
     """
     match place:
         case Place("mission", item=int(item)):
@@ -47,6 +49,10 @@ def change_text(change: Change) -> str:
     'make leg 1 400 m long instead of 300 m'
     >>> change_text(Change("airspeed", Place("leg", 2), 36.0, 18.1, "m/s", most=31.5))
     'command 18.1 to 31.5 m/s on leg 2'
+    >>> change_text(Change("north", Place("exclusion", 0, name="town"), None, 40.0, "m"))
+    'pass town 40 m further north'
+    >>> change_text(Change("descent", Place("leg", 3), None, 12.0, "m"))
+    'fly leg 3 12 m lower'
     """
     where, wanted = place_text(change.place), change.wanted
     match change.what:

@@ -20,7 +20,7 @@ def geojson_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]
 
     >>> square = '{"type": "Polygon", "coordinates": [[[8, 46], [8.01, 46], [8.01, 46.01], [8, 46]]]}'
     >>> [(where, entries["name"], len(entries["rings_deg"][0])) for where, entries in geojson_zones(square, "a file")]
-    [('geometry', 'zone 1', 4)]
+    [('geometry (zone 1)', 'zone 1', 4)]
     """
     try:
         data = json.loads(text, parse_constant=_no_number)

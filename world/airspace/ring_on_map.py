@@ -23,7 +23,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     >>> len(ring_on_map(origin, [(46.0, 8.0), (46.0, 8.01), (46.01, 8.0)]))
     3
     >>> len(ring_on_map(origin, [(46.0, 8.0), (46.0, 8.1), (46.01, 8.0)]))
-    10
+    9
     """
     if not corners:
         return []

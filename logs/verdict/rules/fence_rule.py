@@ -39,13 +39,13 @@ def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geome
         if any(visit.depth > 0.0 or visit.unknown for visit in visits):
             touched.append(_touched(airspace, z, planned[z], None if flown is None else flown[z]))
     if not any(item.ok is False for item in touched):
-        touched.insert(0, _kept(airspace, planned if flown is None else flown, demands.setup.corridor))
+        touched.insert(0, _kept(airspace, planned, flown, demands.setup.corridor))
     return out + touched
 
 
-def _kept(airspace: Airspace, visits: Records, corridor: float) -> Finding:
+def _kept(airspace: Airspace, planned: Records, flown: Records | None, corridor: float) -> Finding:
     """Every zone that could be judged was kept to."""
-    count = len(airspace.zones)
+    count, visits = len(airspace.zones), planned if flown is None else flown
     nearest = int(visits["depth"].argmax())
     margin = -float(visits[nearest].depth)
     reason = f"none of {count} zones is violated" if count > 1 else "the zone is not violated"
@@ -61,8 +61,8 @@ def _kept(airspace: Airspace, visits: Records, corridor: float) -> Finding:
         FLIGHT,
         ok=True,
         reason=reason,
-        planned=0.0,
-        flown=0.0,
+        planned=max(0.0, float(planned["depth"].max())),
+        flown=None if flown is None else max(0.0, float(flown["depth"].max())),
         limit=0.0,
         source="zones",
         tolerance=ROUNDING,

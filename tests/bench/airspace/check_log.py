@@ -19,8 +19,9 @@ from flight.simulation.flight_setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.verdict.judge_flight import judge_flight
-from tests.bench.timing import median_time
+from tests.bench.timing import median_cpu, median_time
 from tests.synthetic import fly_path, make_setup
+from world.scenario import from_spec
 
 SEED = 12
 LEG = 2000.0
@@ -67,8 +68,6 @@ def setup_of(hours: float, zones: list[dict[str, Any]], points: np.ndarray) -> F
     peaks = [{"east_m": float(e), "north_m": float(n), "height_m": 200.0, "sigma_m": 600.0} for e, n in spots]
     setup = make_setup(points, terrain={"kind": "peaks", "peak": peaks}, area_margin=3000.0)
     spec = setup.scenario.to_json() | ({"zones": zones} if zones else {})
-    from world.scenario import from_spec
-
     return replace(setup, scenario=from_spec(spec, "bench", ground=setup.scenario.terrain))
 
 
@@ -85,17 +84,22 @@ def run(count: int = ZONES, corners: int = CORNERS, hours: float = 1.0) -> dict[
             recorder = Recorder(path, setup)
             recorder.write(track)
             recorder.finish("completed", judge_flight(setup, track, "completed"), None)
-            record[f"read, {name}"] = median_time(lambda path=path: read_log(path), 3)
             log = read_log(path)
-            record[f"judge, {name}"] = median_time(lambda log=log: judge_flight(log.setup, log.track, "completed"), 3)
+            work = {
+                f"read, {name}": lambda path=path: read_log(path),
+                f"judge, {name}": lambda log=log: judge_flight(log.setup, log.track, "completed"),
+            }
+            for part, done in work.items():
+                record[part], record[f"{part}, CPU"] = median_time(done, 3), median_cpu(done, 3)
             verdict = judge_flight(log.setup, log.track, "completed")
             found = [item for item in verdict.findings if item.rule == "fence"]
             record[f"violated, {name}"] = float(sum(item.ok is False for item in found))
             record["rows"] = float(len(log.track))
-    record["check"] = record["read, with zones"] + record["judge, with zones"]
+    for kind in ("", ", CPU"):
+        record[f"check{kind}"] = record[f"read, with zones{kind}"] + record[f"judge, with zones{kind}"]
     print(f"\nCheck of a log of {record['rows']:,.0f} rows, {count:,} zones of {corners} corners")
     for name, value in record.items():
-        print(f"  {name:24} {value:8.2f}")
+        print(f"  {name:28} {value:8.2f}")
     return record
 
 

@@ -21,7 +21,7 @@ def test_what_ends_a_flight_comes_before_what_a_plan_may_be_mended_by() -> None:
     assert headline(found[-4:], False) == (
         "not flyable: departure (why), completion (why), landing (why), energy (why)"
     )
-    assert headline(found, False).endswith(", +12 more")
+    assert headline(found, False).endswith(", +14 more")
     assert headline(found, False).startswith("not flyable: departure (why), completion (why), mission (why), slope (")
 
 
