@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from logs.recording.foxglove_layout import layout_text
-from logs.recording.recorder import _CHANNELS
+from logs.recording.recorder import _CHANNELS, ZONES_TOPIC
 from logs.recording.state_channel import FIELDS, STATE_TOPIC
 from tests.clients import need
 
@@ -15,7 +15,7 @@ from tests.clients import need
 def test_the_layout_names_only_topics_and_fields_of_a_log() -> None:
     layout = json.loads(layout_text())
     fields = {field.name for field in FIELDS}
-    topics = {*_CHANNELS, STATE_TOPIC}
+    topics = {*_CHANNELS, STATE_TOPIC, ZONES_TOPIC}
     for name, panel in layout["configById"].items():
         for path in panel.get("paths", ()):
             topic, _, field = path["value"].partition(".")

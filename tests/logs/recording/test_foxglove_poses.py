@@ -10,6 +10,7 @@ from flight.simulation.track import Track
 from logs.recording.chunk_layout import SECOND_NS
 from logs.recording.foxglove_scene import body_rotation
 from logs.recording.state_channel import EPOCH_NS
+from tests.logs.made_flight import make_setup, record
 from tests.logs.recording.mcap_messages import messages
 from world.frames import to_geo
 
@@ -49,3 +50,10 @@ def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
     line = found["/scene/track"][-1][1].entities[0].lines[0]
     assert (line.points[-1].x, line.points[-1].y) == tuple(track.position[-1, :2])
     assert [(item.level, item.message) for _, item in found["/log"]] == [(3, "half way up"), (2, "arrived")]
+
+
+def test_a_log_has_a_scene_of_zones_where_its_scenario_has_zones(tmp_path: Path, track: Track) -> None:
+    zone = {"name": "town", "kind": "exclusion", "east_m": 0, "north_m": 0, "radius_m": 200}
+    found = messages(record(tmp_path / "zones.mcap", make_setup(zones=[zone]), track))
+    ((_, update),) = found["/scene/zones"]
+    assert [text.text for text in update.entities[0].texts] == ["town"]
