@@ -51,9 +51,12 @@ def lattice_ratios(seeds: Sequence[int]) -> dict[str, dict[str, float]]:
     return {str(seed): known[str(seed)] for seed in seeds}
 
 
-def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int) -> dict[str, Any]:
-    """Runs of each algorithm on each instance; prints a table and returns it."""
-    lattice = lattice_ratios(seeds)
+def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int, *, with_lattice: bool = True) -> dict[str, Any]:
+    """Runs of each algorithm on each instance; prints a table and returns it.
+
+    with_lattice: whether the lattice is searched too; without it best known is the best of the runs.
+    """
+    lattice = lattice_ratios(seeds) if with_lattice else {}
     ratios = np.full((len(algorithms), len(seeds), runs), np.nan)
     seconds = np.zeros(ratios.shape)
     for at, seed in enumerate(seeds):
@@ -65,14 +68,15 @@ def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int) -> dict[
                 seconds[row, at, run] = time.process_time() - began
                 if plan.safe:
                     ratios[row, at, run] = plan.objectives[Objective.LENGTH_RATIO]
-    other = np.array([item["ratio"] or np.nan for item in lattice.values()])
+    other = np.array([item["ratio"] or np.nan for item in lattice.values()] or [np.nan] * len(seeds))
     best = np.fmin(other, np.fmin.reduce(ratios, axis=(0, 2)))
     solvable = np.isfinite(best)
     print(f"\n{len(seeds)} instances from seed {seeds[0]}, {runs} runs each; {solvable.sum()} solved by any method")
     print(f"  {'method':<24}{'solved':>10}{'/ best: median':>16}{'90 %':>8}{'worst':>8}{'CPU s':>8}{'most':>7}")
     record: dict[str, Any] = {"seeds": list(seeds), "runs": runs, "solvable": int(solvable.sum())}
     rows = [(name, ratios[row], seconds[row]) for row, name in enumerate(algorithms)]
-    rows.append(("lattice, many starts", other[:, None], np.array([[item["cpu_s"]] for item in lattice.values()])))
+    if lattice:
+        rows.append(("lattice, many starts", other[:, None], np.array([[item["cpu_s"]] for item in lattice.values()])))
     for name, found, spent in rows:
         over = (found / best[:, None])[solvable].ravel()
         safe = over[np.isfinite(over)]
@@ -96,13 +100,14 @@ def main() -> None:
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")
     parser.add_argument("--count", type=int, default=60, help="instances")
     parser.add_argument("--runs", type=int, default=1, help="seeds of each algorithm on each")
+    parser.add_argument("--without-lattice", action="store_true", help="best known is the best of the runs")
     parser.add_argument("--algorithms", nargs="+", default=[DEFAULT, "fda"])
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.count)
     if args.algorithms == ["none"]:
         lattice_ratios(seeds)
         return
-    measure(list(seeds), args.algorithms, args.runs)
+    measure(list(seeds), args.algorithms, args.runs, with_lattice=not args.without_lattice)
 
 
 if __name__ == "__main__":
