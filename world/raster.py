@@ -40,6 +40,8 @@ PIXEL_TOLERANCE = 1e-3
 METRES = ("m", "metre", "metres", "meter", "meters")
 # A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
 MOST_BLOCK = 32 * 2**20
+# Pixels of a window that are read before the next ones: numbers and masks take several times the heights' own memory.
+_PIXELS_AT_ONCE = 2**22
 # Pixels without data that are looked at before the next ones: one inside the area is enough.
 _HOLES_AT_ONCE = 2**16
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
@@ -221,6 +223,8 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         "CPL_VSIL_CURL_ALLOWED_EXTENSIONS": ".none",
         # The vertical part of the reference system too, for its unit.
         "GTIFF_REPORT_COMPD_CS": "YES",
+        # Of blocks once unpacked, bytes; the default is a share of the machine's memory.
+        "GDAL_CACHEMAX": 64 * 2**20,
     }
     try:
         with warnings.catch_warnings(), rasterio.Env(**guard):
@@ -257,14 +261,19 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         return np.asarray(col) - 0.5, np.asarray(row) - 0.5
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
+        heights = np.empty((bottom - top, right - left), dtype=np.float32)
+        at_once = max(1, _PIXELS_AT_ONCE // (right - left))
         try:
             with rasterio.Env(**guard), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
-                block = opened.read(1, window=Window(left, top, right - left, bottom - top), masked=True)
+                for row in range(top, bottom, at_once):
+                    rows = min(at_once, bottom - row)
+                    strip = opened.read(1, window=Window(left, row, right - left, rows), masked=True)
+                    # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
+                    whole = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
+                    heights[row - top : row - top + rows] = whole
         except (RasterioError, RasterioIOError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {one_line(error)}") from error
-        heights = np.ma.filled(block.astype(np.float64), np.nan)
-        # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
-        return np.asarray(heights * scale + offset, dtype=np.float32)
+        return heights
 
     col, row = outline(cols, rows)
     x, y = _applied(forward, col + 0.5, row + 0.5)

@@ -35,8 +35,23 @@ ALGORITHMS: dict[str, Algorithm] = {
     item.name: item
     for item in (
         Algorithm(
+            "fda-seeded",
+            "the default: waypoints ranked by the best path through each, beside seeds from grid routes",
+            graded=True,
+            seeded=True,
+            tightened=True,
+            optimiser="waypoints",
+        ),
+        Algorithm(
+            "fda",
+            "the same without seeds: an estimation of distribution algorithm that needs no grids",
+            graded=True,
+            tightened=True,
+            optimiser="waypoints",
+        ),
+        Algorithm(
             "umda-seeded",
-            "the default: smooth UMDA in the rotated frame, started from grid routes over terrain and threats",
+            "smooth UMDA in the rotated frame, started from grid routes over terrain and threats",
             graded=True,
             smooth=True,
             seeded=True,
@@ -47,13 +62,6 @@ ALGORITHMS: dict[str, Algorithm] = {
             "UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds",
             graded=True,
             smooth=True,
-        ),
-        Algorithm(
-            "fda",
-            "no seeds: waypoints of each interval joined to the best paths, each ranked by the best path through it",
-            graded=True,
-            tightened=True,
-            optimiser="waypoints",
         ),
         Algorithm(
             "emna-seeded",
@@ -116,13 +124,13 @@ ALGORITHMS: dict[str, Algorithm] = {
         Algorithm("umda-bearing", "the same on steps and their angles from the straight line", encoding="bearing"),
     )
 }
-DEFAULT = "umda-seeded"
+DEFAULT = "fda-seeded"
 
 
 def algorithm_lines() -> str:
     """The algorithms, one line each: name and summary.
 
-    >>> print(algorithm_lines().splitlines()[1])
+    >>> print(algorithm_lines().splitlines()[3])
       umda-smooth     UMDA in the rotated frame, graded violations, sampled in a smooth basis, no seeds
     """
     width = max(len(name) for name in ALGORITHMS)
@@ -135,7 +143,7 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     source: what asked for it, as the error's first words.
 
     >>> find_algorithm(None, "example.toml").name, find_algorithm("umda-polar", "example.toml").encoding
-    ('umda-seeded', 'polar')
+    ('fda-seeded', 'polar')
     """
     found = ALGORITHMS.get(DEFAULT if name is None else name)
     if found is None:

@@ -13,7 +13,7 @@ from planner.search.algorithms import find_algorithm
 from planner.search.limits_for import limits_for
 from planner.search.path_generations import path_generations
 from planner.search.score_table import no_scores
-from planner.search.search_state import Archive, Improved, Search, SearchProgress, StopCondition
+from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition
 from planner.search.seeds import starting_vectors, straight_line
 from planner.search.waypoint_generations import waypoint_generations
 from world.errors import ScenarioError
@@ -61,7 +61,8 @@ def plan_path(
 
     algorithm: a name of `planner.search.algorithms.ALGORITHMS`; None takes the scenario's, or the default.
     progress: called with generations done, generations in all, and a short text.
-    stop: asked between generations; a text ("interrupted") ends the search with the best path yet, and stands in it.
+    stop: asked every few hundredths of a second; a text ("interrupted") ends the search with the best path yet, and
+        stands in it.
     improved: called with each path (w, 3) that meets the constraints better than all before it, not yet certified.
     first_safe: end with the first safe path.
     previous: (w, 3) an older path of the same ends and number of waypoints to start from.
@@ -99,7 +100,10 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
     for number in range(len(attempts)):
         if number > 0:
             _retry(search, number)
-        _attempt(search, number, previous)
+        try:
+            _attempt(search, number, previous)
+        except SearchEnded:
+            search.note()
         found = search.best_certified()
         # An earlier attempt's is kept where a later one has nothing better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):

@@ -26,6 +26,12 @@ Improved = Callable[[Floats], None]
 
 # Paths that are kept.
 ARCHIVE_SIZE = 24
+# Waypoints of paths that are evaluated before the search may end: some 10 ms.
+WAYPOINTS_AT_ONCE = 4000
+
+
+class SearchEnded(Exception):
+    """Raised in the midst of a search that is asked to end; its archive holds what it has found."""
 
 
 @dataclass(slots=True)
@@ -106,15 +112,35 @@ class Search:
         return score_table(*evaluate(self.problem.search, paths))
 
     def evaluate(self, vectors: Floats) -> Floats:
-        """Scores (n, 8) of vectors (n, d); the archive takes them."""
-        scores = self.score(vectors)
+        """Scores (n, 8) of vectors (n, d); the archive takes them.  Raises SearchEnded when asked to end."""
+        at_once, scores = max(1, WAYPOINTS_AT_ONCE // self.encoding.waypoints), no_scores()
+        for first in range(0, len(vectors), at_once):
+            scores = np.concatenate([scores, self.score(vectors[first : first + at_once])])
+            if len(scores) < len(vectors) and self._asked_to_end():
+                break
+        self._take(vectors[: len(scores)], scores)
+        if len(scores) < len(vectors):
+            raise SearchEnded
+        return scores
+
+    def pause(self) -> None:
+        """Raise SearchEnded if the search is asked to end and has anything to show."""
+        if len(self.archive.scores) and self._asked_to_end():
+            raise SearchEnded
+
+    def _asked_to_end(self) -> bool:
+        reason = self.stop() if self.stop is not None else ""
+        self.ended = reason or self.ended
+        return bool(reason)
+
+    def _take(self, vectors: Floats, scores: Floats) -> None:
+        """Count what was evaluated, and let it into the archive."""
         self.evaluations += len(vectors)
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
         best = self.archive.vectors[:1]
         if self.improved is not None and self.archive.feasible() and not np.array_equal(before, best):
             self.improved(self.encoding.decode(best)[0])
-        return scores
 
     def improve(self, vector: Floats, most: int) -> Floats:
         """Tighten a vector (d,) by a pattern search; the archive takes what it finds.  Gives the best scores (8,)."""

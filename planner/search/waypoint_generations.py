@@ -23,8 +23,9 @@ from planner.seeding.waypoint_chains import WaypointChains, open_places, waypoin
 
 Floats = NDArray[np.float64]
 
-# Generations at most: the last moves waypoints by decimetres.
-MOST_GENERATIONS = 10
+# Generations at most: the last moves waypoints by decimetres.  Beside seeds, whose best path is tightened in any case,
+# fewer of fewer waypoints do: this share of the population at first.
+MOST_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
 # Of the first generation's waypoints an interval, the share that later ones have, and the fewest.
 LATER_SHARE, FEWEST = 0.2, 24
 # Legs that one generation may be able to join, so many that they fit the memory of a small machine.
@@ -35,7 +36,8 @@ FIRST_ALONG, FIRST_ACROSS, FIRST_UP, SHRINK = 0.4, 0.5, 60.0, 0.5
 # Of the heights, how far draws go on above the ceiling, where spheres are smallest, to be clipped to it.
 ABOVE_CEILING = 0.3
 # How much longer than the best path one through a kept waypoint may be, as a share: in the first generation, the last.
-FIRST_SLACK, LAST_SLACK = 0.1, 0.003
+# Beside seeds the first is less: their best path is nearer to the shortest than the first that samples make.
+FIRST_SLACK, LAST_SLACK, SEEDED_SLACK = 0.1, 0.003, 0.05
 # Bounds on the first path's cost, over the straight line, tried one after the other: the lower, the faster.
 FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
 # Paths that are evaluated whole: through so many of the best waypoints of every so many intervals.
@@ -47,7 +49,7 @@ MENDING = 100
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
     """Search with this many waypoints an interval at first; the archive takes the paths that are found.
 
-    generations: at most `MOST_GENERATIONS` are made.
+    generations: at most `MOST_GENERATIONS` are made, or `SEEDED_GENERATIONS`.
     """
     encoding, space = search.encoding, search.problem.space
     inner = encoding.waypoints - 2
@@ -55,17 +57,20 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
     data = search.problem.search
     sampling = NicheSampling(lower, upper, lambda rows, _: open_places(data, frame.restore(rows)), search.rng)
-    most = int(math.sqrt(MOST_LEGS / (inner + 1)))
-    first = max(2, min(population, most))
+    seeded, most = search.algorithm.seeded, int(math.sqrt(MOST_LEGS / (inner + 1)))
+    first = max(2, min(int(population * (SEEDED_SHARE if seeded else 1.0)), most))
     later = min(first, max(FEWEST, int(LATER_SHARE * first)))
     interval = frame.length / inner
     deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
     rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
-    steps = min(generations, MOST_GENERATIONS)
+    if not len(search.archive.vectors):
+        # Something to show, whenever the search is asked to end.
+        search.evaluate(_as_vectors(rows[:, :1]))
+    steps = min(generations, SEEDED_GENERATIONS if seeded else MOST_GENERATIONS)
+    slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
     for step in range(steps):
-        if len(search.archive.vectors):
-            rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)
-        slack = FIRST_SLACK * (LAST_SLACK / FIRST_SLACK) ** (step / max(1, steps - 1))
+        rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)
+        slack = slack_at_first * (LAST_SLACK / slack_at_first) ** (step / max(1, steps - 1))
         chains = _join(search, encoding.decode(_as_vectors(rows)), slack)
         search.evaluations += math.ceil(chains.legs / (inner + 1))
         _evaluate_best(search, rows, chains)
@@ -96,7 +101,7 @@ def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
         bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_BOUNDS)
     legs = 0
     for bound in bounds:
-        chains = waypoint_chains(data, candidates, bound * straight)
+        chains = waypoint_chains(data, candidates, bound * straight, search.pause)
         legs += chains.legs
         if chains.cost[1:-1].min() <= bound * straight < math.inf:
             break

@@ -7,6 +7,7 @@ Turns join two legs; each is priced where the best way so far makes it, which is
 """
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -32,6 +33,19 @@ TURN_COST = 2e4
 TURN_SHARE = 0.475
 # A leg that is not evaluated yet.
 UNKNOWN = -1.0
+# Legs that are evaluated before the caller may end the work: some 20 ms.
+LEGS_AT_ONCE = 10_000
+# How far the work is: direction, waypoint and candidate that comes next, and legs evaluated.
+_CURSOR = np.dtype([(name, np.int64) for name in ("step", "waypoint", "candidate", "legs")])
+
+
+class _Sweeps(NamedTuple):
+    """Costs (w, k) of the best partial paths from the start and from the destination, and where each comes from."""
+
+    forward: Floats
+    before: Ints
+    backward: Floats
+    after: Ints
 
 
 class WaypointChains(NamedTuple):
@@ -58,44 +72,73 @@ class WaypointChains(NamedTuple):
         return out
 
 
-def waypoint_chains(data: ProblemArrays, candidates: Floats, bound: float) -> WaypointChains:
+def waypoint_chains(
+    data: ProblemArrays, candidates: Floats, bound: float, pause: Callable[[], None] = lambda: None
+) -> WaypointChains:
     """Best paths through candidates (w, k, 3) world m; of the ends only the first counts.
 
-    bound: the most that a path may cost, m; what cannot be part of one is left out, which is faster.
+    bound: the most that a path may cost, m; what cannot be part of one is left out, which is faster.  pause: called
+    after every `LEGS_AT_ONCE` legs; what it raises ends the work.
     """
     count, wide, _ = candidates.shape
     legs = np.full((count - 1, wide, wide), UNKNOWN)
-    return WaypointChains(*_chains(data, candidates, legs, bound))
+    forward, backward = np.full((count, wide), np.inf), np.full((count, wide), np.inf)
+    forward[0, 0], backward[-1, 0] = 0.0, 0.0
+    before, after = np.zeros((count, wide), dtype=np.int64), np.zeros((count, wide), dtype=np.int64)
+    sweeps, cursor = _Sweeps(forward, before, backward, after), np.zeros(1, dtype=_CURSOR)
+    cursor["step"], cursor["waypoint"] = 1, 1
+    while not _advance(data, candidates, legs, bound, sweeps, cursor, LEGS_AT_ONCE):
+        pause()
+    return WaypointChains(_through(data, candidates, bound, sweeps), before, after, int(cursor["legs"][0]))
 
 
 @compiled
-def _chains(
-    data: ProblemArrays, candidates: Floats, legs: Floats, bound: float
-) -> tuple[Floats, Ints, Ints, int]:  # pragma: no cover - compiled
-    """The fields of `WaypointChains`; legs: (w - 1, k, k) costs to fill in as they are asked for."""
+def _advance(
+    data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, most: int
+) -> bool:  # pragma: no cover - compiled
+    """Go on from the cursor until so many legs are evaluated; whether all is done.
+
+    legs: (w - 1, k, k) costs, to fill in as they are asked for.  cursor: a `_CURSOR` record (1,).
+    """
     count, wide, _ = candidates.shape
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
-    before, after = np.zeros((count, wide), dtype=np.int64), np.zeros((count, wide), dtype=np.int64)
-    forward, backward = np.full((count, wide), np.inf), np.full((count, wide), np.inf)
-    # Of the ends only the first candidate counts.
-    forward[0][:1] = 0.0
-    backward[-1][:1] = 0.0
-    rest, evaluated = np.empty(wide), 0
-    for i in range(1, count):
-        for k in range(wide if i < count - 1 else 1):
-            rest[k] = _distance(candidates[i, k], candidates[-1][0])
-        evaluated += _extend(data, limits, candidates, i, 1, forward, before, rest, bound, legs, corners)
-    for i in range(count - 2, -1, -1):
-        rest[:] = forward[i]
-        evaluated += _extend(data, limits, candidates, i, -1, backward, after, rest, bound, legs, corners)
-    cost = forward + backward
-    for i in range(1, count - 1):
-        for k in range(wide):
+    at, least = cursor[0], np.empty(wide)
+    begun = at.legs
+    while at.waypoint >= 0:
+        i, step = at.waypoint, at.step
+        cost, link = (sweeps.forward, sweeps.before) if step > 0 else (sweeps.backward, sweeps.after)
+        open_ends = np.flatnonzero(cost[i - step] < np.inf)
+        while at.candidate < (wide if 0 < i < count - 1 else 1):
+            if at.legs - begun >= most:
+                return False
+            k = at.candidate
+            # What the rest of a path through this one costs, at least.
+            rest = _distance(candidates[i, k], candidates[-1][0]) if step > 0 else sweeps.forward[i, k]
+            at.legs += _extend(
+                data, limits, candidates, i, k, step, cost, link, bound - rest, legs, open_ends, least, corners
+            )
+            at.candidate += 1
+        at.candidate = 0
+        at.waypoint += step
+        if at.waypoint == count:
+            at.waypoint, at.step = count - 2, -1
+    return True
+
+
+@compiled
+def _through(
+    data: ProblemArrays, candidates: Floats, bound: float, sweeps: _Sweeps
+) -> Floats:  # pragma: no cover - compiled
+    """Cost of the best path through each candidate, its turn there included; inf above the bound."""
+    limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
+    cost = sweeps.forward + sweeps.backward
+    for i in range(1, candidates.shape[0] - 1):
+        for k in range(candidates.shape[1]):
             if cost[i, k] < np.inf:
-                a, c = candidates[i - 1, before[i, k]], candidates[i + 1, after[i, k]]
+                a, c = candidates[i - 1, sweeps.before[i, k]], candidates[i + 1, sweeps.after[i, k]]
                 cost[i, k] += _corner_cost(data, limits, a, candidates[i, k], c, corners)
                 cost[i, k] = cost[i, k] if cost[i, k] <= bound else np.inf
-    return cost, before, after, evaluated
+    return cost
 
 
 @compiled
@@ -104,57 +147,51 @@ def _extend(
     limits: PrecomputedLimits,
     candidates: Floats,
     i: int,
+    k: int,
     step: int,
     cost: Floats,
     link: Ints,
-    rest: Floats,
-    bound: float,
+    most: float,
     legs: Floats,
+    open_ends: Ints,
+    least: Floats,
     corners: Records,
 ) -> int:  # pragma: no cover - compiled
-    """Take costs (w, k) of partial paths on to the candidates of waypoint i; legs evaluated.
+    """Take costs (w, k) of partial paths on to a candidate of waypoint i; legs evaluated.
 
     step: 1 for paths from the start, -1 for paths from the destination.  link: (w, k) the candidate that each partial
-    path comes from.  rest: (k,) the least that the remaining path from each candidate costs.
+    path comes from.  most: what a partial path may cost there.  open_ends: candidates before that have partial paths.
+    least, corners: scratch.
     """
-    count, wide, _ = candidates.shape
-    last, evaluated = i - step, 0
-    open_ends = np.flatnonzero(cost[last] < np.inf)
-    least = np.empty(open_ends.size)
-    for k in range(wide if 0 < i < count - 1 else 1):
-        most = bound - rest[k]
-        here = candidates[i, k]
-        if not most > 0.0 or open_ends.size == 0:
+    last, evaluated, here = i - step, 0, candidates[i, k]
+    if not most > 0.0 or open_ends.size == 0:
+        return 0
+    for m in range(open_ends.size):
+        # No leg costs less than its length.
+        least[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
+    while True:
+        # The most promising first: the first without violations ends it.
+        m = _lowest(least[: open_ends.size])
+        j, cheapest = open_ends[m], least[m]
+        if not cheapest < min(cost[i, k], most):
+            return evaluated
+        least[m] = np.inf
+        turn = 0.0
+        if 0 < last < candidates.shape[0] - 1:
+            beyond = candidates[last - step, link[last, j]]
+            a, c = (beyond, here) if step > 0 else (here, beyond)
+            turn = _corner_cost(data, limits, a, candidates[last, j], c, corners)
+        if not cheapest + turn < min(cost[i, k], most):
             continue
-        for m in range(open_ends.size):
-            # No leg costs less than its length.
-            least[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
-        while True:
-            # The most promising first: the first without violations ends it.
-            m = _lowest(least)
-            j, cheapest = open_ends[m], least[m]
-            if not cheapest < min(cost[i, k], most):
-                break
-            least[m] = np.inf
-            turn = 0.0
-            if 0 < last < count - 1:
-                beyond = candidates[last - step, link[last, j]]
-                if step > 0:
-                    turn = _corner_cost(data, limits, beyond, candidates[last, j], here, corners)
-                else:
-                    turn = _corner_cost(data, limits, here, candidates[last, j], beyond, corners)
-            if not cheapest + turn < min(cost[i, k], most):
-                continue
-            first, second = (j, k) if step > 0 else (k, j)
-            leg = legs[min(i, last), first, second]
-            if leg == UNKNOWN:
-                leg = leg_cost(data, limits, candidates[min(i, last), first], candidates[max(i, last), second])
-                legs[min(i, last), first, second] = leg
-                evaluated += 1
-            total = cost[last, j] + leg + turn
-            if total < min(cost[i, k], most):
-                cost[i, k], link[i, k] = total, j
-    return evaluated
+        first, second = (j, k) if step > 0 else (k, j)
+        leg = legs[min(i, last), first, second]
+        if leg == UNKNOWN:
+            leg = leg_cost(data, limits, candidates[min(i, last), first], candidates[max(i, last), second])
+            legs[min(i, last), first, second] = leg
+            evaluated += 1
+        total = cost[last, j] + leg + turn
+        if total < min(cost[i, k], most):
+            cost[i, k], link[i, k] = total, j
 
 
 @compiled

@@ -1,6 +1,6 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
-``python -m tests.bench [chain] [planner] [peers] [flight] [aircraft] [autopilot] [--runs N] [--seconds S]
+``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [--runs N] [--seconds S]
 [--seeds N]``: parts to measure (default: all), seeds of each whole planner run (15), what OMPL is given (10 s), and
 seeds of flights (20).
 """
@@ -15,7 +15,7 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = ("chain", "planner", "peers", "flight", "aircraft", "autopilot")
+PARTS = ("chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot")
 TARGET = Path("runs") / "bench.json"
 
 
@@ -30,7 +30,7 @@ def main() -> None:
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f"{', '.join(sorted(unknown))}: not a part")
     # Imported here: the setting above must come first.
-    from tests.bench import aircraft, autopilot, chain, flight, peers, planner
+    from tests.bench import ablation, aircraft, autopilot, chain, flight, peers, planner
 
     TARGET.parent.mkdir(exist_ok=True)
     kept = json.loads(TARGET.read_text(encoding="utf-8")) if TARGET.exists() else {}
@@ -39,6 +39,7 @@ def main() -> None:
     work = {
         "chain": chain.run,
         "planner": lambda: planner.measure(args.runs),
+        "ablation": lambda: ablation.measure(args.runs),
         "peers": lambda: peers.measure(args.seconds),
         "flight": lambda: flight.run(args.seeds),
         "aircraft": aircraft.run,

@@ -10,6 +10,7 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.plan import Plan
+from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from tests.instances import CLIMB_DEG, DIVE_DEG, ground, random_scenario
 from world.scenario import Scenario, from_spec, load_scenario
@@ -47,7 +48,7 @@ def test_hard_set_is_safe_in_every_run(threats: str, make_limits: Callable[[Scen
     table = scenario.planner
     lengths = []
     for seed in RUNS:
-        plan = plan_path(scenario, make_limits(scenario), seed=seed, algorithm="umda-seeded")
+        plan = plan_path(scenario, make_limits(scenario), seed=seed, algorithm=DEFAULT)
         assert plan.safe, (seed, plan.certificate.problems)
         check_at_one_metre(plan)
         # The paper's own budget, seeds and pattern search included.
@@ -61,6 +62,6 @@ def test_random_instances_that_a_grid_can_pass_are_solved(
     seed: int, make_limits: Callable[[Scenario], Limits], tmp_path: Path
 ) -> None:
     scenario = from_spec(parse_scenario(random_scenario(seed), "random"), "random", base=tmp_path)
-    plan = plan_path(scenario, make_limits(scenario), seed=1, algorithm="umda-seeded")
+    plan = plan_path(scenario, make_limits(scenario), seed=1, algorithm=DEFAULT)
     assert plan.safe, plan.certificate.problems
     check_at_one_metre(plan)

@@ -60,7 +60,7 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-@pytest.mark.parametrize("algorithm", ["umda-seeded", "umda"])
+@pytest.mark.parametrize("algorithm", ["fda-seeded", "umda"])
 def test_a_large_problem_is_planned(
     tmp_path: Path,
     make_limits: Callable[[Scenario], Limits],

@@ -15,7 +15,7 @@ from world.scenario import Scenario, load_scenario
 FLAT = {"kind": "flat", "amsl_m": 0}
 
 
-@pytest.mark.parametrize("name", ["umda-seeded", "umda-smooth", "umda"])
+@pytest.mark.parametrize("name", ["fda-seeded", "fda", "umda-smooth", "umda"])
 def test_same_seed_same_bytes(scenario: Scenario, limits: Limits, name: str) -> None:
     one, two = (plan_json(plan_path(scenario, limits, seed=7, algorithm=name)) for _ in range(2))
     assert one == two
@@ -32,7 +32,7 @@ def test_every_algorithm_runs_within_its_evaluations(scenario: Scenario, limits:
     np.testing.assert_array_equal(plan.waypoints[-1], scenario.destination)
     assert seen
     assert all(0 <= done <= total for done, total, _ in seen)
-    if not ALGORITHMS[name].seeded:
+    if not ALGORITHMS[name].tightened:
         assert plan.evaluations == 60 + 25 * 30
         assert len(plan.history) == 26
     again = parse_plan(plan_json(plan), "plan.json")

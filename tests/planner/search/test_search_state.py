@@ -1,5 +1,6 @@
 """What a search reports as it goes, and what ends it: a stop, a budget, a first safe path."""
 
+import time
 from collections.abc import Callable
 
 import numpy as np
@@ -8,12 +9,15 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.plan import parse_plan, plan_json
+from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from world.errors import ScenarioError
-from world.scenario import Scenario
+from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_planner
 
 Floats = NDArray[np.float64]
+# s from Ctrl-C to the plan.
+AT_ONCE = 0.05
 
 
 def test_better_paths_are_reported_as_they_are_found(scenario: Scenario, limits: Limits) -> None:
@@ -57,3 +61,37 @@ def test_budget_ends_a_search(make_limits: Callable[[Scenario], Limits], small: 
     scenario = small(planner={"waypoints": 8, "population": 40, "generations": 100, "budget": 150, "algorithm": "umda"})
     plan = plan_path(scenario, make_limits(scenario), seed=1)
     assert 150 <= plan.evaluations < 190
+
+
+@pytest.mark.parametrize("name", [DEFAULT, "fda", "umda-seeded", "umda-smooth", "umda"])
+def test_a_search_ends_within_fifty_milliseconds(name: str, make_limits: Callable[[Scenario], Limits]) -> None:
+    """CPU time between two questions, and from an answer to the plan: generations, seeds and certificates included."""
+    scenario = load_scenario("hard-60")
+    limits = make_limits(scenario)
+    plan_path(scenario, limits, seed=1, algorithm=name)
+    asked: list[float] = []
+
+    def go_on() -> str:
+        asked.append(time.process_time())
+        return ""
+
+    plan_path(scenario, limits, seed=1, algorithm=name, stop=go_on)
+    assert np.diff(asked).max() < AT_ONCE
+    for questions in (1, len(asked) // 3, 2 * len(asked) // 3, len(asked) - 1):
+        ends: list[float] = []
+
+        def end(questions: int = questions, ends: list[float] = ends) -> str:
+            ends.append(time.process_time())
+            return "interrupted" if len(ends) >= questions else ""
+
+        plan = plan_path(scenario, limits, seed=1, algorithm=name, stop=end)
+        assert plan.ended == "interrupted"
+        assert time.process_time() - ends[max(0, questions - 1)] < AT_ONCE
+
+
+def test_being_asked_changes_no_result(make_limits: Callable[[Scenario], Limits]) -> None:
+    scenario = load_scenario("hard-30")
+    limits = make_limits(scenario)
+    for name in (DEFAULT, "umda"):
+        one, two = (plan_path(scenario, limits, seed=1, algorithm=name, stop=stop) for stop in (None, str))
+        assert plan_json(one) == plan_json(two)
