@@ -12,7 +12,7 @@ import rasterio
 from numpy.typing import NDArray
 from rasterio.windows import Window
 
-from tests.world.elevation_files import from_origin
+from tests.world.made.elevation_files import from_origin
 
 SIDE, PITCH = 10_000, 1.0 / 3600.0
 WEST, NORTH = 8.0, 48.0
