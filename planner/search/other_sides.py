@@ -24,12 +24,12 @@ Floats = NDArray[np.float64]
 STAGES, SPREAD, RATIO, SHRINKS = 50, 0.2, 1.0 / 3.0, (0.2, 0.5)
 # Routes of one grid, and what they may cost: over the best path, or where none is safe over the straight line.  Grids
 # know few courses, and their routes are longer by some percent.
-MOST_ROUTES, SLACK, MOST_DETOUR = 5, 1.08, 1.8
+MOST_ROUTES, SLACK, MOST_DETOUR = 4, 1.08, 1.8
 # Paths that go on into each round of work; the rounds and the first move with which it moves all their waypoints, the
 # evaluations of its pattern search, and how much a price may be above the length of the best path, as shares of the
 # straight line.
-ROUNDS = ((4, 1.0, 150, math.inf), (2, 0.5, 500, 0.01))
-TIGHTENING = 3
+ROUNDS = ((4, 1.0, 150, math.inf), (1, 0.5, 500, 0.005))
+TIGHTENING = 2
 # A best path that is longer than the straight line by less than this share has no other side worth looking for.
 LEAST_DETOUR = 0.004
 # Paths whose waypoints are nearer to each other than this on average, as a share of the straight line, are one.

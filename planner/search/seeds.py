@@ -15,6 +15,8 @@ Floats = NDArray[np.float64]
 
 # Evaluations that a quick path and each seed are improved with by a pattern search, at most.
 QUICK_SEARCH, SEED_SEARCH = 50, 300
+# Routes that are followed once a path is safe: other sides are looked for next (`planner.search.other_sides`).
+FOLLOWED = 2
 
 
 def straight_line(search: Search) -> bool:
@@ -46,8 +48,8 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += older
     improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
-    for route in _routes(search, grids) if search.algorithm.seeded else ():
-        if search.over() or search.safe_already():
+    for number, route in enumerate(_routes(search, grids) if search.algorithm.seeded else ()):
+        if search.over() or search.safe_already() or (number >= FOLLOWED and search.best_is_safe()):
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])
