@@ -212,10 +212,23 @@ def _applied(transform: Any, x: Any, y: Any) -> tuple[Any, Any]:
     return transform.a * x + transform.b * y + transform.c, transform.d * x + transform.e * y + transform.f
 
 
+def _read_strips(opened: Any, window: tuple[int, int, int, int], scale: float, offset: float) -> NDArray[np.float32]:
+    """Heights of a window (top, bottom, left, right) of an open file, some rows at a time; NaN where it has no data."""
+    top, bottom, left, right = window
+    heights = np.empty((bottom - top, right - left), dtype=np.float32)
+    at_once = max(1, _PIXELS_AT_ONCE // (right - left))
+    for row in range(top, bottom, at_once):
+        rows = min(at_once, bottom - row)
+        # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
+        strip = opened.read(1, window=((row, row + rows), (left, right)), masked=True)
+        whole = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
+        heights[row - top : row - top + rows] = whole
+    return heights
+
+
 def _open_rasterio(file: Path, driver: str) -> RasterFile:
     import rasterio
     from rasterio.errors import NotGeoreferencedWarning, RasterioError, RasterioIOError
-    from rasterio.windows import Window
 
     guard: dict[str, Any] = {
         "GDAL_PAM_ENABLED": "NO",
@@ -261,19 +274,11 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         return np.asarray(col) - 0.5, np.asarray(row) - 0.5
 
     def read(top: int, bottom: int, left: int, right: int) -> NDArray[np.float32]:
-        heights = np.empty((bottom - top, right - left), dtype=np.float32)
-        at_once = max(1, _PIXELS_AT_ONCE // (right - left))
         try:
             with rasterio.Env(**guard), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
-                for row in range(top, bottom, at_once):
-                    rows = min(at_once, bottom - row)
-                    strip = opened.read(1, window=Window(left, row, right - left, rows), masked=True)
-                    # Numbers that a file stores scaled are rare, and silently wrong if read as they stand.
-                    whole = np.ma.filled(strip.astype(np.float64), np.nan) * scale + offset
-                    heights[row - top : row - top + rows] = whole
+                return _read_strips(opened, (top, bottom, left, right), scale, offset)
         except (RasterioError, RasterioIOError, OSError) as error:
             raise TerrainError(f"{file}: cannot be read: {one_line(error)}") from error
-        return heights
 
     col, row = outline(cols, rows)
     x, y = _applied(forward, col + 0.5, row + 0.5)

@@ -20,7 +20,7 @@ from planner.evaluation.missile_index import kill_density
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.seeding.waypoint_fitting import leg_cost
 from world.frames import polymap
-from world.kernels import Records, compiled
+from world.kernels import Records, compiled, inlined
 from world.terrain import pixel_height
 
 Floats = NDArray[np.float64]
@@ -171,7 +171,7 @@ def _extend(
         least[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
     while True:
         # The most promising first: the first without violations ends it.
-        m = _lowest(least[: open_ends.size])
+        m = _lowest(least, open_ends.size)
         j, cheapest = open_ends[m], least[m]
         if not cheapest < min(cost[i, k], most):
             return evaluated
@@ -194,21 +194,21 @@ def _extend(
             cost[i, k], link[i, k] = total, j
 
 
-@compiled
-def _lowest(values: Floats) -> int:  # pragma: no cover - compiled
-    """Where the lowest value stands."""
+@inlined
+def _lowest(values: Floats, count: int) -> int:  # pragma: no cover - compiled
+    """Where the lowest of the first values stands."""
     lowest = 0
-    for k in range(1, values.size):
+    for k in range(1, count):
         lowest = k if values[k] < values[lowest] else lowest
     return lowest
 
 
-@compiled
+@inlined
 def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@compiled
+@inlined
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:  # pragma: no cover - compiled

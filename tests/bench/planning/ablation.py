@@ -11,7 +11,7 @@ import numpy as np
 from planner.plan import Objective
 from planner.search.algorithms import ALGORITHMS, DEFAULT, Algorithm
 from planner.search.plan_path import plan_path
-from tests.bench.fresh_instances import random_task
+from tests.bench.planning.fresh_instances import random_task
 from tests.bench.task import PROBLEMS, Task, best_known, make_task, with_planner
 
 # Random instances beside the hard set: none of them was looked at while the planner was tuned.

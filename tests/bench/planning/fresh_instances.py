@@ -1,7 +1,7 @@
-"""Fresh random instances that no tuning has seen: ``python -m tests.bench.fresh_instances --from 7001 --count 60``.
+"""Fresh random instances that no tuning has seen: ``python -m tests.bench.planning.fresh_instances --from 7001``.
 
 Of `tests.instances`: 60 threats, each instance one that a grid can pass.  Best known is the shortest certified path of
-`tests.bench.lattice_search` and of everything that is measured here.  What the lattice finds is kept in
+`tests.bench.planning.lattice_search` and of everything that is measured here.  What the lattice finds is kept in
 ``runs/fresh-instances.json``, for it takes the longest.
 """
 
@@ -19,7 +19,7 @@ from planner.evaluation.problem import make_problem
 from planner.plan import Objective
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
-from tests.bench.lattice_search import lattice_search
+from tests.bench.planning.lattice_search import lattice_search
 from tests.bench.task import Task, exact_airframe
 from tests.instances import random_scenario
 from world.scenario import from_spec
@@ -51,9 +51,12 @@ def lattice_ratios(seeds: Sequence[int]) -> dict[str, dict[str, float]]:
     return {str(seed): known[str(seed)] for seed in seeds}
 
 
-def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int) -> dict[str, Any]:
-    """Runs of each algorithm on each instance; prints a table and returns it."""
-    lattice = lattice_ratios(seeds)
+def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int, *, with_lattice: bool = True) -> dict[str, Any]:
+    """Runs of each algorithm on each instance; prints a table and returns it.
+
+    with_lattice: whether the lattice is searched too; without it best known is the best of the runs.
+    """
+    lattice = lattice_ratios(seeds) if with_lattice else {}
     ratios = np.full((len(algorithms), len(seeds), runs), np.nan)
     seconds = np.zeros(ratios.shape)
     for at, seed in enumerate(seeds):
@@ -65,14 +68,15 @@ def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int) -> dict[
                 seconds[row, at, run] = time.process_time() - began
                 if plan.safe:
                     ratios[row, at, run] = plan.objectives[Objective.LENGTH_RATIO]
-    other = np.array([item["ratio"] or np.nan for item in lattice.values()])
+    other = np.array([item["ratio"] or np.nan for item in lattice.values()] or [np.nan] * len(seeds))
     best = np.fmin(other, np.fmin.reduce(ratios, axis=(0, 2)))
     solvable = np.isfinite(best)
     print(f"\n{len(seeds)} instances from seed {seeds[0]}, {runs} runs each; {solvable.sum()} solved by any method")
     print(f"  {'method':<24}{'solved':>10}{'/ best: median':>16}{'90 %':>8}{'worst':>8}{'CPU s':>8}{'most':>7}")
     record: dict[str, Any] = {"seeds": list(seeds), "runs": runs, "solvable": int(solvable.sum())}
     rows = [(name, ratios[row], seconds[row]) for row, name in enumerate(algorithms)]
-    rows.append(("lattice, many starts", other[:, None], np.array([[item["cpu_s"]] for item in lattice.values()])))
+    if lattice:
+        rows.append(("lattice, many starts", other[:, None], np.array([[item["cpu_s"]] for item in lattice.values()])))
     for name, found, spent in rows:
         over = (found / best[:, None])[solvable].ravel()
         safe = over[np.isfinite(over)]
@@ -92,17 +96,18 @@ def measure(seeds: Sequence[int], algorithms: Sequence[str], runs: int) -> dict[
 
 def main() -> None:
     """Measure what the command line asks for."""
-    parser = argparse.ArgumentParser(prog="python -m tests.bench.fresh_instances")
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.planning.fresh_instances")
     parser.add_argument("--from", dest="first", type=int, default=7001, help="seed of the first instance")
     parser.add_argument("--count", type=int, default=60, help="instances")
     parser.add_argument("--runs", type=int, default=1, help="seeds of each algorithm on each")
+    parser.add_argument("--without-lattice", action="store_true", help="best known is the best of the runs")
     parser.add_argument("--algorithms", nargs="+", default=[DEFAULT, "fda"])
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.count)
     if args.algorithms == ["none"]:
         lattice_ratios(seeds)
         return
-    measure(list(seeds), args.algorithms, args.runs)
+    measure(list(seeds), args.algorithms, args.runs, with_lattice=not args.without_lattice)
 
 
 if __name__ == "__main__":
