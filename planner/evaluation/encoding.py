@@ -14,10 +14,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from planner.frames.waypoint_frames import WaypointFrames, frames_along, straight_frames
+
 Floats = NDArray[np.float64]
 
 # Lower end of a polar step, as a share of the mean leg: a zero step has no direction.
 _SHORTEST = 0.05
+# Half-width of the box along a route, in pieces of it.
+ASIDE = 2.0
 
 
 class RotatedFrame(NamedTuple):
@@ -71,6 +75,7 @@ class Encoding:
     waypoints: w, of a path, start and destination included.
     lower, upper: (d,) box, d = 3(w - 2), three numbers a waypoint in flying order.
     decode: (n, d) -> (n, w, 3) world m, start and destination included.
+    frames: in which its vectors are along, across and up of each inner waypoint; None where they are not.
 
     >>> space = Space(np.zeros(3), np.array([3000.0, 4000.0, 0.0]), np.array([[0, 3000], [0, 4000]]), (0.0, 500.0))
     >>> encoding = rotated(space, 4)
@@ -85,6 +90,7 @@ class Encoding:
     lower: Floats
     upper: Floats
     decode: Callable[[Floats], Floats]
+    frames: WaypointFrames | None = None
 
     def __post_init__(self) -> None:
         """Lock the box."""
@@ -128,7 +134,32 @@ def rotated(space: Space, waypoints: int) -> Encoding:
     def decode(vectors: Floats) -> Floats:
         return _with_ends(space, frame.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
 
-    return Encoding("rotated", waypoints, lower.ravel(), upper.ravel(), decode)
+    frames = straight_frames(*frame[:4], edges)
+    return Encoding("rotated", waypoints, lower.ravel(), upper.ravel(), decode, frames)
+
+
+def along_route(space: Space, route: Floats) -> Encoding:
+    """As `rotated`, but along is the length of a route (w - 1, 2) on the map, which may turn back.
+
+    Inner waypoint i lies along the i-th piece of the route, across as far as `ASIDE` pieces.
+    """
+    frames = frames_along(route)
+    waypoints = len(route) + 1
+    aside = ASIDE * float(frames.edges[-1]) / (waypoints - 2)
+    lower = np.column_stack([frames.edges[:-1], np.full(waypoints - 2, -aside), np.full(waypoints - 2, space.up[0])])
+    upper = np.column_stack([frames.edges[1:], np.full(waypoints - 2, aside), np.full(waypoints - 2, space.up[1])])
+
+    def decode(vectors: Floats) -> Floats:
+        return _with_ends(space, frames.restore(vectors.reshape(len(vectors), waypoints - 2, 3)))
+
+    return Encoding("route", waypoints, lower.ravel(), upper.ravel(), decode, frames)
+
+
+def frames_of(encoding: Encoding) -> WaypointFrames:
+    """The frames of an encoding's waypoints.  Raises ValueError where it has none."""
+    if encoding.frames is None:
+        raise ValueError(f"{encoding.name}: an encoding without frames along a way")
+    return encoding.frames
 
 
 def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:

@@ -46,7 +46,9 @@ def what_blocks(plan: Plan) -> list[str]:
         if violated:
             lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(violated)}")
     chosen = ALGORITHMS.get(plan.algorithm)
-    if chosen is not None and chosen.encoding == "rotated":
+    if chosen is not None and chosen.encoding == "rotated" and chosen.seeded:
+        lines.append("ways that turn back, or go round to climb, were looked for too, on a coarse lattice")
+    elif chosen is not None and chosen.encoding == "rotated":
         lines.append(
             "paths of the rotated frame only ever get nearer to the destination along the line to it; "
             "a way that must turn back was not looked for"

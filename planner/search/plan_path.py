@@ -11,10 +11,12 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
 from planner.search.limits_for import limits_for
+from planner.search.other_sides import has_safe, search_other_sides
 from planner.search.path_generations import path_generations
 from planner.search.score_table import no_scores
 from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition
 from planner.search.seeds import starting_vectors, straight_line
+from planner.search.turning_back import may_turn_back, search_turning_back
 from planner.search.waypoint_generations import waypoint_generations
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
@@ -108,6 +110,8 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
         # An earlier attempt's is kept where a later one has nothing better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = found
+        if number == 0 and may_turn_back(search, best[1]):
+            best = search_turning_back(search, best)
         if search.finished(best[1]) or search.over():
             break
     if best is None:  # pragma: no cover - the loop always runs
@@ -163,9 +167,13 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
     if len(search.archive.scores) and (search.safe_already() or search.over()):
         search.note()
         return
+    if algorithm.seeded:
+        search_other_sides(search)
     last = None
     if algorithm.optimiser == "waypoints":
-        waypoint_generations(search, population, table.generations)
+        # Where other sides have been looked at and a path is safe, generations shorten it by ten-thousandths.
+        if not (algorithm.seeded and has_safe(search)):
+            waypoint_generations(search, population, table.generations)
     else:
         last = path_generations(search, population, table.generations, starts)
     if algorithm.tightened and search.ended == "completed":

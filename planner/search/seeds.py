@@ -19,6 +19,8 @@ Floats = NDArray[np.float64]
 QUICK_SEARCH, SEED_SEARCH = 50, 300
 # Times as many for seeds where a path has to stay in a band of heights above ground: hardly a move keeps to it.
 BAND_EFFORT = 3
+# Routes that are followed once a path is safe: other sides are looked for next (`planner.search.other_sides`).
+FOLLOWED = 2
 
 
 def straight_line(search: Search) -> bool:
@@ -50,9 +52,12 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
     older = [] if previous is None else list(rotated_vectors(space, encoding, previous[None]))
     starts += older
     improved_scores = [search.improve(vector, SEED_SEARCH) for vector in starts]
-    effort = BAND_EFFORT if math.isfinite(search.problem.search.airspace.max_height) else 1
-    for route in _routes(search, grids) if search.algorithm.seeded else ():
-        if search.over() or search.safe_already():
+    airspace = search.problem.search.airspace
+    effort = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
+    # Among zones no other sides are looked for: all the routes are followed.
+    followed = math.inf if is_limited(airspace) else FOLLOWED
+    for number, route in enumerate(_routes(search, grids) if search.algorithm.seeded else ()):
+        if search.over() or search.safe_already() or (number >= followed and search.best_is_safe()):
             break
         path = fit_waypoints(search.problem.search, frame, route.points, waypoints)
         starts.append(rotated_vectors(space, encoding, path[None])[0])

@@ -24,22 +24,22 @@ SIDEWAYS = 3
 # A cell of a route: its places among those across and among the layers.
 ROUTE_CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
 # Layers that one step may climb and sink.
-_STEP_LAYERS = np.dtype([("climb", np.int64), ("sink", np.int64)], align=True)
+STEP_LAYERS = np.dtype([("climb", np.int64), ("sink", np.int64)], align=True)
 # First and last place across, of a layer, that has a cost; first > last for none.
-_SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
+SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 
 @compiled
-def _step_layers(
-    data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats
+def layers_a_step(
+    data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
 ) -> Records:  # pragma: no cover - compiled
-    """`_STEP_LAYERS` records (sideways, layers) of one step on its course and at its height."""
+    """`STEP_LAYERS` records (sideways, layers) of one step on its course and at its height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
-    out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=_STEP_LAYERS)
+    out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
     for side in range(-SIDEWAYS, SIDEWAYS + 1):
-        run = step * math.sqrt(1.0 + side * side)
-        b[0], b[1] = position_of(frame, step, side * step)
+        run = step * math.sqrt(1.0 + (side * ratio) ** 2)
+        b[0], b[1] = position_of(frame, step, side * ratio * step)
         a[0], a[1] = frame.east, frame.north
         for z in range(layers.size):
             a[2] = layers[z]
@@ -66,7 +66,7 @@ def _relax(
 
 
 @compiled
-def _step_on(
+def step_on(
     cost: Floats,
     after: Floats,
     came: Codes,
@@ -75,10 +75,11 @@ def _step_on(
     price: Floats,
     step: float,
     pitch: float,
+    ratio: float,
 ) -> None:  # pragma: no cover - compiled
     """Relax one stage: costs (layers, across) before and after, the cell each came from, and the cost per m of cells.
 
-    spans: `_SPAN` records (layers,) of the cells with a cost before.  pitch: between layers, m.
+    spans: `SPAN` records (layers,) of the cells with a cost before.  pitch: between layers, m.
     """
     high, wide = cost.shape
     flat, flat_after, flat_came, flat_price = cost.ravel(), after.ravel(), came.ravel(), price.ravel()
@@ -93,12 +94,14 @@ def _step_on(
             most = step_layers[side + SIDEWAYS, z]
             bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
             for z2 in range(bottom, top + 1):
-                length = math.sqrt(step * step * (1.0 + side * side) + ((z2 - z) * pitch) ** 2)
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
                 _relax(flat, flat_price, flat_after, flat_came, z * wide + a, z2 * wide + a + side, b - a, length)
 
 
 @compiled
-def _ahead(columns: int, home: int, left: int, step: float, out: Floats) -> None:  # pragma: no cover - compiled
+def way_ahead(
+    columns: int, home: int, left: int, step: float, ratio: float, out: Floats
+) -> None:  # pragma: no cover - compiled
     """Length on the map of the shortest way from each place across to the destination, `left` stages away, m."""
     for y in range(columns):
         aside = abs(y - home)
@@ -107,16 +110,17 @@ def _ahead(columns: int, home: int, left: int, step: float, out: Floats) -> None
             continue
         k = aside // left if left > 0 else 0
         straight, more = (k + 1) * left - aside, aside - k * left
-        out[y] = step * (straight * math.sqrt(1.0 + k * k) + more * math.sqrt(1.0 + (k + 1) * (k + 1)))
+        far, further = math.sqrt(1.0 + (k * ratio) ** 2), math.sqrt(1.0 + ((k + 1) * ratio) ** 2)
+        out[y] = step * (straight * far + more * further)
 
 
 @compiled
-def _prune(
+def prune(
     after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int
 ) -> None:  # pragma: no cover - compiled
     """Drop cells low..high from which no route ends within the bound; note which are left.
 
-    spans: `_SPAN` records (layers,) to fill.  ahead: (across,) m on the map to the destination.  rises: (layers,) m of
+    spans: `SPAN` records (layers,) to fill.  ahead: (across,) m on the map to the destination.  rises: (layers,) m of
     height to it.
     """
     for z in range(after.shape[0]):
@@ -143,15 +147,15 @@ def cheapest_route(
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
-    step_layers, required = _step_layers(data, frame, step, grid.layers), required_clearance(data)
-    obstacles = find_obstacles(data, frame, step)
+    step_layers, required = layers_a_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
+    obstacles = find_obstacles(data, frame, step, grid.shrink)
     came = np.empty((stages + 1, high, wide), dtype=np.int32)
     price, cost, after = np.full((high, wide), np.inf), np.full((high, wide), np.inf), np.full((high, wide), np.inf)
     home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
     goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
     rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
     cost[start, home] = 0.0
-    spans = np.zeros(high, dtype=_SPAN)
+    spans = np.zeros(high, dtype=SPAN)
     for z in range(high):
         spans[z].first, spans[z].last = (home, home) if z == start else (wide, -1)
     for stage in range(1, stages + 1):
@@ -163,17 +167,17 @@ def cheapest_route(
             break
         set_prices(data, required, frame, stage, obstacles, grid, extra, low, last, price)
         after[:, low : last + 1] = np.inf
-        _step_on(cost, after, came[stage], spans, step_layers, price, step, pitch)
-        _ahead(wide, home, stages - stage, step, ahead)
-        _prune(after, spans, ahead, rises, bound, low, last)
+        step_on(cost, after, came[stage], spans, step_layers, price, step, pitch, grid.ratio)
+        way_ahead(wide, home, stages - stage, step, grid.ratio, ahead)
+        prune(after, spans, ahead, rises, bound, low, last)
         cost, after = after, cost
     if spans[goal].first > home or spans[goal].last < home or cost[goal, home] == np.inf:
         return np.zeros(0, dtype=ROUTE_CELL), np.inf
-    return _trace_back(came, goal, home), cost[goal, home]
+    return trace_back(came, goal, home), cost[goal, home]
 
 
 @compiled
-def _trace_back(came: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
+def trace_back(came: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
     """`ROUTE_CELL` records from the start to this cell of the last stage; came: (stages + 1, layers, across)."""
     wide = came.shape[2]
     cells = np.zeros(came.shape[0], dtype=ROUTE_CELL)

@@ -20,6 +20,8 @@ KILL_COST = 40.0
 # Steps between stages longer than this (m) are coarse: kill spheres grow there by this share of a step, for what lies
 # between the cells.  Finer grids keep them as they are, and find the narrow gaps.
 COARSE, COARSE_GROWTH = 250.0, 0.15
+# Share of a step to either side of a cell within which the highest ground counts.
+GROUND_SPREAD = 0.4
 # A threat in the rotated frame, m, with the radius that routes keep away.
 OBSTACLE = np.dtype(
     [("along", np.float64), ("across", np.float64), ("up", np.float64), ("radius", np.float64)], align=True
@@ -27,11 +29,20 @@ OBSTACLE = np.dtype(
 
 
 class Grid(NamedTuple):
-    """One resolution: stages along, places across (m from the line) and layers of height (m)."""
+    """One resolution: stages along, places across (m from the line) and layers of height (m).
+
+    shrink: share of a step by which kill spheres are taken to be smaller than they are; 0 for none.  What such a grid
+    finds may have to be moved to be safe, and it finds gaps between its cells.
+    spread: share of a step to either side of a cell within which the highest ground counts.
+    ratio: between places across, as a share of a step; below 1 the grid knows more courses and finer gaps.
+    """
 
     stages: int
     across: Floats
     layers: Floats
+    shrink: float = 0.0
+    spread: float = GROUND_SPREAD
+    ratio: float = 1.0
 
 
 class _PixelSteps(NamedTuple):
@@ -99,9 +110,13 @@ def _pixel_steps(
 
 
 @compiled
-def find_obstacles(data: ProblemArrays, frame: RotatedFrame, step: float) -> Records:  # pragma: no cover - compiled
-    """`OBSTACLE` records of the missiles for a grid with this step between stages."""
+def find_obstacles(
+    data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0
+) -> Records:  # pragma: no cover - compiled
+    """`OBSTACLE` records of the missiles for a grid with this step between stages; shrink: see `Grid`."""
     growth = COARSE_GROWTH * step if step > COARSE else 0.0
+    if shrink > 0.0:
+        growth = -shrink * step
     out = np.zeros(data.threats.shape[0], dtype=OBSTACLE)
     count = 0
     for k in range(data.threats.shape[0]):
@@ -159,7 +174,7 @@ def set_prices(
     """Cost per m of a stage's cells price (layers, across) low..high; inf where the ground is too near."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
-    steps = _pixel_steps(data, frame, stage * step, 0.4 * step if stage < grid.stages else 0.0)
+    steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
     for y in range(low, high + 1):
         # The destination is where it is, whatever its clearance.
         if stage == grid.stages and across[y] == 0.0:

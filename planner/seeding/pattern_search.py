@@ -12,10 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.encoding import Encoding, RotatedFrame, rotated_frame
+from planner.evaluation.encoding import Encoding, frames_of
 from planner.evaluation.graded_scores import PathScratch, make_scratch, score_path
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem_arrays import OBJECTIVES, VIOLATIONS, ProblemArrays
+from planner.frames.waypoint_frames import WaypointFrames
+from planner.plan import Objective
 from world.kernels import Record, Records, compiled
 
 Floats = NDArray[np.float64]
@@ -62,13 +64,13 @@ def search_patterns(data: ProblemArrays, encoding: Encoding, vector: Floats, eva
     vector: (d,).  evaluations: the most to make.  Returns the best vectors found (k, d), which are one that meets the
     constraints, if any was seen, and the one of the least merit; and the evaluations made.
     """
-    frame = rotated_frame(data.start, data.destination)
+    frames = frames_of(encoding)
     inner = encoding.waypoints - 2
-    span = frame.length / inner
+    span = float(frames.edges[-1]) / inner
     moves, axes = _triangular_basis(inner)
     steps = np.array([FIRST_ALONG * span, FIRST_ACROSS * span, FIRST_UP])[axes]
     start = np.array(vector, dtype=np.float64)
-    found = _search(data, frame, _Box(encoding.lower, encoding.upper), start, moves, steps, evaluations)
+    found = _search(data, frames, _Box(encoding.lower, encoding.upper), start, moves, steps, evaluations)
     if found.same:
         vectors = [found.feasible]
     elif math.isinf(found.feasible[0]):
@@ -76,6 +78,15 @@ def search_patterns(data: ProblemArrays, encoding: Encoding, vector: Floats, eva
     else:
         vectors = [found.feasible, found.cheapest]
     return np.array(vectors), int(found.evaluations)
+
+
+def merits(scores: Floats) -> Floats:
+    """Merits (n,) that the search lowers, of scores (n, 8) by `planner.plan.Violation` and `planner.plan.Objective`."""
+    prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
+    count = len(prices)
+    ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
+    violated = (scores[:, :count] * prices).sum(axis=1)
+    return np.asarray(ratio + violated + EXPOSURE_PRICE * exposure + EXPOSED * (exposure > 0.0))
 
 
 @cache
@@ -108,14 +119,14 @@ def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:  # pragm
 
 @compiled
 def _merit(
-    data: ProblemArrays, limits: PrecomputedLimits, frame: RotatedFrame, vector: Floats, candidate: _Candidate
+    data: ProblemArrays, limits: PrecomputedLimits, frames: WaypointFrames, vector: Floats, candidate: _Candidate
 ) -> tuple[float, bool]:  # pragma: no cover - compiled
     """Length ratio and the price of what is violated; whether nothing is."""
     path, inner = candidate.path, vector.reshape((vector.size // 3, 3))
     for i in range(inner.shape[0]):
         along, across = inner[i, 0], inner[i, 1]
-        path[i + 1, 0] = frame.east + frame.cosine * along - frame.sine * across
-        path[i + 1, 1] = frame.north + frame.sine * along + frame.cosine * across
+        path[i + 1, 0] = frames.east[i] + frames.cosine[i] * along - frames.sine[i] * across
+        path[i + 1, 1] = frames.north[i] + frames.sine[i] * along + frames.cosine[i] * across
         path[i + 1, 2] = inner[i, 2]
     violations, objectives = candidate.violations[0], candidate.objectives[0]
     violations.turn, violations.slope, violations.terrain, violations.bounds = 0.0, 0.0, 0.0, 0.0
@@ -141,7 +152,7 @@ def _price(violations: Record, objectives: Record) -> tuple[float, bool]:  # pra
 @compiled
 def _search(
     data: ProblemArrays,
-    frame: RotatedFrame,
+    frames: WaypointFrames,
     box: _Box,
     start: Floats,
     moves: Floats,
@@ -152,7 +163,7 @@ def _search(
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
     feasible = np.full(start.size, np.inf)
     here, trial, before = start.copy(), start.copy(), start.copy()
-    best, fit = _merit(data, limits, frame, here, candidate)
+    best, fit = _merit(data, limits, frames, here, candidate)
     shortest = best if fit else math.inf
     if fit:
         feasible[:] = here
@@ -170,7 +181,7 @@ def _search(
                 for d in range(start.size):
                     step = steps[k] * moves[k, d] if k < moves.shape[0] else here[d] - before[d]
                     trial[d] = min(box.upper[d], max(box.lower[d], here[d] + step))
-                merit, fit = _merit(data, limits, frame, trial, candidate)
+                merit, fit = _merit(data, limits, frames, trial, candidate)
                 made += 1
                 if fit and merit < shortest:
                     shortest = merit

@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.airspace_scores import airspace_excess
-from planner.evaluation.encoding import Encoding, RotatedFrame, rotated_frame
+from planner.evaluation.encoding import Encoding, RotatedFrame, frames_of
 from planner.evaluation.height_lags import lag_length
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
 from planner.evaluation.missile_index import kill_density
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.evaluation.terrain_clearance import segment_pixels, terrain_excess
+from planner.frames.waypoint_frames import WaypointFrames, straight_frames
 from planner.seeding.grid_prices import KILL_COST
 from world.kernels import compiled
 
@@ -143,12 +144,19 @@ def fit_waypoints(
     shares = np.linspace(0.1, 0.9, fit.places)
     along = edges[:-1, None] + shares * span
     points = np.stack([along, *(np.interp(along, route[:, 0], route[:, axis]) for axis in (1, 2))], axis=-1)
-    candidates = np.zeros((waypoints, fit.places * len(fit.lifts), 3))
+    return fit_points(data, straight_frames(*frame[:4], edges), points, fit)
+
+
+def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE) -> Floats:
+    """Waypoints (w, 3) world m, each at one of its places (w - 2, places, 3) in its frame, then moved about there."""
+    inner, places, _ = points.shape
+    candidates = np.zeros((inner + 2, places * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
-    candidates[1:-1, :, 2] += np.repeat(fit.lifts, fit.places)
-    chosen, _ = _pick(data, frame, candidates)
+    candidates[1:-1, :, 2] += np.repeat(fit.lifts, places)
+    chosen, _ = _pick(data, frames, candidates)
     steps = _AROUND if fit.diagonal else _BESIDE
-    return frame.restore(_moved(data, frame, edges, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)[0])
+    moved, _ = _moved(data, frames, chosen, steps, fit.rounds, np.array(FIRST_MOVES), SHRINK)
+    return _restored(frames, moved[:, None])[:, 0]
 
 
 def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
@@ -157,40 +165,51 @@ def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int
     vector: (d,).  scale: of the first moves, to `FIRST_MOVES`.  Turns are not evaluated.  Returns the new vector, and
     as many evaluations as its evaluated legs would make paths.
     """
-    frame = rotated_frame(data.start, data.destination)
-    edges = np.linspace(0.0, frame.length, encoding.waypoints - 1)
-    path = frame.rotate(encoding.decode(vector[None])[0])
-    chosen, legs = _moved(data, frame, edges, path, _AROUND, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
+    frames = frames_of(encoding)
+    path = np.zeros((encoding.waypoints, 3))
+    path[1:-1] = frames.rotate(encoding.decode(vector[None])[0, 1:-1])
+    chosen, legs = _moved(data, frames, path, _AROUND, rounds, scale * np.array(FIRST_MOVES), LAST_SHRINK)
     return np.clip(chosen[1:-1].ravel(), encoding.lower, encoding.upper), math.ceil(legs / (encoding.waypoints - 1))
 
 
 def _moved(
     data: ProblemArrays,
-    frame: RotatedFrame,
-    edges: Floats,
+    frames: WaypointFrames,
     chosen: Floats,
     steps: Floats,
     rounds: int,
     moves: Floats,
     shrink: float,
 ) -> tuple[Floats, int]:
-    """Waypoints (w, 3) in rotated axes after rounds of moves of up to `moves` along, across and up; legs evaluated."""
+    """Waypoints (w, 3) in their frames after rounds of moves of up to `moves` along, across and up; legs evaluated."""
     legs = 0
-    low, high = edges[:-1, None], edges[1:, None]
-    moves = moves * [high[0, 0] - low[0, 0], high[0, 0] - low[0, 0], 1.0]
+    low, high = frames.edges[:-1, None], frames.edges[1:, None]
+    span = frames.edges[-1] / (len(chosen) - 2)
+    moves = moves * [span, span, 1.0]
     for _ in range(rounds):
         candidates = np.repeat(chosen[:, None, :], len(steps), axis=1)
         candidates[1:-1] += steps * moves
         candidates[1:-1, :, 0] = np.clip(candidates[1:-1, :, 0], low, high)
         candidates[1:-1, :, 2] = np.clip(candidates[1:-1, :, 2], data.floor, data.ceiling)
-        chosen, more = _pick(data, frame, candidates)
+        chosen, more = _pick(data, frames, candidates)
         legs += more
         moves = moves * shrink
     return chosen, legs
 
 
-def _pick(data: ProblemArrays, frame: RotatedFrame, candidates: Floats) -> tuple[Floats, int]:
-    """Chosen candidates (w, 3), in rotated axes, the ends fixed; and how many legs were evaluated."""
-    candidates[0], candidates[-1] = frame.rotate(data.start), frame.rotate(data.destination)
-    chosen, legs = _choose(data, np.ascontiguousarray(frame.restore(candidates)))
+def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
+    """Chosen candidates (w, 3), in their frames, the ends fixed; and how many legs were evaluated."""
+    count = len(candidates) - 2
+    # An end has the frame of the waypoint next to it.
+    for end, place, inner in ((0, data.start, 0), (-1, data.destination, count - 1)):
+        candidates[end] = frames.rotate(np.tile(place, (count, 1)))[inner]
+    chosen, legs = _choose(data, np.ascontiguousarray(_restored(frames, candidates)))
     return candidates[np.arange(len(candidates)), chosen], int(legs)
+
+
+def _restored(frames: WaypointFrames, candidates: Floats) -> Floats:
+    """World positions of candidates (w, c, 3), those of the ends in the frame of the waypoint next to each."""
+    rows = np.clip(np.arange(len(candidates)) - 1, 0, len(candidates) - 3)
+    east, north, cosine, sine = (values[rows] for values in frames[:4])
+    of_rows = WaypointFrames(east, north, cosine, sine, frames.edges)
+    return np.asarray(of_rows.restore(candidates.transpose(1, 0, 2)).transpose(1, 0, 2))

@@ -17,4 +17,6 @@ def test_what_blocks_a_way_is_named(small: Callable[..., Scenario], make_limits:
     lines = what_blocks(plan)
     assert "terrain closes the way" in lines[0]
     assert "ceiling is 450 m" in lines[0]
-    assert "must turn back" in lines[-1]
+    assert "turn back, or go round to climb, were looked for" in lines[-1]
+    alone = plan_path(walled, make_limits(walled), seed=1, algorithm="umda")
+    assert "a way that must turn back was not looked for" in what_blocks(alone)[-1]

@@ -11,7 +11,7 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import make_problem
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.grid_kernels import ROUTE_CELL, SIDEWAYS, _ahead, _relax, _trace_back, cheapest_route
+from planner.seeding.grid_kernels import ROUTE_CELL, SIDEWAYS, _relax, cheapest_route, trace_back, way_ahead
 from planner.seeding.grid_prices import Grid, Records
 from world.scenario import Scenario
 
@@ -82,7 +82,7 @@ def test_a_step_climbs_and_sinks_no_more_than_the_limits_allow(data: ProblemArra
 def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
     columns, home, step = 9, 3, 50.0
     out = np.empty(columns)
-    _ahead(columns, home, left, step, out)
+    way_ahead(columns, home, left, step, 1.0, out)
     for y in range(columns):
         ways = itertools.product(range(-SIDEWAYS, SIDEWAYS + 1), repeat=left)
         lengths = [sum(step * math.hypot(1.0, side) for side in way) for way in ways if y + sum(way) == home]
@@ -106,7 +106,7 @@ def test_a_route_is_traced_back_from_its_end() -> None:
     came = np.full((3, 2, 3), -9, dtype=np.int32)
     came[2, 0, 1] = 5
     came[1, 1, 2] = 0
-    cells = _trace_back(came, 0, 1)
+    cells = trace_back(came, 0, 1)
     assert cells.dtype == ROUTE_CELL
     assert cells["layer"].tolist() == [0, 1, 0]
     assert cells["across"].tolist() == [0, 2, 1]

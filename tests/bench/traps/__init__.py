@@ -1,0 +1,1 @@
+"""Plans out of traps beside the shortest ways that a fine grid finds."""
