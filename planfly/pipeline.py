@@ -50,7 +50,7 @@ class PlanThenFly:
 
     >>> result = plan_then_fly("paper-07", seed=1)
     >>> len(result.plan.waypoints), len(result.mission.items), round(float(result.track.time[-1]))
-    (10, 11, 517)
+    (10, 11, 524)
     """
 
     plan: Plan

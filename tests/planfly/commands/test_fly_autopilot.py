@@ -117,8 +117,8 @@ def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
     time.sleep(0.3)
     children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
     running.send_signal(number)
-    running.communicate(timeout=20)
-    assert running.returncode == 130
+    _, complaint = running.communicate(timeout=20)
+    assert running.returncode == 130, complaint
     assert list(temporary.glob("planfly-autopilot-*")) == []
     assert len(children) == 1
     assert not Path("/proc", children[0]).exists()
