@@ -44,11 +44,29 @@ kill_scale_m = 50
 speed_mps = 3
 from_deg = 250
 turbulence = "light"
+[limits]
+min_clearance_m = 50
+max_height_m = 400
+[[zones]]
+name = "round"
+kind = "exclusion"
+east_m = -1500
+north_m = 0
+radius_m = 200
+[[zones]]
+name = "square"
+kind = "exclusion"
+polygon_m = [[1000, -1000], [1400, -1000], [1400, -600], [1000, -600]]
+floor_agl_m = 60
 """
 FLY = ("fly", "field.waypoints", "--scenario", "field.toml", "--overwrite")
 # Commands one after the other, of each process.
 PROCESSES = (
-    (("plan", "tight", "--out", "plan.json"),),
+    (
+        ("plan", "tight", "--out", "tight.json"),
+        ("plan", "field.toml", "--out", "field.json"),
+        ("plan", "trap-u", "--out", "trap.json"),
+    ),
     (
         (*FLY, "--log", "ardupilot.mcap"),
         (*FLY, "--log", "path.mcap", "--guidance", "path"),
