@@ -36,7 +36,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     for item in (
         Algorithm(
             "fda-seeded",
-            "the default: waypoints ranked by the best path through each, beside seeds from grid routes",
+            "the default: seeds from grid routes and past obstacles' other sides; generations where none is safe",
             graded=True,
             seeded=True,
             tightened=True,
@@ -44,7 +44,7 @@ ALGORITHMS: dict[str, Algorithm] = {
         ),
         Algorithm(
             "fda",
-            "the same without seeds: an estimation of distribution algorithm that needs no grids",
+            "generations of waypoints, ranked by the best path through each: needs no seeds and no grids",
             graded=True,
             tightened=True,
             optimiser="waypoints",
