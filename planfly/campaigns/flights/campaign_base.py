@@ -1,0 +1,122 @@
+"""What all flights of a campaign have in common: the mission, planned once, its world, its aircraft, its spread."""
+
+import hashlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from aircraft.catalog import model_hash
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import straight
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import Mission
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission_files.formats import mission_text
+from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.campaigns.spread.spread_file import Spread, SpreadError
+from planfly.open_mission import OpenedMission, ScenarioChange, open_mission
+from planfly.pipeline import Advance, make_plan, make_setup
+from planner.plan import Plan
+from world.errors import MissionError
+from world.scenario import Scenario, load_scenario
+
+
+@dataclass(frozen=True)
+class CampaignBase:
+    """One mission, and what varies about it.
+
+    scenario: as planned in; `mission` is flown in it by every flight, in the flight's own wind.
+    airframe: of that scenario.
+    placed: the mission on the terrain that its planner knows, whatever the terrain of a flight is.
+    plan: the mission's; None for one that a person brought.
+    seed: of the draws.
+    name: a stem for file names.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    mission: Mission
+    placed: PlacedMission
+    plan: Plan | None
+    spread: Spread
+    seed: int
+    name: str
+
+    def world_hash(self) -> str:
+        """Hash of all that decides what flight k does, but for the code: scenario, mission, model, spread and seed."""
+        model = self.airframe.aircraft
+        terrain = self.scenario.terrain
+        parts = (
+            json.dumps(self.scenario.to_json(), sort_keys=True),
+            "" if terrain is None else hashlib.sha256(terrain.heights.tobytes()).hexdigest(),
+            mission_text(self.mission, "waypoints"),
+            model_hash(model),
+            repr(self.airframe.parameters),
+            json.dumps(self.spread.to_json(), sort_keys=True),
+            str(self.seed),
+        )
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def open_campaign(
+    target: str,
+    spread: Spread,
+    *,
+    scenario_name: str | None = None,
+    terrain: str | None = None,
+    seed: int | None = None,
+    change: ScenarioChange = lambda scenario: scenario,
+    advance: Advance | None = None,
+) -> CampaignBase:
+    """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
+
+    target: an embedded scenario's name, a scenario's TOML file, a plan.json, .waypoints or .plan.
+    scenario_name, terrain, change: as of `planfly.open_mission.open_mission`.
+    seed: of plan and draws; None takes the scenario's, or 1.
+    Raises a PlanflyError for bad input, a plan that is not feasible, and a spread whose middle is no aircraft that
+    flies.
+    """
+    path = Path(target)
+    if path.suffix.lower() in (".json", ".waypoints", ".plan"):
+        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change)
+        base = of_mission(opened, spread)
+    else:
+        scenario = change(load_scenario(target, terrain))
+        airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
+        plan = make_plan(scenario, airframe, number, advance=advance)
+        if not plan.feasible:
+            raise MissionError(f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why")
+        mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+        placed = place_stops(mission, scenario.origin, scenario.terrain)
+        base = CampaignBase(scenario, airframe, mission, placed, plan, spread, number, scenario.name)
+    check_middle(base)
+    # A mission that cannot be laid out is refused here, not by a worker.
+    make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
+    return base
+
+
+def of_mission(opened: OpenedMission, spread: Spread) -> CampaignBase:
+    """The base of a campaign of a mission that has been opened."""
+    setup = opened.setup
+    scenario, mission = setup.scenario, setup.mission
+    placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
+    return CampaignBase(scenario, opened.airframe, mission, placed, setup.plan, spread, setup.seed, opened.name)
+
+
+def check_middle(base: CampaignBase) -> None:
+    """Refuse a spread with whose medians the aircraft holds no level flight.  Raises SpreadError."""
+    medians = {one.quantity.name: one.value(0.5) for one in base.spread.varying}
+    variation = Variation(
+        mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
+    )
+    aircraft = base.airframe.aircraft
+    model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
+    amsl = float(base.scenario.start[2])
+    if straight(model, base.airframe.airspeed, amsl) is None:
+        factors = ", ".join(f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians)
+        raise SpreadError(
+            f"{base.spread.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
+            f" {base.airframe.airspeed:g} m/s"
+        )
+
+
