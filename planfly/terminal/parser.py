@@ -19,6 +19,7 @@ from planfly.terminal.argument_types import (
     threat,
     time_or_stations,
 )
+from planfly.terminal.campaign_options import add_campaigns
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from planfly.terminal.parser_options import (
     flown_by_options,
@@ -63,6 +64,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_log_commands(command)
     _add_serve(command)
     _add_paper(command)
+    add_campaigns(command)
     _add_aircraft(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser

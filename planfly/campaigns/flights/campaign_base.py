@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from aircraft.catalog import model_hash
@@ -16,7 +16,8 @@ from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.campaigns.spread.spread_file import Spread, SpreadError
 from planfly.open_mission import OpenedMission, ScenarioChange, open_mission
 from planfly.pipeline import Advance, make_plan, make_setup
-from planner.plan import Plan
+from planner.plan import Plan, plan_json, read_plan
+from world.atomic_files import write_whole
 from world.errors import MissionError
 from world.scenario import Scenario, load_scenario
 
@@ -62,6 +63,7 @@ def open_campaign(
     target: str,
     spread: Spread,
     *,
+    planned: Path | None = None,
     scenario_name: str | None = None,
     terrain: str | None = None,
     seed: int | None = None,
@@ -71,34 +73,52 @@ def open_campaign(
     """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
 
     target: an embedded scenario's name, a scenario's TOML file, a plan.json, .waypoints or .plan.
+    planned: where a scenario's plan is kept: it is read from there if it is there already, else written.
     scenario_name, terrain, change: as of `planfly.open_mission.open_mission`.
     seed: of plan and draws; None takes the scenario's, or 1.
     Raises a PlanflyError for bad input, a plan that is not feasible, and a spread whose middle is no aircraft that
     flies.
     """
     path = Path(target)
-    if path.suffix.lower() in (".json", ".waypoints", ".plan"):
-        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change)
-        base = of_mission(opened, spread)
-    else:
+    if path.suffix.lower() not in (".json", ".waypoints", ".plan"):
         scenario = change(load_scenario(target, terrain))
-        airframe, number = load_airframe(scenario), choose_seed(scenario, seed)
-        plan = make_plan(scenario, airframe, number, advance=advance)
-        if not plan.feasible:
-            raise MissionError(f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why")
-        mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
-        placed = place_stops(mission, scenario.origin, scenario.terrain)
-        base = CampaignBase(scenario, airframe, mission, placed, plan, spread, number, scenario.name)
+        kept = planned is not None and planned.is_file()
+        plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
+        if kept and plan.scenario.to_json() != scenario.to_json():
+            raise MissionError(f"{planned}: is the plan of another scenario than {target}")
+        if planned is not None and not kept:
+            write_whole(planned, plan_json(plan))
+        base = _of_plan(plan, spread, choose_seed(scenario, seed))
+    else:
+        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change)
+        base = _of_mission(opened, spread, path.name)
     check_middle(base)
     # A mission that cannot be laid out is refused here, not by a worker.
     make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
     return base
 
 
-def of_mission(opened: OpenedMission, spread: Spread) -> CampaignBase:
-    """The base of a campaign of a mission that has been opened."""
+def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
+    plan = make_plan(scenario, load_airframe(scenario), choose_seed(scenario, seed), advance=advance)
+    if not plan.feasible:
+        raise MissionError(f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why")
+    return plan
+
+
+def _of_plan(plan: Plan, spread: Spread, seed: int) -> CampaignBase:
+    scenario = plan.scenario
+    airframe = load_airframe(scenario)
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="plan.json", tracking=tracking)
+    placed = place_stops(mission, scenario.origin, scenario.terrain)
+    return CampaignBase(scenario, airframe, mission, placed, plan, spread, seed, scenario.name)
+
+
+def _of_mission(opened: OpenedMission, spread: Spread, source: str) -> CampaignBase:
     setup = opened.setup
-    scenario, mission = setup.scenario, setup.mission
+    # By its name alone: the folder that it lies in is nothing of the flight's.
+    mission = replace(setup.mission, source=source)
+    scenario = setup.scenario
     placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
     return CampaignBase(scenario, opened.airframe, mission, placed, setup.plan, spread, setup.seed, opened.name)
 

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,13 @@ LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "mo
 MOST_WIND, MOST_GRADIENT = 40.0, 0.05
 
 
+class MeanWind(NamedTuple):
+    """A mean wind that takes the place of a scenario's: speed in m/s, and where it comes from, degrees."""
+
+    speed: float
+    from_deg: float
+
+
 @dataclass(frozen=True)
 class VariedFlight:
     """A setup in its own wind, over its own terrain, and the rest of its draw."""
@@ -33,14 +40,14 @@ class VariedFlight:
     off_nominal: OffNominal
 
 
-def vary(base: CampaignBase, draw: Draw) -> VariedFlight:
-    """The flight of a draw.
+def vary(base: CampaignBase, draw: Draw, wind: MeanWind | None = None) -> VariedFlight:
+    """The flight of a draw; wind: about which it varies, None for the scenario's.
 
     Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power and the
     start's place are known to nobody who steers.
     """
     values = draw.values
-    scenario = _in_wind(base.scenario, values)
+    scenario = _in_wind(base.scenario, values, wind)
     if values["terrain_height"] and scenario.terrain is not None:
         scenario = replace(scenario, terrain=_raised(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
@@ -51,11 +58,12 @@ def vary(base: CampaignBase, draw: Draw) -> VariedFlight:
     return VariedFlight(setup, airframe, OffNominal(variation, offset))
 
 
-def _in_wind(scenario: Scenario, values: dict[str, float]) -> Scenario:
+def _in_wind(scenario: Scenario, values: dict[str, float], mean: MeanWind | None) -> Scenario:
     """The scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
     old = scenario.wind
-    speed = min(MOST_WIND, max(0.0, old.speed + values["wind_speed"]))
-    from_deg = (math.degrees(old.from_course) + values["wind_from"]) % 360.0
+    about = mean or MeanWind(old.speed, math.degrees(old.from_course))
+    speed = min(MOST_WIND, max(0.0, about.speed + values["wind_speed"]))
+    from_deg = (about.from_deg + values["wind_from"]) % 360.0
     gradient = min(MOST_GRADIENT, max(-MOST_GRADIENT, old.gradient + values["wind_gradient"]))
     level = LEVELS.index(old.turbulence) + round(values["turbulence"])
     turbulence = LEVELS[min(len(LEVELS) - 1, max(0, level))]
