@@ -129,7 +129,5 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
     return Goal(prove if prove is not None else at_least, prove is not None, number, confidence)
 
 
-def _shares(
-    prove: float | None, at_least: float | None, confidence: float
-) -> Iterable[tuple[str, float | None]]:
+def _shares(prove: float | None, at_least: float | None, confidence: float) -> Iterable[tuple[str, float | None]]:
     return (("prove", prove), ("at_least", at_least), ("confidence", confidence))

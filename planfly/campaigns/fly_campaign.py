@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from planfly.campaigns.engine.cluster import Workers, connected
@@ -29,24 +29,22 @@ class _Book:
 
     estimator: Estimator
     goal: Goal
-    tally: Tally = Tally(0, 0)
-    beyond: dict[int, str] | None = None
+    tally: Tally = field(default_factory=lambda: Tally(0, 0))
+    beyond: dict[int, str] = field(default_factory=dict)
     sent: int = 0
     decided: bool = False
 
     def add(self, index: int, outcome: str) -> None:
         """Take a flight in, and decide as soon as the flights without a gap do."""
-        beyond = self.beyond if self.beyond is not None else {}
-        self.beyond = beyond
-        beyond[index] = outcome
-        while not self.decided and (known := beyond.pop(self.tally.flown, None)) is not None:
+        self.beyond[index] = outcome
+        while not self.decided and (known := self.beyond.pop(self.tally.flown, None)) is not None:
             self.tally = _with_outcome(self.tally, known)
             self.decided = self.goal.stops and self.estimator.decides(self.tally)
 
     def following(self) -> Order | None:
         """The next flight to send."""
         self.sent = max(self.sent, self.tally.flown)
-        while self.beyond and self.sent in self.beyond:
+        while self.sent in self.beyond:
             self.sent += 1
         if self.decided or self.sent >= self.goal.flights:
             return None

@@ -5,19 +5,24 @@ import sys
 from pathlib import Path
 
 from logs.verdict.wording import place_text
-from planfly.campaigns.campaign_result import make_goal
 from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_again, write_files
 from planfly.campaigns.report.summary import summarise, summary_lines
-from planfly.campaigns.spread.spread_file import Spread, default_spread, read_spread
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.storage.store import DATABASE
+from planfly.commands.campaign_missions import (
+    campaign_goal,
+    campaign_spread,
+    command_line,
+    default_campaign_folder,
+    open_base,
+)
 from planfly.terminal.exit_codes import FLYABLE, INTERRUPTED, LOSS, NOT_FLYABLE
 from planfly.terminal.progress import progress
-from planfly.terminal.scenario_options import scenario_change
-from planfly.terminal.targets import RESULTS
+from planner.plan import plan_json
+from world.atomic_files import write_whole
 from world.errors import PlanflyError
 
 _EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}
@@ -74,54 +79,10 @@ def _refly(base: CampaignBase, goal: Goal, folder: Path, index: int) -> int:
     return FLYABLE if again.outcome == "flyable" else NOT_FLYABLE
 
 
-def campaign_goal(args: argparse.Namespace) -> Goal:
-    """The goal that the options state.  Raises PlanflyError."""
-    try:
-        return make_goal(args.flights, args.prove, args.at_least, args.confidence)
-    except ValueError as error:
-        raise PlanflyError(f"--{error}") from error
-
-
-def campaign_spread(args: argparse.Namespace) -> Spread:
-    """The spread that the options name.  Raises SpreadError."""
-    return default_spread() if args.spread is None else read_spread(Path(args.spread))
-
-
-def open_base(args: argparse.Namespace, spread: Spread, folder: Path | None) -> CampaignBase:
-    """The mission of the options, planned if it is a scenario, or as an earlier campaign in the folder has planned it."""
-    change = scenario_change(args)
-
-    def opened(advance: object = None) -> CampaignBase:
-        return open_campaign(
-            args.target,
-            spread,
-            planned=None if folder is None else folder / "plan.json",
-            scenario_name=args.scenario,
-            terrain=args.terrain,
-            seed=args.seed,
-            change=change,
-            advance=advance,  # type: ignore[arg-type]
-        )
-
-    is_file = Path(args.target).suffix.lower() in (".json", ".waypoints", ".plan")
-    if is_file or (folder is not None and (folder / "plan.json").is_file()):
-        return opened()
-    with progress("planning") as advance:
-        return opened(advance)
-
-
 def keep_plan(base: CampaignBase, folder: Path) -> None:
     """Keep the plan with the campaign, for those that go on with it."""
-    from planner.plan import plan_json
-    from world.atomic_files import write_whole
-
     if base.plan is not None:
         write_whole(folder / "plan.json", plan_json(base.plan))
-
-
-def default_campaign_folder(target: str, kind: str) -> Path:
-    """Where a campaign goes that nobody named a folder for: ``runs/<name>-<kind>``."""
-    return RESULTS / f"{Path(target).stem}-{kind}"
 
 
 def refuse_campaign(folder: Path, overwrite: bool) -> None:
@@ -132,12 +93,3 @@ def refuse_campaign(folder: Path, overwrite: bool) -> None:
         holds = any((folder / name).exists() for name in CAMPAIGN_FILES)
         what = "holds a campaign; --resume goes on with it, " if holds else "exists and is not empty; "
         raise PlanflyError(f"{folder}: {what}--overwrite replaces it")
-
-
-def command_line(args: argparse.Namespace) -> str:
-    """The line that repeats it."""
-    names = ("spread", "flights", "prove", "at_least", "seed", "scenario", "terrain")
-    given = "".join(
-        f" --{name.replace('_', '-')} {value}" for name in names if (value := getattr(args, name)) is not None
-    )
-    return f"planfly {args.command} {args.target}{given}"

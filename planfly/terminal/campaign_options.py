@@ -22,7 +22,9 @@ def add_campaigns(command: _Command) -> None:
     goal.add_argument("--at-least", metavar="P", type=_share, help="answer after all flights whether P is reached")
     campaign.add_argument("--flights", metavar="N", type=_flights, help="how many (300), at most with --prove (5000)")
     campaign.add_argument("--resume", action="store_true", help="go on with the campaign in --out")
-    campaign.add_argument("--refly", metavar="K", type=_index, help="fly flight K of the campaign in --out again, into a log")
+    campaign.add_argument(
+        "--refly", metavar="K", type=_index, help="fly flight K of the campaign in --out again, into a log"
+    )
     winds = command(
         "winds",
         "find the largest wind from each direction in which a mission flies",

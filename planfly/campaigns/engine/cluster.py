@@ -39,7 +39,10 @@ def connected(workers: Workers) -> Iterator[Any]:
     Raises SchedulerError for an address that may not be used, and a scheduler that does not answer.
     """
     import dask
-    from distributed import Client, LocalCluster
+    import distributed
+
+    # It states no types.
+    cluster_types: Any = distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     settings = {
@@ -54,13 +57,13 @@ def connected(workers: Workers) -> Iterator[Any]:
         if workers.scheduler is not None:
             address = checked_address(workers.scheduler)
             try:
-                client = Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+                client = cluster_types.Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
             except (OSError, TimeoutError, ValueError) as error:
                 raise SchedulerError(f"--scheduler {address}: no scheduler answers: {error}") from error
             with client:
                 yield client
             return
-        cluster = LocalCluster(
+        cluster = cluster_types.LocalCluster(
             n_workers=workers.count or os.cpu_count() or 1,
             threads_per_worker=1,
             processes=True,
@@ -70,7 +73,7 @@ def connected(workers: Workers) -> Iterator[Any]:
             memory_limit=0,
             silence_logs=logging.CRITICAL,
         )
-        with cluster, Client(cluster, set_as_default=False) as client:
+        with cluster, cluster_types.Client(cluster, set_as_default=False) as client:
             yield client
 
 

@@ -2,7 +2,8 @@
 
 import uuid
 from collections.abc import Callable, Iterator
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
 
 from planfly.campaigns.engine.fingerprint import fingerprint
 from planfly.campaigns.engine.flight_tasks import CampaignPlugin, FlyOne, fly_task
@@ -12,7 +13,8 @@ from planfly.campaigns.flights.varied_flight import MeanWind
 from world.errors import PlanflyError
 
 
-class Order(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Order:
     """A flight to fly: its index, and the mean wind that takes the scenario's place, None for none."""
 
     index: int
@@ -41,7 +43,8 @@ class Pilots:
 
     def threads(self) -> int:
         """Flights that the workers can fly at a time, at least 1."""
-        return max(1, sum(self._client.nthreads().values()))
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
 
     def fly(self, following: Callable[[], Order | None]) -> Iterator[Flown]:
         """Fly orders as they are asked for, and hand each back as it is done, in whatever order that is.
@@ -52,7 +55,7 @@ class Pilots:
         from distributed import as_completed
 
         flying: dict[str, Order] = {}
-        done = as_completed(loop=self._client.loop)
+        done: Any = cast("Any", as_completed)(loop=self._client.loop)
 
         def send() -> None:
             while len(flying) < self.threads():

@@ -133,10 +133,10 @@ def check_middle(base: CampaignBase) -> None:
     model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
     amsl = float(base.scenario.start[2])
     if straight(model, base.airframe.airspeed, amsl) is None:
-        factors = ", ".join(f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians)
+        factors = ", ".join(
+            f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
+        )
         raise SpreadError(
             f"{base.spread.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
             f" {base.airframe.airspeed:g} m/s"
         )
-
-

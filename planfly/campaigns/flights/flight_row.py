@@ -106,8 +106,8 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
     """Of each rule that was judged the finding with the least margin, in the verdict's order.
 
     >>> from logs.verdict.findings import make_finding
-    >>> made = [make_finding("clearance", Place("leg", k), ok=True, reason="", margin=m) for k, m in ((0, 9.0), (1, 4.0))]
-    >>> least_margins(tuple(made))[0][1].value
+    >>> wide, close = (make_finding("slope", Place("leg", 1), ok=True, reason="", margin=m) for m in (9.0, 4.0))
+    >>> least_margins((wide, close))[0][1].value
     4.0
     """
     least: dict[str, Finding] = {}

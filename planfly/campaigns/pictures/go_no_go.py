@@ -15,7 +15,6 @@ class Spoke:
 
     from_deg: where the wind comes from.
     boundary: largest wind with the probability asked for, m/s, as estimated; low, high: its interval.
-    proved: largest wind for which the lower bound reaches it, m/s; 0 where none does.
     reaches: whether the boundary lies beyond all that was looked at.
     flights: wind speed, flights and flyable ones, for the marks.
     """
@@ -24,7 +23,6 @@ class Spoke:
     boundary: float
     low: float
     high: float
-    proved: float
     reaches: bool
     flights: tuple[tuple[float, int, int], ...]
 
@@ -49,8 +47,8 @@ def draw_go_no_go(
             return np.interp(fine, angle, values)
 
         low, high = outline([one.low for one in ring]), outline([one.high for one in ring])
-        boundary, proved = outline([one.boundary for one in ring]), outline([one.proved for one in ring])
-        axes.fill_between(fine, 0.0, proved, color=PLANNED, alpha=0.45, linewidth=0.0)
+        boundary = outline([one.boundary for one in ring])
+        axes.fill_between(fine, 0.0, low, color=PLANNED, alpha=0.45, linewidth=0.0)
         axes.fill_between(fine, boundary, most, color=FAIL, alpha=0.13, linewidth=0.0)
         axes.fill_between(fine, low, high, color=LIMIT, alpha=0.45, linewidth=0.0)
         axes.plot(fine, boundary, color=INK, linewidth=1.8)
@@ -78,11 +76,12 @@ def draw_go_no_go(
 
 
 def _legend(figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None) -> None:
+    from matplotlib.artist import Artist
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    entries: list[tuple[object, str]] = [
-        (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} shown\nat {100 * confidence:g} %"),
+    entries: list[tuple[Artist, str]] = [
+        (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
         (Line2D([], [], color=INK, linewidth=1.8), f"boundary, P = {target:g}"),
         (Patch(color=LIMIT, alpha=0.45), f"its interval, {100 * confidence:g} %"),
         (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),

@@ -67,7 +67,13 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
             )
             axes.plot([one.low, one.high], [p, p], color=BLUE, linewidth=2.0)
             axes.annotate(
-                f"{one.flights}", (x, 0.0), xytext=(0, 3), textcoords="offset points", ha="center", fontsize=7, color=QUIET
+                f"{one.flights}",
+                (x, 0.0),
+                xytext=(0, 3),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7,
+                color=QUIET,
             )
         if target is not None:
             axes.axhline(target, color=LIMIT, linewidth=1.2, linestyle="--")

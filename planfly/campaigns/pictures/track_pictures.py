@@ -17,7 +17,9 @@ _CHI2 = -2.0 * math.log(0.05)
 _COLUMNS = 5
 
 
-def draw_clearance_fan(clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, least: float) -> Figure:
+def draw_clearance_fan(
+    clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, least: float
+) -> Figure:
     """Height above ground along the way over all flights, over the ground's own profile.
 
     clearance: (n, s) least of each flight on each of s equal pieces of the way, m, NaN where it did not get.
@@ -72,7 +74,8 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
         figure = new_figure(0.7 + 2.0 * lines)
         reach = _reach(crossings)
         panels = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
-        figure.subplots_adjust(left=0.07, right=0.98, bottom=0.5 / (0.7 + 2.0 * lines), top=0.9, wspace=0.12, hspace=0.3)
+        tall = 0.7 + 2.0 * lines
+        figure.subplots_adjust(left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.12, hspace=0.3)
         for k, axes in enumerate(panels.ravel()):
             if k >= count:
                 axes.set_axis_off()
@@ -89,9 +92,9 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
             axes.set_xlim(-reach, reach)
             axes.set_ylim(-reach, reach)
             axes.tick_params(labelsize=7)
-        figure.text(0.07, 0.965, "Crossings of the waypoints, m right of and above each, with the ellipse of 95 %",
-                    fontsize=11, color=INK)  # fmt: skip
-        figure.text(0.98, 0.965, "dots flyable, crosses not", fontsize=8, color=QUIET, ha="right")
+        title = "Crossings of the waypoints, m right of and above each, with the ellipse of 95 %"
+        figure.text(0.07, 1.0 - 0.3 / tall, title, fontsize=11, color=INK)
+        figure.text(0.98, 1.0 - 0.3 / tall, "dots flyable, crosses not", fontsize=8, color=QUIET, ha="right")
     return figure
 
 

@@ -28,7 +28,12 @@ def _logs(folder: Path) -> list[Path]:
 
 
 def write_files(
-    folder: Path, base: CampaignBase, summary: CampaignSummary, store: Store, command: str, advance: Advance | None = None
+    folder: Path,
+    base: CampaignBase,
+    summary: CampaignSummary,
+    store: Store,
+    command: str,
+    advance: Advance | None = None,
 ) -> None:
     """Write ``summary.json``, ``report.html`` and the worst flights' logs; logs of flights that are none stay not."""
     from planfly.campaigns.report.page import campaign_page

@@ -1,6 +1,7 @@
 """The page of a campaign: one HTML file that needs no other, its pictures inside."""
 
 import base64
+from collections.abc import Sequence
 from importlib import resources
 
 import numpy as np
@@ -78,11 +79,11 @@ def _embedded(figure: Figure) -> str:
     return "data:image/png;base64," + base64.b64encode(png_bytes(figure)).decode("ascii")
 
 
-def winds_page(name: str, figure: Figure, lines: list[str], rows: list[tuple[str, ...]], command: str) -> bytes:
+def winds_page(name: str, figure: Figure, lines: list[str], rows: Sequence[tuple[str, ...]], command: str) -> bytes:
     """The page of a go/no-go chart."""
-    return _render(
-        "winds.html", name=name, picture=_embedded(figure), lines=lines, rows=rows, command=command
-    ).encode("utf-8")
+    return _render("winds.html", name=name, picture=_embedded(figure), lines=lines, rows=rows, command=command).encode(
+        "utf-8"
+    )
 
 
 def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> list[tuple[Figure, str]]:

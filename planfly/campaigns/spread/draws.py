@@ -22,13 +22,13 @@ class Draw:
 
 
 def draw_flight(spread: Spread, seed: int, index: int) -> Draw:
-    """Draw a flight's numbers.
+    r"""Draw a flight's numbers.
 
     seed: the campaign's.  The stream is ``SeedSequence(seed, spawn_key=(index,))``: no flight needs another's draw, so
     that any order, any number of workers and any part of a campaign give the same flights.
 
     >>> from planfly.campaigns.spread.spread_file import parse_spread
-    >>> one = parse_spread('[mass]\\ndistribution = "uniform"\\nloc = 0.9\\nscale = 0.2\\nsource = "by hand"', "x")
+    >>> one = parse_spread('[mass]\ndistribution = "uniform"\nloc = 0.9\nscale = 0.2\nsource = "by hand"', "x")
     >>> first, again = draw_flight(one, 1, 7), draw_flight(one, 1, 7)
     >>> first == again, first.values["drag"], 0.9 < first.values["mass"] < 1.1
     (True, 1.0, True)

@@ -105,16 +105,18 @@ def default_spread() -> Spread:
 
 def read_spread(path: Path) -> Spread:
     """Read a spread file.  Raises SpreadError for one that cannot be read or used."""
-    return parse_spread(utf8_text(read_small_file(path, MOST_BYTES, "spread", SpreadError), path, SpreadError), str(path))
+    return parse_spread(
+        utf8_text(read_small_file(path, MOST_BYTES, "spread", SpreadError), path, SpreadError), str(path)
+    )
 
 
 def parse_spread(text: str, name: str) -> Spread:
-    """The spread of a file's text; name: of the file in messages.
+    r"""The spread of a file's text; name: of the file in messages.
 
     Raises SpreadError, in one line, for what is no TOML, an unknown quantity, an unknown distribution, a parameter that
     the distribution has not or may not have, and a distribution that lies outside the quantity's range.
 
-    >>> parse_spread('[mass]\\ndistribution = "norm"\\nloc = 9.0\\nscale = 0.1\\nsource = "a guess"', "mine.toml")
+    >>> parse_spread('[mass]\ndistribution = "norm"\nloc = 9.0\nscale = 0.1\nsource = "a guess"', "mine.toml")
     Traceback (most recent call last):
     ...
     planfly.campaigns.spread.spread_file.SpreadError: mine.toml: mass: norm(loc=9, scale=0.1): 0.0 % ... 0.5..2 ...

@@ -133,7 +133,9 @@ class Store:
 
     def texts(self, name: str) -> list[str]:
         """A column of words, in the order of flights."""
-        return [str(value) for (value,) in self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")]
+        return [
+            str(value) for (value,) in self._connection.execute(f"SELECT {_known(name)} FROM flights ORDER BY flight")
+        ]
 
     def blobs(self, name: str, most: int) -> list[bytes]:
         """A column of arrays' bytes, of the first flights that have some."""
@@ -175,7 +177,7 @@ def read_table(path: Path) -> dict[str, list[Any]]:
     return {name: list(values) for name, values in zip(COLUMNS, zip(*rows, strict=True), strict=True)} if rows else {}
 
 
-class _told:  # noqa: N801 - reads as a statement
+class _told:
     """Tell SQLite's errors as ours: a full disk as OSError, the rest as StoreError."""
 
     def __init__(self, path: Path) -> None:
@@ -201,7 +203,6 @@ def _known(name: str) -> str:
     if name not in COLUMNS:
         raise KeyError(name)
     return name
-
 
 
 def _values(row: FlightRow, made_of: str) -> list[Any]:
