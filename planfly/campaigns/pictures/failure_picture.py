@@ -17,8 +17,9 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
     """
     with clean_style():
         shown = sorted(counts, key=lambda one: -one[2])[:MOST]
-        figure = new_figure(1.3 + 0.32 * max(1, len(shown)))
-        axes = figure.add_axes((0.27, 0.14, 0.69, 0.70))
+        tall = 1.4 + 0.32 * max(1, len(shown))
+        figure = new_figure(tall)
+        axes = figure.add_axes((0.27, 0.6 / tall, 0.69, 1.0 - 1.1 / tall))
         axes.set_title("Failures by rule and place")
         for side in ("top", "right"):
             axes.spines[side].set_visible(False)

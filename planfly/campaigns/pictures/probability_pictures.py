@@ -90,8 +90,9 @@ def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
 def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
     """What the deciding margin's variance comes from: to the right more of the quantity helps, to the left it harms."""
     with clean_style():
-        figure = new_figure(1.6 + 0.32 * max(1, len(bars)))
-        axes = figure.add_axes((0.17, 0.22, 0.79, 0.62))
+        tall = 1.2 + 0.3 * max(1, len(bars))
+        figure = new_figure(tall)
+        axes = figure.add_axes((0.17, 0.5 / tall, 0.79, 1.0 - 1.1 / tall))
         rows = range(len(bars))
         for row, bar in zip(rows, bars, strict=True):
             length = bar.index * (1.0 if bar.slope >= 0.0 else -1.0)

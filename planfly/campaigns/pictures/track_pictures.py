@@ -72,10 +72,9 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
     lines = -(-count // columns)
     with clean_style():
         figure = new_figure(0.7 + 2.0 * lines)
-        reach = _reach(crossings)
-        panels = figure.subplots(lines, columns, squeeze=False, sharex=True, sharey=True)
+        panels = figure.subplots(lines, columns, squeeze=False)
         tall = 0.7 + 2.0 * lines
-        figure.subplots_adjust(left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.12, hspace=0.3)
+        figure.subplots_adjust(left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.22, hspace=0.35)
         for k, axes in enumerate(panels.ravel()):
             if k >= count:
                 axes.set_axis_off()
@@ -89,6 +88,7 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
             if good.sum() > 2:
                 axes.add_patch(covariance_ellipse(here[good]))
             axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
+            reach = _reach(here)
             axes.set_xlim(-reach, reach)
             axes.set_ylim(-reach, reach)
             axes.tick_params(labelsize=7)
