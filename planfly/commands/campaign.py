@@ -5,20 +5,20 @@ import sys
 from pathlib import Path
 
 from logs.verdict.wording import place_text
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_again, write_files
-from planfly.campaigns.report.summary import summarise, summary_lines
-from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.store import DATABASE
-from planfly.commands.campaign_missions import (
+from planfly.campaigns.asked_campaign import (
     campaign_goal,
     campaign_spread,
     command_line,
     default_campaign_folder,
     open_base,
 )
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_again, write_files
+from planfly.campaigns.report.summary import campaign_lines, summarise
+from planfly.campaigns.statistics.decision import Goal
+from planfly.campaigns.storage.store import DATABASE
 from planfly.terminal.exit_codes import FLYABLE, INTERRUPTED, LOSS, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planner.plan import plan_json
@@ -59,7 +59,7 @@ def _fly(args: argparse.Namespace, base: CampaignBase, goal: Goal, folder: Path)
         summary = summarise(base, goal, estimate, store)
         with progress("reporting") as advance:
             write_files(folder, base, summary, store, command_line(args), advance)
-    print("\n".join(summary_lines(summary)))
+    print("\n".join(campaign_lines(summary)))
     print(f"results   {folder}/ (report.html, summary.json, {DATABASE}, worst/)")
     return _EXITS[estimate.answer]
 

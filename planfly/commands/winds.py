@@ -4,10 +4,10 @@ import argparse
 import sys
 from pathlib import Path
 
+from planfly.campaigns.asked_campaign import campaign_spread, command_line, default_campaign_folder, open_base
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.find_winds import ASKED, WindsGoal, find_winds
 from planfly.campaigns.report.wind_files import wind_lines, write_winds
-from planfly.commands.campaign_missions import campaign_spread, command_line, default_campaign_folder, open_base
 from planfly.terminal.exit_codes import FLYABLE, INTERRUPTED
 from planfly.terminal.progress import progress
 from planfly.terminal.targets import refuse_folder

@@ -74,7 +74,9 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
         figure = new_figure(0.7 + 2.0 * lines)
         panels = figure.subplots(lines, columns, squeeze=False)
         tall = 0.7 + 2.0 * lines
-        figure.subplots_adjust(left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.22, hspace=0.35)
+        figure.subplots_adjust(
+            left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.22, hspace=0.35
+        )
         for k, axes in enumerate(panels.ravel()):
             if k >= count:
                 axes.set_axis_off()

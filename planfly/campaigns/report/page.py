@@ -16,7 +16,7 @@ from planfly.campaigns.flights.track_shape import STATIONS
 from planfly.campaigns.pictures.failure_picture import draw_failures
 from planfly.campaigns.pictures.probability_pictures import Bar, draw_probability, draw_tornado, speed_bins
 from planfly.campaigns.pictures.track_pictures import draw_clearance_fan, draw_crossings
-from planfly.campaigns.report.summary import CampaignSummary, closest_text, log_name, summary_lines
+from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, closest_text, log_name
 from planfly.campaigns.spread.quantities import BY_NAME
 from planfly.campaigns.storage.store import Store
 from planfly.pipeline import make_setup
@@ -28,7 +28,7 @@ _DRAWN = 3000
 def campaign_page(base: CampaignBase, summary: CampaignSummary, store: Store, command: str) -> bytes:
     """The page's bytes; command: the line that flies it again."""
     pictures = [(_embedded(figure), words) for figure, words in _pictures(base, summary, store)]
-    lines = summary_lines(summary)
+    lines = campaign_lines(summary)
     text = _render(
         "campaign.html",
         name=summary.name,

@@ -48,7 +48,9 @@ class Sensitivity:
 class CampaignSummary:
     """All that summary and report tell.
 
-    deciding: the rule that fails most, or, where none does, whose margins come nearest to nothing; "" for none.
+    deciding: the rule that fails most, or, where none does, that of the least reliability index: the mean of its
+    margins in their standard deviations (Cornell, "A probability-based structural code", ACI Journal 66, 1969); "" for
+    none.
     low_margin: of that rule, the margin that one flight in twenty falls below, in `unit`; None where unknown.
     """
 
@@ -103,18 +105,20 @@ def _failures(store: Store) -> tuple[RuleFailures, ...]:
 
 
 def _deciding_rule(store: Store, by_rule: tuple[RuleFailures, ...]) -> tuple[str, float | None]:
-    lows = {}
+    lows, indices = {}, {}
     for rule in RULES:
         margins = store.column(f"margin_{rule}")
         known = margins[np.isfinite(margins)]
         if known.size:
             lows[rule] = float(np.quantile(known, 0.05))
+            spread = float(known.std())
+            indices[rule] = float(known.mean()) / spread if spread > 0.0 else math.inf
     if by_rule:
         rule = max(by_rule, key=lambda one: one.flights).rule
         return rule, lows.get(rule)
     if not lows:
         return "", None
-    rule = min(lows, key=lambda name: lows[name] / SCALES[name])
+    rule = min(indices, key=lambda name: indices[name])
     return rule, lows[rule]
 
 
@@ -200,7 +204,7 @@ def log_name(row: FlightRow) -> str:
     return f"worst/flight-{row.draw.index:06d}.mcap"
 
 
-def summary_lines(summary: CampaignSummary) -> list[str]:
+def campaign_lines(summary: CampaignSummary) -> list[str]:
     """The summary on a terminal."""
     found, goal = summary.estimate, summary.goal
     tally, sure = found.tally, f"{100.0 * goal.confidence:g} %"

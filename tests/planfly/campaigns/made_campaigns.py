@@ -67,10 +67,8 @@ def made_flight(base: CampaignBase, index: int, wind: MeanWind | None = None) ->
     """A flight whose outcome follows from its draw: nine of ten fly; in a wind from W at most 12 m/s, else 8."""
     draw = draw_flight(base.spread, base.seed, index)
     luck = draw.seed % 1000 / 1000.0
-    if wind is None:
-        good = luck < 0.9
-    else:
-        good = wind.speed < (12.0 if wind.from_deg == 270.0 else 8.0) + luck - 0.5
+    strong = 12.0 if wind is not None and wind.from_deg == 270.0 else 8.0
+    good = luck < 0.9 if wind is None else wind.speed < strong + luck - 0.5
     margin = LeastMargin(1.0 if good else -1.0, "m", Place("leg", 1))
     failed = () if good else (("clearance", Place("leg", 1)),)
     return FlightRow(

@@ -1,4 +1,4 @@
-"""What the commands of campaigns have in common: goal, spread, mission and folder of the options."""
+"""A campaign as the command line asks for it: its goal, spread, mission and folder."""
 
 import argparse
 from pathlib import Path
@@ -59,6 +59,6 @@ def command_line(args: argparse.Namespace) -> str:
     """The line that repeats it."""
     names = ("spread", "flights", "prove", "at_least", "seed", "scenario", "terrain")
     given = "".join(
-        f" --{name.replace('_', '-')} {value}" for name in names if (value := getattr(args, name)) is not None
+        f" --{name.replace('_', '-')} {value}" for name in names if (value := getattr(args, name, None)) is not None
     )
     return f"planfly {args.command} {args.target}{given}"
