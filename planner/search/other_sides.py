@@ -25,7 +25,9 @@ AGAIN, LEAST_GAIN = 3, 2e-5
 
 
 def search_other_sides(search: Search) -> None:
-    """Shorten routes on other sides than those of the best path."""
+    """Shorten the best path, and routes on other sides than its own."""
+    if search.shortens and search.has_safe():
+        shorten_best(search)
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame = rotated_frame(space.start, space.destination)
     straight, found_one = math.dist(space.start, space.destination), search.has_safe()

@@ -168,8 +168,6 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
         search.note()
         return
     if algorithm.seeded:
-        if search.shortens and search.has_safe():
-            shorten_best(search)
         search_other_sides(search)
     last = None
     if algorithm.optimiser == "waypoints":
@@ -178,13 +176,17 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
             waypoint_generations(search, population, table.generations)
     else:
         last = path_generations(search, population, table.generations, starts)
-    if search.shortens and search.ended == "completed":
+    if algorithm.tightened and search.ended == "completed":
+        _finish(search, last)
+
+
+def _finish(search: Search, last: Floats | None) -> None:
+    """Shorten or tighten the best path, and the vector (d,) that generations came to, if there were any."""
+    if search.shortens:
         if last is not None:
             search.shorten(search.encoding.decode(last[None])[0])
         shorten_best(search)
-        search.note()
-        search.report(0)
-    if algorithm.tightened and search.ended == "completed" and search.shortest is None:
+    if search.shortest is None:
         # What the generations came to, tightened, may be another way than the improved seed's.
         if last is not None:
             search.tighten(last, LAST_ROUNDS, 0.5, LAST_SEARCH)
@@ -192,5 +194,5 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
             if search.over():
                 break
             search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
-        search.note()
-        search.report(0)
+    search.note()
+    search.report(0)

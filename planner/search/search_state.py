@@ -172,7 +172,7 @@ class Search:
 
     @property
     def shortens(self) -> bool:
-        """Whether it shortens paths free of their intervals: among zones, which shortening does not see, it does not."""
+        """Whether paths are shortened free of their intervals: not among zones, which shortening does not see."""
         return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
 
     def shorten(self, path: Floats) -> bool:

@@ -1,7 +1,8 @@
 """Shortening: a path pulled taut under its constraints, all waypoints at once and free of their intervals.
 
 A grid, a population or a moving of places finds the side of the obstacles on which to pass; how short a path is there
-is a smooth problem in all coordinates, which Newton's steps solve in a millisecond (`planner.seeding.shortening_kernels`).
+is a smooth problem in all coordinates, which Newton's steps solve in a millisecond or two
+(`planner.seeding.shortening_kernels`).
 """
 
 import math

@@ -1,54 +1,22 @@
-"""A path's length under its constraints, with derivatives, and steps down it: the compiled part of shortening.
+"""Newton's steps down a path's length under its constraints: the compiled part of `planner.seeding.path_shortening`.
 
-The augmented Lagrangian of Hestenes and Powell in the form for inequalities of Rockafellar ("The multiplier method of
-Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
-constraint c >= 0 of multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
-Steps are Newton's with the constraints' curvature left out; a constraint binds four waypoints in a row at most, so that
-the matrix is a band and a step costs as much as a few evaluations of the path.
+A step solves a band of equations (`planner.seeding.shortening_model`) and costs what a few evaluations of the path do.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.clearance_buffer import clearance_at
-from planner.evaluation.height_lags import HEIGHT_LAG, measure_lags
-from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_limits
-from planner.evaluation.leg_geometry import (
-    CORNER,
-    LEG,
-    courses_at,
-    measure_corner,
-    measure_corners,
-    measure_legs,
-    roll_length,
-    turn_length,
-)
+from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.optimisers.linear_algebra import band_cholesky, solve_band
-from world.frames import polymap
-from world.kernels import Records, compiled
-from world.terrain import pixel_height
+from planner.seeding.shortening_bindings import Bindings, bindings, carried, constraints_of
+from planner.seeding.shortening_model import BAND, Model, lagrangian
+from world.kernels import compiled
 
 Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
-# Variables that one constraint binds at most, which is the matrix's half band: three of each of four waypoints.
-BAND = 12
-# Spheres are constraints of the legs that come so near their surface, m.
-NEAR = 250.0
-# Length that a rad of turn counts as, m; and the least turn, rad, that what a turn takes of its legs is measured at.
-TURN_LENGTH, LEAST_TURN = 200.0, 0.2
-# Shortest leg, m: a little more than the scores ask for.
-SHORTEST_LEG = 15.0
-# Of a leg, the share and the length, m, that stay straight between its turns (`settling_length`).
-SETTLING_SHARE, SETTLING_LENGTH = 0.05, 20.0
-# Height by which a leg is less steep than it may be, m: what the last steps leave undecided.
-LEVEL_SPARE = 0.2
-# Half the way over which the ground's slope is taken, m.
-GROUND_STEP = 8.0
 # What is added to the matrix's diagonal, 1 / m: along a straight line a waypoint's place is free.
 DAMPING = 2e-4
 # Furthest that a step moves a waypoint along an axis, m.
@@ -57,348 +25,6 @@ LONGEST_STEP = 80.0
 FIRST_PENALTY, LAST_PENALTY, ROUNDS, STEPS, HALVINGS = 0.1, 1.0, 9, 5, 5
 # A round ends with a step that moves no waypoint further than this, m.
 STILL = 0.05
-
-
-class Bindings(NamedTuple):
-    """What constrains a path of w waypoints in one round, as seen where the round began.
-
-    pairs: (p, 2) a leg and the missile near it; wide: (p,) distance (m) wanted of its middle.
-    samples: of the ground on each leg; low: (w - 1,) m wanted above it beside the clearance.
-    climb, dive: (w - 1,) tangents.  before, after: (w,) length of the legs (m) that a turn takes, over the tangent of
-    half of it.  roll: (w - 1,) m of a leg between turns of opposite sides.
-    turns_in_legs: whether legs must hold their turns.
-    """
-
-    pairs: Ints
-    wide: Floats
-    samples: int
-    low: Floats
-    climb: Floats
-    dive: Floats
-    before: Floats
-    after: Floats
-    roll: Floats
-    turns_in_legs: bool
-
-
-class Model(NamedTuple):
-    """Gradient (n,) and band (n, BAND) of the Hessian of a path's inner waypoints; a constraint's slopes (BAND,)."""
-
-    gradient: Floats
-    band: Floats
-    slopes: Floats
-
-
-@compiled
-def bindings(data: ProblemArrays, path: Floats, samples: int, spare: float) -> Bindings:  # pragma: no cover - compiled
-    """What constrains a path (w, 3) near where it is; spare: m by which spheres and ground are kept further away."""
-    limits = precompute_limits(data)
-    count = path.shape[0] - 1
-    legs, corners, lags = np.zeros(count, dtype=LEG), np.zeros(count + 1, dtype=CORNER), np.zeros(count, HEIGHT_LAG)
-    measure_legs(path, legs)
-    measure_corners(data, limits.wind, path, legs, corners)
-    if data.tracking.strays:
-        measure_lags(data.tracking, data.aircraft, limits.wind, path, legs, lags)
-    low, climb, dive, roll = np.zeros(count), np.zeros(count), np.zeros(count), np.zeros(count)
-    for i in range(count):
-        steepest, deepest = slope_limits(data, path[i], path[i + 1])
-        climb[i], dive[i] = math.tan(steepest), math.tan(deepest)
-        low[i] = spare + lags[i].most
-        if data.legs_hold_turns and not data.fly_over:
-            up = min(path[i, 2], path[i + 1, 2])
-            roll[i] = roll_length(data.aircraft, legs, corners, i, up, limits.wind)
-    before, after = np.zeros(count + 1), np.zeros(count + 1)
-    if data.legs_hold_turns:
-        _turn_shares(data, limits, path, legs, before, after)
-    pairs, wide = _near_missiles(data, path, corners, lags, spare)
-    return Bindings(pairs, wide, samples, low, climb, dive, before, after, roll, data.legs_hold_turns)
-
-
-@compiled
-def _turn_shares(
-    data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
-) -> None:  # pragma: no cover - compiled
-    """Fill what turns take of the legs before and after them, over the tangents of half of them, (w,)."""
-    corners = np.zeros(1, dtype=CORNER)
-    for i in range(path.shape[0]):
-        ux, uy, vx, vy = courses_at(data, legs, i)
-        cross, dot = ux * vy - uy * vx, ux * vx + uy * vy
-        turn = math.atan2(abs(cross), dot)
-        if i in (0, path.shape[0] - 1) and turn == 0.0:
-            continue
-        if turn < LEAST_TURN:
-            turn = LEAST_TURN
-            sine = math.sin(turn) if cross >= 0.0 else -math.sin(turn)
-            vx, vy = ux * math.cos(turn) - uy * sine, uy * math.cos(turn) + ux * sine
-        measure_corner(data.aircraft, data.tracking, limits.wind, True, ux, uy, vx, vy, path[i, 2], corners[0])
-        share = math.tan(0.5 * min(turn, 3.0))
-        before[i], after[i] = min(1e4, corners[0].before) / share, min(1e4, corners[0].after) / share
-        if data.fly_over:
-            before[i], after[i] = 0.0, min(1e4, turn_length(True, corners, 0)) / share
-
-
-@compiled
-def _near_missiles(
-    data: ProblemArrays, path: Floats, corners: Records, lags: Records, spare: float
-) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
-    """Legs and the missiles near them (p, 2), and the distances (p,) wanted from the middles of these, m."""
-    missiles = data.missiles.missiles
-    pairs, wide = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
-    for k in range(missiles.shape[0]):
-        missile = missiles[k]
-        for i in range(path.shape[0] - 1):
-            ax, ay, az = path[i, 0] - missile.east, path[i, 1] - missile.north, path[i, 2] - missile.up
-            dx, dy, dz = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
-            length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
-            share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
-            away = math.sqrt((ax + share * dx) ** 2 + (ay + share * dy) ** 2 + (az + share * dz) ** 2)
-            if away > missile.radius + data.kill_margin + NEAR:
-                continue
-            length = math.sqrt(length2)
-            aside = 0.0
-            if share * length < corners[i].after:
-                aside = corners[i].excursion
-            if (1.0 - share) * length < corners[i + 1].before:
-                aside = max(aside, corners[i + 1].excursion)
-            lag = max(lags[i].most, -lags[i].least) * abs(az + share * dz) / max(away, 1.0)
-            pairs.append((i, k))
-            wide.append(missile.radius + data.kill_margin + spare + aside + lag)
-    out, wanted = np.zeros((len(pairs), 2), dtype=np.int64), np.zeros(len(pairs))
-    for p in range(len(pairs)):
-        out[p, 0], out[p, 1] = pairs[p]
-        wanted[p] = wide[p]
-    return out, wanted
-
-
-@compiled
-def constraints_of(bound: Bindings) -> int:  # pragma: no cover - compiled
-    """How many constraints `lagrangian` has."""
-    count: int = bound.low.size
-    return bound.pairs.shape[0] + count * (bound.samples + 4) + count + 1
-
-
-@compiled
-def _add(
-    value: float, first: int, points: int, multiplier: float, penalty: float, model: Model
-) -> float:  # pragma: no cover - compiled
-    """Add a constraint on so many waypoints from the `first` to the model; what it adds to the merit.
-
-    Its slopes with respect to them stand in `model.slopes`.
-    """
-    push = multiplier - penalty * value
-    if not push > 0.0:
-        return -multiplier * multiplier / (2.0 * penalty)
-    size, begin = model.gradient.size, 3 * (first - 1)
-    for a in range(3 * points):
-        row = begin + a
-        if 0 <= row < size:
-            model.gradient[row] -= push * model.slopes[a]
-            for b in range(a + 1):
-                if begin + b >= 0:
-                    model.band[row, a - b] += penalty * model.slopes[a] * model.slopes[b]
-    return (push * push - multiplier * multiplier) / (2.0 * penalty)
-
-
-@compiled
-def _add_length(path: Floats, model: Model) -> float:  # pragma: no cover - compiled
-    """Add the path's length to the model; the length, m."""
-    total, size, unit = 0.0, model.gradient.size, np.empty(3)
-    for i in range(path.shape[0] - 1):
-        length = 0.0
-        for axis in range(3):
-            unit[axis] = path[i + 1, axis] - path[i, axis]
-            length += unit[axis] * unit[axis]
-        length = max(1e-3, math.sqrt(length))
-        total += length
-        a, b = 3 * (i - 1), 3 * i
-        for axis in range(3):
-            unit[axis] /= length
-            if a >= 0:
-                model.gradient[a + axis] -= unit[axis]
-            if b < size:
-                model.gradient[b + axis] += unit[axis]
-        for axis in range(3):
-            for other in range(3):
-                bend = ((1.0 if axis == other else 0.0) - unit[axis] * unit[other]) / length
-                if a >= 0 and other <= axis:
-                    model.band[a + axis, axis - other] += bend
-                if b < size and other <= axis:
-                    model.band[b + axis, axis - other] += bend
-                if a >= 0 and b < size:
-                    model.band[b + axis, 3 + axis - other] -= bend
-    return total
-
-
-@compiled
-def _add_missiles(
-    data: ProblemArrays, bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: Model
-) -> float:  # pragma: no cover - compiled
-    """Add the distances of legs to missiles; what they add to the merit.  They are the first of the constraints."""
-    merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
-    for p in range(bound.pairs.shape[0]):
-        i, missile = bound.pairs[p, 0], missiles[bound.pairs[p, 1]]
-        ax, ay, az = path[i, 0] - missile.east, path[i, 1] - missile.north, path[i, 2] - missile.up
-        dx, dy, dz = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
-        length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
-        share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
-        ax, ay, az = ax + share * dx, ay + share * dy, az + share * dz
-        away = max(1e-3, math.sqrt(ax * ax + ay * ay + az * az))
-        slopes[0], slopes[1], slopes[2] = ax / away, ay / away, az / away
-        for axis in range(3):
-            slopes[3 + axis] = share * slopes[axis]
-            slopes[axis] *= 1.0 - share
-        values[p] = away - bound.wide[p]
-        merit += _add(values[p], i, 2, multipliers[p], penalty, model)
-    return merit
-
-
-@compiled
-def _add_ground(
-    data: ProblemArrays,
-    limits: PrecomputedLimits,
-    bound: Bindings,
-    path: Floats,
-    multipliers: Floats,
-    values: Floats,
-    penalty: float,
-    model: Model,
-    at: int,
-) -> float:  # pragma: no cover - compiled
-    """Add the heights of samples of the legs above what is required, constraints from `at`; see `_add_missiles`."""
-    merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
-    for i in range(path.shape[0] - 1):
-        for k in range(bound.samples):
-            share = (k + 1.0) / (bound.samples + 1.0)
-            x = path[i, 0] + share * (path[i + 1, 0] - path[i, 0])
-            y = path[i, 1] + share * (path[i + 1, 1] - path[i, 1])
-            z = path[i, 2] + share * (path[i + 1, 2] - path[i, 2])
-            column, row = polymap(to_pixel, x, y)
-            value = z - pixel_height(heights, column, row) - clearance_at(limits.required, x, y) - bound.low[i]
-            number = at + i * bound.samples + k
-            values[number] = value
-            if multipliers[number] - penalty * value > 0.0:
-                column, row = polymap(to_pixel, x + GROUND_STEP, y)
-                rise = pixel_height(heights, column, row)
-                column, row = polymap(to_pixel, x - GROUND_STEP, y)
-                by_east = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-                column, row = polymap(to_pixel, x, y + GROUND_STEP)
-                rise = pixel_height(heights, column, row)
-                column, row = polymap(to_pixel, x, y - GROUND_STEP)
-                by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-                slopes[0], slopes[1], slopes[2] = -by_east, -by_north, 1.0
-                if math.isnan(by_east + by_north):
-                    slopes[0], slopes[1] = 0.0, 0.0
-                for axis in range(3):
-                    slopes[3 + axis] = share * slopes[axis]
-                    slopes[axis] *= 1.0 - share
-            merit += _add(value, i, 2, multipliers[number], penalty, model)
-    return merit
-
-
-@compiled
-def _add_slopes(
-    bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: Model, at: int
-) -> float:  # pragma: no cover - compiled
-    """Add what legs are less steep than allowed, m of height, and longer than the shortest; see `_add_missiles`."""
-    merit, slopes = 0.0, model.slopes
-    for i in range(path.shape[0] - 1):
-        dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
-        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
-        for kind in range(3):
-            tangent = bound.climb[i] if kind == 0 else bound.dive[i] if kind == 1 else 1.0
-            sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
-            slopes[3], slopes[4], slopes[5] = tangent * dx / run, tangent * dy / run, sign
-            for axis in range(3):
-                slopes[axis] = -slopes[3 + axis]
-            number = at + 3 * i + kind
-            values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else LEVEL_SPARE)
-            merit += _add(values[number], i, 2, multipliers[number], penalty, model)
-    return merit
-
-
-@compiled
-def _add_turns(
-    data: ProblemArrays,
-    bound: Bindings,
-    path: Floats,
-    multipliers: Floats,
-    values: Floats,
-    penalty: float,
-    model: Model,
-    at: int,
-) -> float:  # pragma: no cover - compiled
-    """Add what turns are less than allowed, and what legs have left between theirs; see `_add_missiles`."""
-    merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
-    turn, of_before, of_after = np.zeros(count + 1), np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
-    for i in range(count + 1):
-        ux, uy = math.sin(data.start_course), math.cos(data.start_course)
-        vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
-        if i > 0:
-            ux, uy = path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1]
-        if i < count:
-            vx, vy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
-        if math.isnan(ux + vx):
-            continue
-        cross = ux * vy - uy * vx
-        turn[i] = math.atan2(abs(cross), ux * vx + uy * vy)
-        side, u2, v2 = 1.0 if cross >= 0.0 else -1.0, max(1.0, ux * ux + uy * uy), max(1.0, vx * vx + vy * vy)
-        of_before[i, 0], of_before[i, 1] = side * uy / u2, -side * ux / u2
-        of_after[i, 0], of_after[i, 1] = -side * vy / v2, side * vx / v2
-        slopes[:9] = 0.0
-        _turn_slopes(of_before[i], of_after[i], -TURN_LENGTH, 0, slopes)
-        values[at + i] = TURN_LENGTH * (data.max_turn - turn[i])
-        merit += _add(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
-    if not bound.turns_in_legs:
-        return merit
-    for i in range(count):
-        number = at + count + 1 + i
-        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
-        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
-        one, two = math.tan(0.5 * min(3.0, turn[i])), math.tan(0.5 * min(3.0, turn[i + 1]))
-        need = bound.after[i] * one + bound.before[i + 1] * two + bound.roll[i]
-        slopes[:] = 0.0
-        for axis, part in ((0, dx / run), (1, dy / run)):
-            slopes[3 + axis], slopes[6 + axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
-        _turn_slopes(of_before[i], of_after[i], -0.5 * bound.after[i] * (1.0 + one * one), 0, slopes)
-        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * bound.before[i + 1] * (1.0 + two * two), 3, slopes)
-        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - 1.0
-        merit += _add(values[number], i - 1, 4, multipliers[number], penalty, model)
-    return merit
-
-
-@compiled
-def _turn_slopes(
-    of_before: Floats, of_after: Floats, factor: float, at: int, slopes: Floats
-) -> None:  # pragma: no cover - compiled
-    """Add a factor times the slopes of a turn, by the legs before and after it, to those of its three waypoints."""
-    for axis in range(2):
-        slopes[at + axis] -= factor * of_before[axis]
-        slopes[at + 3 + axis] += factor * (of_before[axis] - of_after[axis])
-        slopes[at + 6 + axis] += factor * of_after[axis]
-
-
-@compiled
-def lagrangian(
-    data: ProblemArrays,
-    limits: PrecomputedLimits,
-    bound: Bindings,
-    path: Floats,
-    multipliers: Floats,
-    values: Floats,
-    penalty: float,
-    model: Model,
-) -> float:  # pragma: no cover - compiled
-    """The augmented length of a path (w, 3), m; fills the constraints' values and the model."""
-    model.gradient[:], model.band[:] = 0.0, 0.0
-    at = bound.pairs.shape[0]
-    merit = _add_length(path, model)
-    merit += _add_missiles(data, bound, path, multipliers, values, penalty, model)
-    merit += _add_ground(data, limits, bound, path, multipliers, values, penalty, model, at)
-    at += bound.samples * (path.shape[0] - 1)
-    merit += _add_slopes(bound, path, multipliers, values, penalty, model, at)
-    at += 3 * (path.shape[0] - 1)
-    merit += _add_turns(data, bound, path, multipliers, values, penalty, model, at)
-    return merit
 
 
 @compiled
@@ -450,47 +76,41 @@ def begin(data: ProblemArrays, path: Floats, samples: int, spare: float) -> Shor
     return Shortening(path.copy(), bound, np.zeros(constraints_of(bound)), 0, 0)
 
 
+class _Descent(NamedTuple):
+    """What a round's steps share: the box's corners (3,), the model, the matrix's factor, a step, and a trial."""
+
+    low: Floats
+    high: Floats
+    model: Model
+    factor: Floats
+    step: Floats
+    trial: Floats
+
+
 @compiled
 def go_on(
     data: ProblemArrays, under_way: Shortening, spare: float, most: int
 ) -> Shortening:  # pragma: no cover - compiled
-    """The shortening after as many rounds as there are left, or after so many, by one at least."""
+    """The shortening after as many rounds as are left, or after so many."""
     here, bound, multipliers, number, made = under_way
-    limits, there, size = precompute_limits(data), here.copy(), 3 * (here.shape[0] - 2)
-    low = np.array([data.west, data.south, data.floor])
-    high = np.array([data.east, data.north, data.ceiling])
-    model = Model(np.zeros(size), np.zeros((size, BAND)), np.zeros(BAND))
-    factor, step = np.zeros((size, BAND)), np.zeros(size)
+    limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
+    descent = _Descent(
+        np.array([data.west, data.south, data.floor]),
+        np.array([data.east, data.north, data.ceiling]),
+        Model(np.zeros(size), np.zeros((size, BAND)), np.zeros(BAND)),
+        np.zeros((size, BAND)),
+        np.zeros(size),
+        here.copy(),
+    )
     last = min(ROUNDS, number + most)
     while number < last:
         if number > 0:
             renewed = bindings(data, here, bound.samples, spare)
-            multipliers = _carried(bound, multipliers, renewed)
+            multipliers = carried(bound, multipliers, renewed)
             bound = renewed
         penalty = FIRST_PENALTY * (LAST_PENALTY / FIRST_PENALTY) ** (number / (ROUNDS - 1))
         values = np.zeros(multipliers.size)
-        merit = lagrangian(data, limits, bound, here, multipliers, values, penalty, model)
-        made += 2
-        for _ in range(STEPS):
-            furthest, share, better = _newton_step(here, low, high, model, factor, step), 1.0, False
-            for _ in range(HALVINGS):
-                for row in range(size):
-                    axis = row % 3
-                    place = here[1 + row // 3, axis] + share * step[row]
-                    there[1 + row // 3, axis] = min(high[axis], max(low[axis], place))
-                trial = lagrangian(data, limits, bound, there, multipliers, values, penalty, model)
-                made += 1
-                if trial < merit:
-                    better = True
-                    break
-                share *= 0.5
-            if not better:
-                break
-            merit = trial
-            here[:] = there
-            if share * furthest < STILL:
-                break
-        lagrangian(data, limits, bound, here, multipliers, values, penalty, model)
+        made += _descend(data, limits, bound, here, multipliers, values, penalty, descent)
         for k in range(values.size):
             multipliers[k] = max(0.0, multipliers[k] - penalty * values[k])
         number += 1
@@ -498,18 +118,37 @@ def go_on(
 
 
 @compiled
-def _carried(old: Bindings, multipliers: Floats, new: Bindings) -> Floats:  # pragma: no cover - compiled
-    """Multipliers for new bindings: those of the pairs of leg and missile that were there, and of all that has none."""
-    out, many, before = np.zeros(constraints_of(new)), new.pairs.shape[0], old.pairs.shape[0]
-    out[many:] = multipliers[before:]
-    k = 0
-    for p in range(many):
-        # Both are in the order of missiles, and of legs.
-        while k < before and (
-            old.pairs[k, 1] < new.pairs[p, 1]
-            or (old.pairs[k, 1] == new.pairs[p, 1] and old.pairs[k, 0] < new.pairs[p, 0])
-        ):
-            k += 1
-        if k < before and old.pairs[k, 0] == new.pairs[p, 0] and old.pairs[k, 1] == new.pairs[p, 1]:
-            out[p] = multipliers[k]
-    return out
+def _descend(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    bound: Bindings,
+    here: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    descent: _Descent,
+) -> int:  # pragma: no cover - compiled
+    """Step a path (w, 3) down, in place, and fill the constraints' values where it ends; models made."""
+    low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
+    merit, made = lagrangian(data, limits, bound, here, multipliers, values, penalty, model), 1
+    for _ in range(STEPS):
+        furthest, share, better = _newton_step(here, low, high, model, descent.factor, step), 1.0, False
+        for _ in range(HALVINGS):
+            for row in range(step.size):
+                axis = row % 3
+                place = here[1 + row // 3, axis] + share * step[row]
+                trial[1 + row // 3, axis] = min(high[axis], max(low[axis], place))
+            found = lagrangian(data, limits, bound, trial, multipliers, values, penalty, model)
+            made += 1
+            if found < merit:
+                better = True
+                break
+            share *= 0.5
+        if not better:
+            break
+        merit = found
+        here[:] = trial
+        if share * furthest < STILL:
+            break
+    lagrangian(data, limits, bound, here, multipliers, values, penalty, model)
+    return made + 1
