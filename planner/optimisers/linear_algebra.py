@@ -78,7 +78,8 @@ def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: n
 def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - compiled
     """Fill the lower factor (d, b) of a positive definite band matrix (d, b).
 
-    Entry [i, k] of either stands in row i and column i - k.  A pivot that rounding leaves below a trillionth of its diagonal entry is taken for that.
+    Entry [i, k] of either stands in row i and column i - k.  A pivot that rounding leaves below a trillionth of its
+    diagonal entry is taken for that.
     """
     size, wide = matrix.shape
     for i in range(size):

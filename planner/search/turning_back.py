@@ -4,6 +4,8 @@ The straight frame holds no path that gets further from the destination along th
 route that may; a frame along that route then holds paths about it, and they are fitted and tightened as elsewhere.
 """
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +27,7 @@ STEPS = (1.0, 0.6)
 # A route is followed if it is shorter than this share of the best safe path.
 WORTH = 0.99
 # Searches at first, and evaluations of each and after each move of all waypoints, that a path along a route is improved
-# with where shortening does not finish it; and these moves, each of so many rounds, as shares of the first that fit it.
+# with before it is shortened; and these moves, each of so many rounds, as shares of the first that fit it.
 FIRST_SEARCHES, FIRST_SEARCH, LATER_SEARCH = 4, 500, 600
 MOVES, ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 
@@ -74,23 +76,15 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
     )  # fmt: skip
     path = fit_points(inner.problem.search, frames_of(encoding), _places(route, encoding), CLOSE)
     vector = np.clip(frames_of(encoding).rotate(path[1:-1]).ravel(), encoding.lower, encoding.upper)
-    try:
+    with suppress(SearchEnded):
         _improve_along(inner, vector, (path, route))
-    except SearchEnded:
-        pass
     search.evaluations, search.ended = inner.evaluations, inner.ended
     return inner.best_path()
 
 
 def _improve_along(inner: Search, vector: Floats, ways: tuple[Floats, ...]) -> None:
-    """Shorten ways (k, 3) and the path of a vector (d,); work on the vector where that gives no finished path."""
+    """Work on the path of a vector (d,), then shorten it and ways (k, 3): a bound climb either may end short of."""
     inner.evaluate(vector[None])
-    if inner.shortens:
-        for way in ways:
-            inner.shorten(evenly(way, inner.encoding.waypoints))
-        shorten_best(inner)
-    if inner.shortest is not None:
-        return
     for _ in range(FIRST_SEARCHES):
         if inner.over() or inner.safe_already():
             return
@@ -99,6 +93,10 @@ def _improve_along(inner: Search, vector: Floats, ways: tuple[Floats, ...]) -> N
         if inner.over() or inner.safe_already():
             return
         inner.tighten(inner.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
+    if inner.shortens:
+        for way in ways:
+            inner.shorten(evenly(way, inner.encoding.waypoints))
+        shorten_best(inner)
 
 
 def _places(route: Floats, encoding: Encoding) -> Floats:
