@@ -16,7 +16,7 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
 from planner.plan import Certificate, Violation
 from planner.search.algorithms import Algorithm
 from planner.search.score_table import KILL, LENGTH, best_first, no_scores, safe, score_table, violated
-from planner.seeding.path_shortening import shorten
+from planner.seeding.path_shortening import MOST_MODELS, shorten
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
@@ -150,7 +150,10 @@ class Search:
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
         best = self.archive.vectors[:1]
-        if self.improved is not None and self.archive.feasible() and not np.array_equal(before, best):
+        if self.improved is None or not self.archive.feasible() or np.array_equal(before, best):
+            return
+        ratio = self.archive.scores[0][LENGTH]
+        if self.shortest is None or ratio * self._straight() < path_length(self.shortest[0]):
             self.improved(self.encoding.decode(best)[0])
 
     def improve(self, vector: Floats, most: int) -> Floats:
@@ -178,9 +181,11 @@ class Search:
     def shorten(self, path: Floats) -> bool:
         """Shorten a path (w, 3) and keep what comes of it if it is the shortest finished one; whether it is."""
         for spare in SPARES:
+            if self._budget() - self.evaluations < MOST_MODELS:
+                return False
             path, made = shorten(self.problem.search, path, spare=spare, pause=self.pause)
             self.evaluations += made
-            if self.shortest is not None and path_length(path) >= path_length(self.shortest[0]):
+            if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
                 return False
             certificate = certify(self.problem, path)
             if self.finished(certificate):
@@ -212,13 +217,15 @@ class Search:
         """Whether a path is known that violates nothing and is exposed to no missile."""
         return self.shortest is not None or (len(self.archive.scores) > 0 and self.best_is_safe())
 
+    def _straight(self) -> float:
+        return math.dist(self.problem.space.start, self.problem.space.destination)
+
     def length_ratio(self) -> float:
         """Length ratio of the best path yet."""
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
-        space = self.problem.space
-        shortest = path_length(self.shortest[0]) / math.dist(space.start, space.destination)
+        shortest = path_length(self.shortest[0]) / self._straight()
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
     def finished(self, certificate: Certificate) -> bool:

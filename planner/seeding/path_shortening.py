@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.shortening_kernels import ROUNDS, Shortening, begin, go_on
+from planner.seeding.shortening_kernels import HALVINGS, ROUNDS, STEPS, Shortening, begin, go_on
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 SAMPLE_PITCH, FEWEST_SAMPLES, MOST_SAMPLES = 30.0, 6, 48
 # What it keeps further from spheres and ground than is asked, m: what its last steps leave undecided.
 SPARE = 0.1
+# Models that one shortening makes at most.
+MOST_MODELS = ROUNDS * (2 + STEPS * HALVINGS)
 # Pairs of leg and missile that are looked at before the caller may end the work: some 5 ms.
 PAIRS_AT_ONCE = 400_000
 
