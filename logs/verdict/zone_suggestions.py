@@ -8,9 +8,9 @@ from logs.verdict.findings import Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import Change, Quantity, Suggestion
-from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ROUNDING, ZONE_TRIES
+from logs.verdict.tolerances import BUFFER_LENGTH, ROUNDING, ZONE_TRIES
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
@@ -66,7 +66,7 @@ def _least_shift(
         visit = path_zones(shifted, record, terrain)[0]
         if visit.unknown:
             return None
-        if visit.depth <= FENCE_DEPTH:
+        if visit.depth <= DEPTH_PRECISION:
             return shift
         shift += float(visit.depth)
         if shift >= most:
