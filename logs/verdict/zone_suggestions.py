@@ -37,9 +37,10 @@ def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: 
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([demands.airspace.zones[z]]), demands.setup.scenario.terrain
     planned, flown = item.planned or 0.0, item.flown or 0.0
-    moves, deeper = planned_moves(demands), max(0.0, flown - planned)
     if aligned is not None and planned <= ROUNDING:
         moves, deeper = flown_moves(aligned, first, last), 0.0
+    else:
+        moves, deeper = planned_moves(demands, first, last), max(0.0, flown - planned)
     near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
     found = []
     for ways in (_LEVEL, _UPRIGHT):

@@ -107,3 +107,14 @@ def test_what_came_after_the_last_waypoint_belongs_to_the_last_leg() -> None:
         assert moves[-1].leg == 1
     before = flown_moves(longer, 0, 0)
     np.testing.assert_allclose(move_point(before[-1], 1.0), track.position[aligned.rows[1]], atol=1e-9)
+
+
+def test_the_moves_of_some_legs_are_those_of_all_that_are_on_them() -> None:
+    setup = make_setup([[0.0, 0.0, 300.0], [0.0, 2000.0, 400.0], [2000.0, 2000.0, 400.0], [2000.0, 4000.0, 400.0]])
+    demands = route_demands(setup)
+    every = planned_moves(demands)
+    for first, last in ((0, 0), (1, 1), (1, 2), (2, 2)):
+        some = planned_moves(demands, first, last)
+        wanted = every[(every["leg"] >= first) & (every["leg"] <= last)]
+        for name in ("east", "north", "up", "length", "curvature", "climb", "bend", "lasts", "leg"):
+            np.testing.assert_array_equal(some[name], wanted[name])
