@@ -55,6 +55,7 @@ _PACKAGES = (
     "pymavlink",
     "pyproj",
     "rasterio",
+    "shapely",
     "mcap",
     "zstandard",
     "protobuf",

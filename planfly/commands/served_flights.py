@@ -31,6 +31,7 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.flights_beside import judge_with_flights_beside
+from planfly.named_fences import NamedFences
 from planfly.open_mission import open_mission
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
@@ -52,6 +53,7 @@ class ServeOptions:
     flight: entries of the scenario's [flight] that take the place of its own; None for those it keeps.
     speed: times real time.
     logs: the folder of the flight logs.
+    fences: named beside the mission; a station that uploads another fence replaces the items, not the zones.
     """
 
     mission: str
@@ -60,6 +62,7 @@ class ServeOptions:
     speed: float
     logs: Path
     flight: dict[str, str | float | None] = field(default_factory=dict)
+    fences: NamedFences = field(default_factory=NamedFences)
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,9 +82,12 @@ def open_served(options: ServeOptions) -> ServedScenario:
         return with_flight(scenario, **options.flight)
 
     if options.mission:
-        opened = open_mission(Path(options.mission), options.scenario, options.terrain, change=change)
+        opened = open_mission(
+            Path(options.mission), options.scenario, options.terrain, change=change, fences=options.fences
+        )
         return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
     scenario = change(load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain))
+    scenario = options.fences.on_scenario(scenario)
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
 
 

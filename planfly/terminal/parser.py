@@ -21,6 +21,7 @@ from planfly.terminal.argument_types import (
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from planfly.terminal.parser_options import (
+    fence_option,
     flown_by_options,
     overwrite_option,
     own_link_options,
@@ -142,6 +143,7 @@ def _add_export_and_fly(command: _Command) -> None:
     export.add_argument(
         "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
     )
+    fence_option(export)
     overwrite_option(export)
     fly = command(
         "fly", "fly a plan or any mission file, write the log, end with the verdict",

@@ -14,6 +14,18 @@ def world_options(parser: argparse.ArgumentParser) -> None:
     """What a mission is judged in."""
     parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
+    fence_option(parser)
+
+
+def fence_option(parser: argparse.ArgumentParser) -> None:
+    """Fences beside the mission's own."""
+    parser.add_argument(
+        "--fence",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="keep to this fence, too: .fence, .waypoints, .txt or .plan, or zones in .geojson or .kml; repeatable",
+    )
 
 
 def flown_by_options(parser: argparse.ArgumentParser) -> None:
