@@ -18,13 +18,14 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
-from logs.recording.recorder import Recorder, thin_track
+from logs.recording.recorder import thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.levels import FlownBeside
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.flights_beside import airframe_answer, find_deciding_parameter
+from planfly.whole_log import WholeLog
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -230,8 +231,9 @@ def _record_and_judge(
     if log is None:
         flown = fly_to_end(flight, progress=report)
         return _judged(setup, airframe, flown.track, flown.ended)
-    with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = fly_to_end(flight, recorder.write_rows, report)
+    with WholeLog(log, setup, every=every, batch=BATCH) as recorder:
+        flown = fly_to_end(flight, recorder.write, report)
+        recorder.ended = flown.ended
         judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)

@@ -16,17 +16,17 @@ from planfly.terminal.targets import default_folder, named_or_default, refuse_ex
 def fly(args: argparse.Namespace) -> int:
     """Fly a mission into a log; the exit code is the verdict's."""
     source = Path(args.mission)
-    with autopilot_program(args) as program:
-        opened = open_mission(source, args.scenario, args.terrain, seed=args.seed, change=scenario_change(args))
-        default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
-        target = named_or_default(args.log, default, args.overwrite, source)
-        if program is not None and args.log:
-            refuse_existing(autopilot_log(target), args.overwrite, source)
-        print_warnings(opened.setup.mission.warnings)
-        target.parent.mkdir(parents=True, exist_ok=True)
-        with progress("flying") as advance:
-            every = 60 // args.log_hz
-            flown = fly_and_judge(opened.setup, opened.airframe, target, advance, every=every, autopilot=program)
+    program = autopilot_program(args)
+    opened = open_mission(source, args.scenario, args.terrain, seed=args.seed, change=scenario_change(args))
+    default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
+    target = named_or_default(args.log, default, args.overwrite, source)
+    if program is not None and args.log:
+        refuse_existing(autopilot_log(target), args.overwrite, source)
+    print_warnings(opened.setup.mission.warnings)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    with progress("flying") as advance:
+        every = 60 // args.log_hz
+        flown = fly_and_judge(opened.setup, opened.airframe, target, advance, every=every, autopilot=program)
     print_verdict(flown.verdict, opened.setup.route.notes)
     print(f"log       {target}" if len(flown.track) else "log       none: nothing was flown")
     if program is not None and len(flown.track):

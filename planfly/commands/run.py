@@ -44,11 +44,7 @@ class _Task:
 
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
-    with autopilot_program(args) as program:
-        return _run(args, program)
-
-
-def _run(args: argparse.Namespace, program: Path | None) -> int:
+    program = autopilot_program(args)
     scenario = scenario_change(args)(load_scenario(args.scenario))
     seed = choose_seed(scenario, args.seed)
     airframe = load_airframe(scenario)
