@@ -76,6 +76,11 @@ class WholeLog:
             self._recorder.write_rows(rows)
             self._rows += len(rows)
 
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+        return self._recorder.size
+
     def event(self, time: float, text: str, level: str) -> None:
         """Record what happened; arguments as of `Recorder.event`."""
         self._recorder.event(time, text, level)

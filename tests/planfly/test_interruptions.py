@@ -71,7 +71,7 @@ EVERY = (
     ("compare", "flight.mcap", "flight.mcap", "--out", "out"),
     ("replay", "flight.mcap"),
     ("replay", "flight.mcap", "--movie", "film.gif"),
-    ("export", "plan.json", "--out", "m.plan"),
+    ("export", "plan.json", "m.plan"),
     ("recover", "broken.mcap", "--out", "mended.mcap"),
     ("aircraft", "aerosonde"),
     ("scenarios",),
