@@ -23,6 +23,7 @@ from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from planfly.terminal.parser_options import (
     fence_option,
     flown_by_options,
+    limit_options,
     overwrite_option,
     own_link_options,
     pilot_options,
@@ -92,6 +93,7 @@ def _add_run_and_plan(command: _Command) -> None:
     )
     steering_options(run)
     program_option(run)
+    limit_options(run)
     overwrite_option(run)
     # Names and summaries only: what they stand for is imported with the command.
     from planner.search.algorithms import algorithm_lines
@@ -162,6 +164,7 @@ def _add_export_and_fly(command: _Command) -> None:
     )  # fmt: skip
     steering_options(fly)
     program_option(fly)
+    limit_options(fly)
     overwrite_option(fly)
 
 

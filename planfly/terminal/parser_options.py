@@ -70,6 +70,21 @@ def program_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def limit_options(parser: argparse.ArgumentParser) -> None:
+    """Where a flight ends that would go on."""
+    parser.add_argument(
+        "--max-hours",
+        metavar="H",
+        type=positive,
+        default=6.0,
+        help="simulated hours that are flown at most (default: 6)",
+    )
+    parser.add_argument(
+        "--max-log", metavar="MB", type=positive, default=256.0,
+        help="the flight ends when its log has so many MB (default: 256; it grows by some 20 an hour)",
+    )  # fmt: skip
+
+
 def own_link_options(parser: argparse.ArgumentParser, *, bind: str) -> None:
     """Where and with whom a vehicle speaks MAVLink."""
     parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
