@@ -49,6 +49,8 @@ _DATUMS = {
     "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
     "unstated": "the log does not say what its heights are above (--datum says it)",
 }
+# Rules that ask for the heights of the plan.
+_OF_PLANNED_HEIGHTS = frozenset({"slope", "height"})
 # Rules that ask what the aircraft can do.
 _OF_AIRCRAFT = frozenset({"turn", "slope", "speed", "stall", "loiter", "energy"})
 _UNNAMED = "the aircraft is not named (--aircraft)"
@@ -108,8 +110,8 @@ def _as_far_as_held(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Findi
             reason = f"the log holds no {_CALLED[quantity]}"
             break
         if quantity == "heights":
-            reason = "" if source.plan_heights else "the plan states no heights"
-            reason = reason or _DATUMS.get(source.heights.datum, "")
+            stated = source.plan_heights or item.rule not in _OF_PLANNED_HEIGHTS
+            reason = _DATUMS.get(source.heights.datum, "") if stated else "the plan states no heights"
         else:
             reason = _missing(legs, quantity)
         if reason:

@@ -8,8 +8,9 @@ file's end, begins right behind it.  pymavlink's `DFFormat` says what the letter
 import contextlib
 import io
 import struct
-from collections.abc import Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,12 +75,14 @@ class Dataflash:
     data: its bytes.
     starts: for each type of message, where its messages begin.
     formats: of each type.
+    names: of the messages that the log holds.
     damage: what could not be read.
     """
 
     data: Bytes
     starts: dict[int, Ints]
     formats: dict[int, DFFormat]
+    names: tuple[str, ...]
     damage: Damage
 
     def messages(self, name: str) -> Messages:
@@ -89,33 +92,54 @@ class Dataflash:
                 return _columns(self.data, self.starts[number], known)
         return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
 
-    def names(self) -> Iterator[str]:
-        """Names of the messages that the log holds."""
-        return (self.formats[number].name for number in self.starts if number in self.formats)
 
+def index_dataflash(data: Bytes, names: Collection[str]) -> Dataflash:
+    """Find the messages of some names in a log (n,) of bytes.
 
-def index_dataflash(data: Bytes) -> Dataflash:
-    """Find the messages of a log (n,) of bytes."""
-    at, kinds, places, size = _find_messages(data, HEADER, FMT, _FMT_LENGTH, TRAILING)
-    order = np.argsort(kinds, kind="stable")
-    numbers, firsts = np.unique(kinds[order], return_index=True)
-    starts = {int(number): found for number, found in zip(numbers, np.split(at[order], firsts[1:]), strict=True)}
+    Twice through the log: for the formats, and for the messages of those names, so that what is kept of a large log is
+    small.
+    """
+    only_formats = np.zeros(256, np.bool_)
+    only_formats[FMT] = True
+    first = _find_messages(data, only_formats)
     formats: dict[int, DFFormat] = {}
     unreadable = 0
-    for start in starts.get(FMT, np.zeros(0, np.int64)).tolist():
+    for start in first.at.tolist():
         found = _format(bytes(data[start + HEADER : start + _FMT_LENGTH]))
         if found is None:
             unreadable += 1
         else:
             formats.setdefault(found.type, found)
-    last = int(at[-1]) if len(at) else 0
-    known = formats.get(int(kinds[-1])) if len(at) else None
-    cut = known is not None and last + known.len > len(data)
-    return Dataflash(data, starts, formats, Damage(places, size, cut, unreadable))
+    wanted = np.zeros(256, np.bool_)
+    wanted[[number for number, known in formats.items() if known.name in names]] = True
+    second = _find_messages(data, wanted)
+    order = np.argsort(second.kinds, kind="stable")
+    numbers, firsts = np.unique(second.kinds[order], return_index=True)
+    starts = {int(number): found for number, found in zip(numbers, np.split(second.at[order], firsts[1:]), strict=True)}
+    held = tuple(known.name for number, known in formats.items() if second.counts[number])
+    damage = Damage(int(second.places), int(second.size), bool(second.cut), unreadable)
+    return Dataflash(data, starts, formats, held, damage)
+
+
+class _Found(NamedTuple):
+    """Where the wanted messages begin and of which type each is; how many there are of each type; what is lost."""
+
+    at: Ints
+    kinds: Bytes
+    counts: Ints
+    places: int
+    size: int
+    cut: bool
+
+
+def _find_messages(data: Bytes, wanted: NDArray[np.bool_]) -> _Found:
+    return _Found(*_walk_messages(data, HEADER, FMT, _FMT_LENGTH, TRAILING, wanted))
 
 
 def _format(body: bytes) -> DFFormat | None:
     """The format that a FMT message states; None for one that cannot be one."""
+    if len(body) < _FMT_LENGTH - HEADER:
+        return None
     number, length, name, letters, columns = struct.unpack("<BB4s16s64s", body)
     try:
         # It complains on the terminal.
@@ -158,46 +182,44 @@ def _struct_codes(known: DFFormat) -> list[str]:
 
 
 @compiled
-def _find_messages(
-    data: Bytes, header: int, fmt: int, fmt_length: int, trailing: int
-) -> tuple[Ints, Bytes, int, int]:  # pragma: no cover - compiled
-    """Where messages begin and of which type each is; how many places could not be read, and their bytes."""
-    lengths = np.zeros(256, np.int64)
+def _walk_messages(
+    data: Bytes, header: int, fmt: int, fmt_length: int, trailing: int, wanted: NDArray[np.bool_]
+) -> tuple[Ints, Bytes, Ints, int, int, bool]:  # pragma: no cover - compiled
+    """The fields of `_Found`."""
+    lengths, counts = np.zeros(256, np.int64), np.zeros(256, np.int64)
     lengths[fmt] = fmt_length
-    count = 0
-    at = np.empty(1024, np.int64)
-    kinds = np.empty(1024, np.uint8)
-    places, size, k, end = 0, 0, 0, data.size
-    reading = True
+    at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
+    count, places, size, k, end, behind = 0, 0, 0, 0, data.size, 0
+    reading, cut = True, False
     while k + header <= end:
         length = 0
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
         after = k + length
         # What follows has to be a message, too, unless the file ends there.
-        follows = after >= end - 1 or (data[after] == 0xA3 and data[after + 1] == 0x95)
-        if length > 0 and not follows and end - after < trailing:
-            follows = True
-        if length > 0 and follows:
+        follows = after >= end - 1 or (data[after] == 0xA3 and data[after + 1] == 0x95) or end - after < trailing
+        if length == 0 or not follows:
+            places += reading
+            reading = False
+            size += 1
+            k += 1
+            continue
+        kind = data[k + 2]
+        counts[kind] += 1
+        if wanted[kind]:
             if count == at.size:
                 more_at, more_kinds = np.empty(2 * count, np.int64), np.empty(2 * count, np.uint8)
                 more_at[:count], more_kinds[:count] = at, kinds
                 at, kinds = more_at, more_kinds
-            at[count], kinds[count] = k, data[k + 2]
+            at[count], kinds[count] = k, kind
             count += 1
-            if data[k + 2] == fmt and k + fmt_length <= end:
-                lengths[data[k + header]] = data[k + header + 1]
-            k = after
-            reading = True
-        else:
-            if reading:
-                places += 1
-                reading = False
-            size += 1
-            k += 1
-    if not reading and count and end - at[count - 1] < trailing + 256:
+        if kind == fmt and after <= end:
+            lengths[data[k + header]] = data[k + header + 1]
+        k = behind = after
+        cut = after > end
+        reading = True
+    if not reading and behind and end - behind < trailing:
         # The rest of the last page.
-        behind = at[count - 1] + lengths[kinds[count - 1]]
         places -= 1
         size -= min(size, end - header + 1 - behind)
-    return at[:count], kinds[:count], places, size
+    return at[:count], kinds[:count], counts, places, size, cut

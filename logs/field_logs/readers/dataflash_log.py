@@ -46,7 +46,7 @@ _WEEK = 604_800.0
 
 def read_dataflash(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without a message that says where the vehicle was."""
-    index = index_dataflash(np.memmap(path, np.uint8, mode="r"))
+    index = index_dataflash(np.memmap(path, np.uint8, mode="r"), _READ)
     return _Reader(index, str(path)).read()
 
 
@@ -62,7 +62,7 @@ class _Reader:
         series = {name: found for name, found in self._series() if found is not None and len(found.time)}
         program, vehicle = self._program()
         if "position" not in series:
-            names = ", ".join(sorted(set(self._index.names()))[:12])
+            names = ", ".join(sorted(self._index.names)[:12])
             raise LogError(
                 f"{self._source}: no POS, AHR2 or GPS message: nothing says where it flew (it has {names or 'none'})"
             )
@@ -98,7 +98,7 @@ class _Reader:
     def _steady(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
         """Where the log's clock has to be moved: from which byte on, by how much (s), and when."""
         times, at = [], []
-        for name in ("POS", "ATT", "GPS", "MODE", "IMU"):
+        for name in ("POS", "ATT", "GPS", "MODE"):
             found = self._messages(name)
             if found.has("TimeUS") or found.has("TimeMS"):
                 times.append(_raw_time(found))
@@ -299,9 +299,11 @@ class _Reader:
 
 
 _DEGREE = math.pi / 180.0
-_WITH_INSTANCES = frozenset(
-    {"GPS", "BARO", "ARSP", "BAT", "IMU", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2", "BCL", "MAG"}
-)
+_READ = (
+    "POS", "AHR2", "GPS", "ATT", "XKF1", "NKF1", "EKF1", "XKF2", "NKF2", "EKF2", "ARSP", "CTUN", "BAT", "CURR",
+    "BARO", "MODE", "CMD", "PARM", "MSG", "VER",
+)  # fmt: skip
+_WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2"})
 
 
 def _raw_time(found: Messages) -> Floats:

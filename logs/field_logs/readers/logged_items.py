@@ -18,45 +18,42 @@ class Item(NamedTuple):
 def gather_items(rows: Iterable[Item]) -> list[tuple[float, tuple[MissionItem, ...]]]:
     """Missions that items, in the order of the log, come to, and when each began to hold.
 
-    A mission begins where its first item comes and others follow, or where an item differs from the one of its number
-    before it; an item that comes again as it was is one that is flown.
+    Items from number 0 on are a mission anew.  An item alone is one that is flown if it is as it was, and else one that
+    was changed.
 
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 75.0) for k in range(3)]
     >>> logged = [Item(1.0, 3, way[0]), Item(1.0, 3, way[1]), Item(1.0, 3, way[2]), Item(9.0, 3, way[1])]
     >>> [(start, len(items)) for start, items in gather_items(logged)]
     [(1.0, 3)]
     """
-    missions: list[tuple[float, dict[int, MissionItem], int]] = []
-    for time, total, item in rows:
-        if not missions or _begins_another(missions[-1], total, item):
-            missions.append((time, {}, total))
-        missions[-1][1][item.seq] = item
-    # An item of a mission yet to come, alone, is none.
-    found = [(start, tuple(items[seq] for seq in sorted(items))) for start, items, _ in missions]
-    kept = [one for k, one in enumerate(found) if len(one[1]) > 1 or k + 1 == len(found)]
+    found: list[tuple[float, dict[int, MissionItem]]] = []
+    ordered = list(rows)
+    for k, (time, _, item) in enumerate(ordered):
+        follows = k + 1 < len(ordered) and ordered[k + 1].item.seq == 1
+        if not found or (item.seq == 0 and follows and len(found[-1][1]) > 1):
+            found.append((time, {}))
+        elif item.seq in found[-1][1] and not _same(found[-1][1][item.seq], item):
+            found.append((time, dict(found[-1][1])))
+        found[-1][1][item.seq] = item
     out: list[tuple[float, tuple[MissionItem, ...]]] = []
-    for start, items in kept:
-        if not out or out[-1][1] != items:
-            out.append((start, items))
+    for start, items in found:
+        whole = tuple(items[seq] for seq in sorted(items))
+        if not out or not _alike(out[-1][1], whole):
+            out.append((start, whole))
     return out
 
 
-def _begins_another(last: tuple[float, dict[int, MissionItem], int], total: int, item: MissionItem) -> bool:
-    _, items, before = last
-    known = items.get(item.seq)
-    if known is not None:
-        return not _same(known, item)
-    return bool(total and before and total != before)
+def _alike(one: tuple[MissionItem, ...], other: tuple[MissionItem, ...]) -> bool:
+    return len(one) == len(other) and all(map(_same, one, other))
 
 
 def _same(one: MissionItem, other: MissionItem) -> bool:
-    return (one.command, one.params, one.x, one.y, one.alt) == (
-        other.command,
-        other.params,
-        other.x,
-        other.y,
-        other.alt,
-    )
+    return _content(one) == _content(other)
+
+
+def _content(item: MissionItem) -> tuple[object, ...]:
+    # As text: what is unset is NaN, which equals nothing.
+    return item.seq, item.command, repr((item.params, item.lat_deg, item.lon_deg, item.alt))
 
 
 def logged_mission(items: tuple[MissionItem, ...], source: str) -> Mission | None:

@@ -8,6 +8,7 @@ import contextlib
 import io
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,14 @@ from flight.simulation.field_source import Damage
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from logs.field_logs.readers.vehicle_modes import px4_state
 from world.errors import LogError
+from world.kernels import compiled
 
+Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
 
 FORMAT = "PX4 log"
+# Bytes before the first record, and the letters of all records (PX4, "ULog File Format").
+_HEADER, _LETTERS = 16, b"BFIMPQARDLCSO"
 _TOPICS = [
     "vehicle_global_position", "vehicle_local_position", "vehicle_attitude", "airspeed_validated", "airspeed", "wind",
     "wind_estimate", "battery_status", "vehicle_status", "navigator_mission_item", "vehicle_gps_position", "sensor_gps",
@@ -38,13 +43,48 @@ def read_px4(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one that pyulog cannot read, and one without vehicle_global_position."""
     try:
         # It complains on the terminal.
-        with contextlib.redirect_stdout(io.StringIO()):
-            found = ULog(str(path), _TOPICS, disable_str_exceptions=True)
+        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
+            found = ULog(file, _TOPICS, disable_str_exceptions=True)
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory") from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}") from error
-    return _Topics(found, str(path)).log()
+    return _Topics(found, str(path), find_damage(np.memmap(path, np.uint8, mode="r"))).log()
+
+
+def find_damage(data: Bytes) -> Damage:
+    """What of a log (n,) of bytes cannot be read: its records follow each other, each with a length and a known letter.
+
+    >>> find_damage(np.zeros(20, np.uint8)).places
+    1
+    """
+    places, size, cut = _walk(data, _HEADER, np.frombuffer(_LETTERS, np.uint8))
+    return Damage(places, size, bool(cut))
+
+
+@compiled
+def _walk(data: Bytes, header: int, letters: Bytes) -> tuple[int, int, bool]:  # pragma: no cover - compiled
+    """Places where no record begins, their bytes, and whether the last record is cut."""
+    known = np.zeros(256, np.bool_)
+    for letter in letters:
+        known[letter] = True
+    places, size, k, reading = 0, 0, header, True
+    while k + 3 <= data.size:
+        length = data[k] + 256 * data[k + 1]
+        after = k + 3 + length
+        if known[data[k + 2]] and after > data.size:
+            # Only what a cut record would be: nothing else can follow it.
+            return places, size, True
+        follows = after + 3 > data.size or known[data[after + 2]]
+        if known[data[k + 2]] and follows:
+            k = after
+            reading = True
+        else:
+            places += reading
+            reading = False
+            size += 1
+            k += 1
+    return places, size, k < data.size
 
 
 def _one_line(error: Exception) -> str:
@@ -54,8 +94,8 @@ def _one_line(error: Exception) -> str:
 class _Topics:
     """The topics of one log, the first instance of each."""
 
-    def __init__(self, log: ULog, source: str) -> None:
-        self._log, self._source = log, source
+    def __init__(self, log: ULog, source: str, damage: Damage) -> None:
+        self._log, self._source, self._damage = log, source, damage
         self._data: dict[str, dict[str, Any]] = {}
         for one in sorted(log.data_list, key=lambda data: -int(data.multi_id)):
             if "timestamp" in one.data and len(one.data["timestamp"]):
@@ -78,9 +118,7 @@ class _Topics:
             parameters=self._parameters(),
             events=tuple((one.timestamp * 1e-6, str(one.message)) for one in self._log.logged_messages),
             utc_start=self._utc_start(),
-            damage=Damage(
-                places=len(self._log.dropouts) + int(self._log.file_corruption), unreadable=0, cut=False, size=0
-            ),
+            damage=replace(self._damage, places=self._damage.places + len(self._log.dropouts)),
         )
 
     def _table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:

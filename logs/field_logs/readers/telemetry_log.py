@@ -15,29 +15,29 @@ from pymavlink.dialects.v20 import ardupilotmega as dialect
 from flight.ardupilot.pilot import true_by_equivalent
 from flight.mission.items import Home, Mission, MissionItem, on_grid, renumbered
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
-from logs.field_logs.readers.clocks import steady_clock
 from logs.field_logs.readers.logged_items import Item, gather_items, logged_mission
 from logs.field_logs.readers.telemetry_frames import TelemetryReader
+from logs.field_logs.readers.telemetry_rows import NUMBERS, SystemMessages
 from logs.field_logs.readers.vehicle_modes import plane_mode, px4_mode
 from world.errors import LogError
 
 Floats = NDArray[np.float64]
 
 FORMAT = "MAVLink telemetry log"
-_WANTED = (
-    "HEARTBEAT", "GLOBAL_POSITION_INT", "ATTITUDE", "VFR_HUD", "WIND", "WIND_COV", "GPS_RAW_INT", "SYS_STATUS",
-    "BATTERY_STATUS", "MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT", "PARAM_VALUE", "STATUSTEXT",
-    "HOME_POSITION",
-)  # fmt: skip
+_KEPT = ("HEARTBEAT", "PARAM_VALUE", "STATUSTEXT", "HOME_POSITION")
+_MISSION = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
+_WANTED = frozenset((*_KEPT, *_MISSION, *NUMBERS))
 _NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED)
+# Items that are kept: far more than a station sends.
+_MOST_ITEMS = 200_000
 # MAV_TYPE; what is not listed says nothing of what it is.
 _TYPES: dict[int, VehicleKind] = {
     1: "plane", 16: "plane", 19: "plane", 20: "plane", 21: "plane", 22: "plane", 23: "plane", 24: "plane", 25: "plane",
     2: "copter", 3: "copter", 4: "copter", 13: "copter", 14: "copter", 15: "copter", 29: "copter", 35: "copter",
     5: "tracker", 7: "blimp", 10: "rover", 11: "boat", 12: "submarine",
 }  # fmt: skip
-_GROUND_STATION, _GIMBAL = 6, 26
-_AUTOPILOT = 1
+# Ground stations, onboard computers, gimbals, receivers for other traffic.
+_NO_VEHICLES = (6, 18, 26, 27)
 _NOT_AUTOPILOTS = (8, 18)
 _PX4 = 12
 _NAMES = {3: "ArduPilot", _PX4: "PX4"}
@@ -48,38 +48,33 @@ def read_telemetry(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without GLOBAL_POSITION_INT or GPS_RAW_INT."""
     data = np.memmap(path, np.uint8, mode="r")
     reader = TelemetryReader(memoryview(data), _NUMBERS)  # type: ignore[arg-type]  # an array is a buffer
-    kept = list(reader.messages())
-    vehicle = _vehicle_id(kept)
-    if vehicle is None:
+    systems: dict[int, SystemMessages] = {}
+    items: list[tuple[float, Any]] = []
+    for stamp, message in reader.messages():
+        systems.setdefault(message.get_srcSystem(), SystemMessages()).add(stamp, message)
+        if message.get_type() in _MISSION and len(items) < _MOST_ITEMS:
+            items.append((stamp, message))
+    vehicles = [found for found in systems.values() if any(_is_vehicle(one) for _, one in found.named("HEARTBEAT"))]
+    if not vehicles:
         raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew")
-    return _Messages(kept, vehicle, str(path)).log(reader)
-
-
-def _vehicle_id(kept: list[tuple[float, Any]]) -> int | None:
-    """The system number of the vehicle that is heard most often."""
-    heard: dict[int, int] = {}
-    for _, message in kept:
-        if message.get_type() == "HEARTBEAT" and _is_vehicle(message):
-            heard[message.get_srcSystem()] = heard.get(message.get_srcSystem(), 0) + 1
-    return max(heard, key=lambda number: heard[number]) if heard else None
+    # Of several the one that is heard most often.
+    return _Messages(max(vehicles, key=len), items, str(path)).log(reader)
 
 
 def _is_vehicle(message: Any) -> bool:
-    return message.type not in (_GROUND_STATION, _GIMBAL, 18, 27) and message.autopilot not in _NOT_AUTOPILOTS
+    return message.type not in _NO_VEHICLES and message.autopilot not in _NOT_AUTOPILOTS
 
 
 class _Messages:
     """The messages of one vehicle, by name, on its own clock."""
 
-    def __init__(self, kept: list[tuple[float, Any]], vehicle: int, source: str) -> None:
-        self._source, self._vehicle = source, vehicle
-        own = [(stamp, one) for stamp, one in kept if one.get_srcSystem() == vehicle]
-        self._offset, self.jumps, times = _boot_times(own)
-        self._own: dict[str, list[tuple[float, Any]]] = {}
-        for time, (_, message) in zip(times, own, strict=True):
-            self._own.setdefault(message.get_type(), []).append((time, message))
+    def __init__(self, own: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
+        self._source, self._found = source, own
+        clock = own.boot_times()
+        self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
         # Missions go to the vehicle: they are the station's messages.
-        self._all = [(stamp - self._offset, message) for stamp, message in kept]
+        self._items = [(stamp - self._offset, message) for stamp, message in items]
+        self._own = {name: [(float(self._times[k]), one) for k, one in own.named(name)] for name in _KEPT}
 
     def log(self, reader: TelemetryReader) -> RawLog:
         series = {name: found for name, found in self._series() if found is not None}
@@ -106,16 +101,11 @@ class _Messages:
         )
 
     def _table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
-        columns = tuple(columns)
-        rows = [
-            (time, *(float(getattr(one, column)) for column in columns))
-            for time, one in self._own.get(name, [])
-            if all(hasattr(one, column) for column in columns)
-        ]
-        if not rows:
+        rows = self._found.table(name)
+        if not len(rows):
             return None
-        table = np.array(rows, dtype=np.float64)
-        return LogSeries(name, table[:, 0], table[:, 1:])
+        wanted = [1 + NUMBERS[name].index(column) for column in columns]
+        return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, wanted])
 
     def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
         place = self._table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
@@ -177,7 +167,7 @@ class _Messages:
 
     def _heights(self) -> Iterable[HeightSource]:
         gps = self._gps_place()
-        if gps is not None and "GLOBAL_POSITION_INT" in self._own:
+        if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
             yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
         hud = self._table("VFR_HUD", ("alt",))
         if hud is not None:
@@ -197,7 +187,7 @@ class _Messages:
         """Items as they went up, or came down when a station asked for them."""
         rows: list[Item] = []
         total = 0
-        for time, message in self._all:
+        for time, message in self._items:
             kind = message.get_type()
             if getattr(message, "mission_type", _MISSION_TYPE) != _MISSION_TYPE:
                 continue
@@ -205,7 +195,7 @@ class _Messages:
                 total = message.count
             elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
                 rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT")))
-        px4 = any(one.autopilot == _PX4 for _, one in self._own.get("HEARTBEAT", []))
+        px4 = any(one.autopilot == _PX4 for _, one in self._own["HEARTBEAT"])
         for start, items in gather_items(rows):
             made = _px4_mission(items, self._source) if px4 else logged_mission(items, f"{self._source}: mission items")
             if made is not None:
@@ -251,36 +241,3 @@ def _px4_mission(items: tuple[MissionItem, ...], source: str) -> Mission | None:
     if len(items) < 2:
         return None
     return renumbered(Mission(None, items, source=f"{source}: mission items"))
-
-
-def _boot_times(own: list[tuple[float, Any]]) -> tuple[float, tuple[float, ...], list[float]]:
-    """Time received less time since boot, s; where the vehicle was switched on anew; and each message's time, s.
-
-    A message without a time of its own has the one before it, and as much more as it was received later.
-    """
-    times: list[float] = []
-    offset = math.nan
-    for stamp, message in own:
-        boot = getattr(message, "time_boot_ms", None)
-        if boot is not None:
-            times.append(boot * 1e-3)
-            if math.isnan(offset):
-                offset = stamp - times[-1]
-        else:
-            times.append(math.nan)
-    if math.isnan(offset):
-        offset = own[0][0] if own else 0.0
-    stamped = np.array(times)
-    known = np.flatnonzero(np.isfinite(stamped))
-    jumps: tuple[float, ...] = ()
-    if known.size:
-        steady = steady_clock(stamped[known])
-        jumps = steady.jumps
-        stamped[known] = steady.time
-        received = np.array([stamp for stamp, _ in own])
-        before = known[np.clip(np.searchsorted(known, np.arange(len(own)), side="right") - 1, 0, None)]
-        unknown = ~np.isfinite(stamped)
-        stamped[unknown] = stamped[before[unknown]] + (received - received[before])[unknown]
-    else:
-        stamped = np.array([stamp - offset for stamp, _ in own])
-    return offset, jumps, stamped.tolist()
