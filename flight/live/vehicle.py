@@ -112,10 +112,7 @@ class Vehicle:
             self.step(_NAP)
 
     def close(self) -> None:
-        """Have the process that flies end its flight and itself; its last texts go to the terminal.
-
-        One that is not ready yet has no flight to end, and nothing is waited for.
-        """
+        """Have the process that flies end its flight, if it has begun to serve; its last texts go to the terminal."""
         until = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
             if self._ready:
