@@ -1,7 +1,7 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,15 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
-from logs.recording.recorder import Recorder, thin_track
+from logs.recording.recorder import thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.levels import FlownBeside
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.flights_beside import airframe_answer, find_deciding_parameter
+from planfly.flight_limits import FlightLimits
+from planfly.flights_beside import judge_with_flights_beside
+from planfly.whole_log import WholeLog
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -38,6 +40,7 @@ Advance = Callable[[float, float, str], None]
 BATCH = 60
 # A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
 MOST_STORES = 2.0
+_USUAL_LIMITS = FlightLimits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +174,7 @@ def fly_and_judge(
     autopilot: Path | None = None,
     off_nominal: OffNominal | None = None,
     beside: bool = True,
+    most: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
@@ -178,6 +182,7 @@ def fly_and_judge(
     autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
     off_nominal: how the flight differs from what guidance knows; none of a real ArduPlane's.
     beside: whether the flights below are flown; whether it is flyable does not depend on them.
+    most: how long it may fly, and how large its log may grow.
 
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
     one passes, flights with other parameters.
@@ -193,8 +198,8 @@ def fly_and_judge(
         if autopilot is None:
             how = off_nominal or OffNominal(Variation())
             flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
-            return _record_and_judge(setup, airframe, flight, log, advance, every, beside=beside)
-        return _fly_program(setup, airframe, log, advance, every, autopilot)
+            return _record_and_judge(setup, airframe, flight, log, advance, every, most, beside=beside)
+        return _fly_program(setup, airframe, log, advance, every, autopilot, most)
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
 
@@ -213,6 +218,7 @@ def _fly_program(
     advance: Advance | None,
     every: int,
     autopilot: Path,
+    most: FlightLimits,
 ) -> JudgedFlight:
     # Imported here: nobody else needs MAVLink.
     from flight.real_autopilot.autopilot_flight import AutopilotFlight
@@ -220,7 +226,7 @@ def _fly_program(
     with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every)
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, most)
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)
@@ -246,9 +252,12 @@ def _record_and_judge(
     log: Path | None,
     advance: Advance | None,
     every: int,
+    most: FlightLimits,
     *,
     beside: bool = True,
 ) -> JudgedFlight:
+    flight.most_ticks = min(flight.most_ticks, most.most_ticks(flight.dt))
+
     def report(done: float, whole: float) -> None:
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
@@ -256,8 +265,9 @@ def _record_and_judge(
     if log is None:
         flown = fly_to_end(flight, progress=report)
         return _judged(setup, airframe, flown.track, flown.ended, beside=beside)
-    with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = fly_to_end(flight, recorder.write_rows, report)
+    with WholeLog(log, setup, every=every, batch=BATCH) as recorder:
+        flown = fly_to_end(flight, recorder.write, report, lambda: most.log_full(recorder.size))
+        recorder.ended = flown.ended
         judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, beside=beside)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
@@ -275,11 +285,7 @@ def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
 def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, beside: bool) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    others = None
-    if beside and setup.parameters is not None:
-        others = FlownBeside(airframe_answer(setup, airframe.aircraft))
-    verdict = judge_flight(setup, track, ended, beside=others)
-    if others is not None and others.airframe is not None and others.airframe.flyable and not verdict.flyable:
-        others = replace(others, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
-        verdict = judge_flight(setup, track, ended, beside=others)
+    if not beside:
+        return JudgedFlight(setup, track, ended, judge_flight(setup, track, ended), (event,))
+    verdict, others = judge_with_flights_beside(setup, airframe.aircraft, track, ended)
     return JudgedFlight(setup, track, ended, verdict, (event,), others)

@@ -21,8 +21,12 @@ COMMAND_NAMES = (
     "paper",
     "campaign",
     "winds",
+    "import",
+    "refly",
     "scenarios",
 )
+# Where a command's name is a word of Python's own.
+_MODULES = {"import": "import_log"}
 
 
 def find_command(name: str) -> CommandFunction:
@@ -36,5 +40,6 @@ def find_command(name: str) -> CommandFunction:
     """
     if name not in COMMAND_NAMES:
         raise KeyError(name)
-    command: CommandFunction = getattr(import_module(f"planfly.commands.{name}"), name)
+    module = _MODULES.get(name, name)
+    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), module)
     return command

@@ -102,9 +102,9 @@ def test_a_full_disk_is_told_and_keeps_what_was_written(base: CampaignBase, tmp_
     with opened(path) as store:
         # As SQLite says it of a disk: the file may have no more pages.
         store._connection.execute("PRAGMA max_page_count = 12")
+        many = (replace(row, draw=replace(row.draw, index=k)) for k in range(1000))
         with pytest.raises(OSError, match="no space left"):
-            for k in range(1000):
-                store.add(replace(row, draw=replace(row.draw, index=k)))
+            any(store.add(one) for one in many)
     with opened(path, resume=True) as store:
         # All before the one that found no room.
         assert list(store.outcomes()) == list(range(len(store.outcomes())))
