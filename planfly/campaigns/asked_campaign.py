@@ -5,7 +5,7 @@ from pathlib import Path
 
 from planfly.campaigns.campaign_result import make_goal
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
-from planfly.campaigns.spread.spread_file import Spread, default_spread, read_spread
+from planfly.campaigns.spread.spread_file import FlightSpread, default_spread, read_spread
 from planfly.campaigns.statistics.decision import Goal
 from planfly.pipeline import Advance
 from planfly.terminal.progress import progress
@@ -22,12 +22,12 @@ def campaign_goal(args: argparse.Namespace) -> Goal:
         raise PlanflyError(f"--{error}") from error
 
 
-def campaign_spread(args: argparse.Namespace) -> Spread:
+def campaign_spread(args: argparse.Namespace) -> FlightSpread:
     """The spread that the options name.  Raises SpreadError."""
     return default_spread() if args.spread is None else read_spread(Path(args.spread))
 
 
-def open_base(args: argparse.Namespace, spread: Spread, folder: Path | None) -> CampaignBase:
+def open_base(args: argparse.Namespace, spread: FlightSpread, folder: Path | None) -> CampaignBase:
     """The mission of the options, planned if it is a scenario and the folder holds no plan of it."""
     change = scenario_change(args)
 

@@ -9,7 +9,7 @@ from planfly.campaigns.engine.flight_loop import Flown, Order, Pilots
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import fly_one
-from planfly.campaigns.flights.varied_flight import MeanWind
+from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.statistics.wind_boundary import Direction, WindBoundary, needs_more
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction.
@@ -88,7 +88,7 @@ def _fly_round(
         if entry is None:
             return None
         number, speed, index = entry
-        order = Order(index, MeanWind(speed, 360.0 * number / goal.directions))
+        order = Order(index, GivenWind(speed, 360.0 * number / goal.directions))
         asked[order] = entry
         return order
 

@@ -15,7 +15,7 @@ from planfly.campaigns.asked_campaign import (
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_again, write_files
+from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_row_again, write_files
 from planfly.campaigns.report.summary import campaign_lines, summarise
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.storage.store import DATABASE
@@ -71,7 +71,7 @@ def _refly(base: CampaignBase, goal: Goal, folder: Path, index: int) -> int:
             raise PlanflyError(f"{store.path}: --refly {index}: no such flight; it has {store.tally().flown}, from 0")
     target = folder / "flights" / f"flight-{index:06d}.mcap"
     target.parent.mkdir(exist_ok=True)
-    again = fly_again(base, row, target)
+    again = fly_row_again(base, row, target)
     print(f"flight {index}: {again.outcome}, ended: {again.ended}, as in the table")
     for rule, place in again.failed:
         print(f"  failed  {rule} at {place_text(place)}")

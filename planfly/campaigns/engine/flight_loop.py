@@ -9,7 +9,7 @@ from planfly.campaigns.engine.fingerprint import fingerprint
 from planfly.campaigns.engine.flight_tasks import CampaignPlugin, FlyOne, fly_task
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.flights.varied_flight import MeanWind
+from planfly.campaigns.flights.varied_flight import GivenWind
 from world.errors import PlanflyError
 
 
@@ -18,7 +18,7 @@ class Order:
     """A flight to fly: its index, and the mean wind that takes the scenario's place, None for none."""
 
     index: int
-    wind: MeanWind | None = None
+    wind: GivenWind | None = None
 
 
 class Flown(NamedTuple):

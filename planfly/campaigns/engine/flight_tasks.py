@@ -14,10 +14,10 @@ from aircraft.catalog import find_aircraft
 from planfly.campaigns.engine.fingerprint import fingerprint, refuse_different
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
-from planfly.campaigns.flights.varied_flight import MeanWind
+from planfly.campaigns.flights.varied_flight import GivenWind
 
 # Flies flight k of a base, in this wind; `planfly.campaigns.flights.flight_row.fly_one` in all campaigns.
-FlyOne = Callable[[CampaignBase, int, MeanWind | None], FlightRow]
+FlyOne = Callable[[CampaignBase, int, GivenWind | None], FlightRow]
 
 
 class CampaignPlugin(WorkerPlugin):
@@ -50,7 +50,7 @@ class CampaignPlugin(WorkerPlugin):
         return self._ready
 
 
-def fly_task(campaign: str, index: int, wind: MeanWind | None) -> FlightRow:
+def fly_task(campaign: str, index: int, wind: GivenWind | None) -> FlightRow:
     """Fly a flight on the worker that this runs on."""
     worker = get_worker()
     plugin = worker.plugins[campaign]

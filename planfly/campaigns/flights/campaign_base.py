@@ -13,7 +13,7 @@ from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.campaigns.spread.spread_file import Spread, SpreadError
+from planfly.campaigns.spread.spread_file import FlightSpread, SpreadError
 from planfly.open_mission import OpenedMission, ScenarioChange, open_mission
 from planfly.pipeline import Advance, make_plan, make_setup
 from planner.plan import Plan, plan_json, read_plan
@@ -39,7 +39,7 @@ class CampaignBase:
     mission: Mission
     placed: PlacedMission
     plan: Plan | None
-    spread: Spread
+    spread: FlightSpread
     seed: int
     name: str
 
@@ -61,7 +61,7 @@ class CampaignBase:
 
 def open_campaign(
     target: str,
-    spread: Spread,
+    spread: FlightSpread,
     *,
     planned: Path | None = None,
     scenario_name: str | None = None,
@@ -105,7 +105,7 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
     return plan
 
 
-def _of_plan(plan: Plan, spread: Spread, seed: int) -> CampaignBase:
+def _of_plan(plan: Plan, spread: FlightSpread, seed: int) -> CampaignBase:
     scenario = plan.scenario
     airframe = load_airframe(scenario)
     tracking = airframe.limits.tracking
@@ -114,7 +114,7 @@ def _of_plan(plan: Plan, spread: Spread, seed: int) -> CampaignBase:
     return CampaignBase(scenario, airframe, mission, placed, plan, spread, seed, scenario.name)
 
 
-def _of_mission(opened: OpenedMission, spread: Spread, source: str) -> CampaignBase:
+def _of_mission(opened: OpenedMission, spread: FlightSpread, source: str) -> CampaignBase:
     setup = opened.setup
     # By its name alone: the folder that it lies in is nothing of the flight's.
     mission = replace(setup.mission, source=source)

@@ -10,7 +10,7 @@ from logs.verdict.findings import RULES, Finding, Verdict
 from logs.verdict.places import Place
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.track_shape import clearance_profile, waypoint_crossings
-from planfly.campaigns.flights.varied_flight import MeanWind, vary
+from planfly.campaigns.flights.varied_flight import GivenWind, vary
 from planfly.campaigns.spread.draws import Draw, draw_flight
 from planfly.pipeline import fly_and_judge
 
@@ -69,7 +69,7 @@ SCALES = dict.fromkeys(RULES, 10.0) | {
 _COUNTS = ("completion", "threat", "mission", "takeoff", "landing", "turn")
 
 
-def fly_one(base: CampaignBase, index: int, wind: MeanWind | None = None, log: Path | None = None) -> FlightRow:
+def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
     """Fly a flight of a campaign by its index alone.
 
     wind: mean wind in the scenario's place.  log: where to record it, None for nowhere.

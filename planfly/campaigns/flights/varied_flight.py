@@ -24,7 +24,7 @@ LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "mo
 MOST_WIND, MOST_GRADIENT = 40.0, 0.05
 
 
-class MeanWind(NamedTuple):
+class GivenWind(NamedTuple):
     """A mean wind that takes the place of a scenario's: speed in m/s, and where it comes from, degrees."""
 
     speed: float
@@ -40,7 +40,7 @@ class VariedFlight:
     off_nominal: OffNominal
 
 
-def vary(base: CampaignBase, draw: Draw, wind: MeanWind | None = None) -> VariedFlight:
+def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> VariedFlight:
     """The flight of a draw; wind: about which it varies, None for the scenario's.
 
     Scenario and limits are in the flight's wind, as `planfly fly --wind` has them; mass, drag, control power and the
@@ -58,10 +58,10 @@ def vary(base: CampaignBase, draw: Draw, wind: MeanWind | None = None) -> Varied
     return VariedFlight(setup, airframe, OffNominal(variation, offset))
 
 
-def _in_wind(scenario: Scenario, values: dict[str, float], mean: MeanWind | None) -> Scenario:
+def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | None) -> Scenario:
     """The scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
     old = scenario.wind
-    about = mean or MeanWind(old.speed, math.degrees(old.from_course))
+    about = mean or GivenWind(old.speed, math.degrees(old.from_course))
     speed = min(MOST_WIND, max(0.0, about.speed + values["wind_speed"]))
     from_deg = (about.from_deg + values["wind_from"]) % 360.0
     gradient = min(MOST_GRADIENT, max(-MOST_GRADIENT, old.gradient + values["wind_gradient"]))

@@ -46,14 +46,14 @@ def write_files(
     for count, row in enumerate(summary.worst):
         path = folder / log_name(row)
         if row.duration > 0.0 and not path.exists():
-            fly_again(base, row, path)
+            fly_row_again(base, row, path)
         if advance is not None:
             advance(count + 1.0, float(len(summary.worst)), f"flight {row.draw.index}")
     write_whole(folder / "summary.json", summary_json(summary))
     write_whole(folder / "report.html", campaign_page(base, summary, store, command))
 
 
-def fly_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
+def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """Fly a flight of the table once more, into a log.
 
     Raises PlanflyError where it does not come out as the table has it: the machine that flew it computes otherwise.

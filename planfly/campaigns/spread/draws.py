@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planfly.campaigns.spread.quantities import QUANTITIES
-from planfly.campaigns.spread.spread_file import Spread
+from planfly.campaigns.spread.spread_file import FlightSpread
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class Draw:
     values: dict[str, float]
 
 
-def draw_flight(spread: Spread, seed: int, index: int) -> Draw:
+def draw_flight(spread: FlightSpread, seed: int, index: int) -> Draw:
     r"""Draw a flight's numbers.
 
     seed: the campaign's.  The stream is ``SeedSequence(seed, spawn_key=(index,))``: no flight needs another's draw, so

@@ -75,15 +75,15 @@ class Varying:
 
 
 @dataclass(frozen=True)
-class Spread:
+class FlightSpread:
     """All that varies, in the order of `planfly.campaigns.spread.quantities.QUANTITIES`; name: where it is from."""
 
     varying: tuple[Varying, ...]
     name: str
 
-    def without(self, names: tuple[str, ...]) -> "Spread":
+    def without(self, names: tuple[str, ...]) -> "FlightSpread":
         """The spread in which these quantities do not vary."""
-        return Spread(tuple(one for one in self.varying if one.quantity.name not in names), self.name)
+        return FlightSpread(tuple(one for one in self.varying if one.quantity.name not in names), self.name)
 
     def to_json(self) -> dict[str, dict[str, Any]]:
         """As plain data, a table a quantity."""
@@ -93,7 +93,7 @@ class Spread:
         }
 
 
-def default_spread() -> Spread:
+def default_spread() -> FlightSpread:
     """The spread that campaigns have where no other is given.
 
     >>> [one.quantity.name for one in default_spread().varying][:3]
@@ -103,14 +103,14 @@ def default_spread() -> Spread:
     return parse_spread(text, DEFAULT)
 
 
-def read_spread(path: Path) -> Spread:
+def read_spread(path: Path) -> FlightSpread:
     """Read a spread file.  Raises SpreadError for one that cannot be read or used."""
     return parse_spread(
         utf8_text(read_small_file(path, MOST_BYTES, "spread", SpreadError), path, SpreadError), str(path)
     )
 
 
-def parse_spread(text: str, name: str) -> Spread:
+def parse_spread(text: str, name: str) -> FlightSpread:
     r"""The spread of a file's text; name: of the file in messages.
 
     Raises SpreadError, in one line, for what is no TOML, an unknown quantity, an unknown distribution, a parameter that
@@ -131,7 +131,7 @@ def parse_spread(text: str, name: str) -> Spread:
     varying = tuple(_varying(BY_NAME[key], tables[key], f"{name}: {key}") for key in NAMES if key in tables)
     if not varying:
         raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}")
-    return Spread(varying, name)
+    return FlightSpread(varying, name)
 
 
 def _varying(quantity: Quantity, table: Any, where: str) -> Varying:

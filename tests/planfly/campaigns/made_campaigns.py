@@ -7,9 +7,9 @@ from pathlib import Path
 from logs.verdict.places import Place
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.flights.flight_row import FlightRow, LeastMargin
-from planfly.campaigns.flights.varied_flight import MeanWind
+from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.draws import draw_flight
-from planfly.campaigns.spread.spread_file import Spread, default_spread
+from planfly.campaigns.spread.spread_file import FlightSpread, default_spread
 
 SCENARIO = """\
 name = "short"
@@ -58,12 +58,12 @@ def write_short(folder: Path) -> tuple[Path, Path]:
     return mission, scenario
 
 
-def short_base(folder: Path, spread: Spread | None = None, seed: int = 1) -> CampaignBase:
+def short_base(folder: Path, spread: FlightSpread | None = None, seed: int = 1) -> CampaignBase:
     mission, scenario = write_short(folder)
     return open_campaign(str(mission), spread or default_spread(), scenario_name=str(scenario), seed=seed)
 
 
-def made_flight(base: CampaignBase, index: int, wind: MeanWind | None = None) -> FlightRow:
+def made_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """A flight whose outcome follows from its draw: nine of ten fly; in a wind from W at most 12 m/s, else 8."""
     draw = draw_flight(base.spread, base.seed, index)
     luck = draw.seed % 1000 / 1000.0
@@ -77,19 +77,19 @@ def made_flight(base: CampaignBase, index: int, wind: MeanWind | None = None) ->
     )  # fmt: skip
 
 
-def all_fly(base: CampaignBase, index: int, wind: MeanWind | None = None) -> FlightRow:
+def all_fly(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """A made flight that always flies."""
     draw = draw_flight(base.spread, base.seed, index)
     return FlightRow(draw, "flyable", "completed", (), (), 50.0, 60.0)
 
 
-def slow_flight(base: CampaignBase, index: int, wind: MeanWind | None = None) -> FlightRow:
+def slow_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """A made flight that takes a while, for whoever is to be killed meanwhile."""
     time.sleep(0.05)
     return made_flight(base, index, wind)
 
 
-def deadly_flight(base: CampaignBase, index: int, wind: MeanWind | None = None) -> FlightRow:
+def deadly_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
     """Flight 5 ends its worker's process, as a model that makes JSBSim abort does."""
     if index == 5:
         os.abort()

@@ -10,7 +10,7 @@ import pytest
 import planfly.commands
 from planfly.commands.registry import COMMAND_NAMES, find_command
 
-HELPERS = {"__init__", "registry", "served_flights"}
+HELPERS = {"__init__", "registry"}
 
 
 def test_the_commands_are_the_modules_of_their_folder() -> None:
@@ -22,7 +22,7 @@ def test_the_commands_are_the_modules_of_their_folder() -> None:
 
 
 def test_what_is_no_command_is_not_imported() -> None:
-    for name in ("registry", "served_flights", "os", ""):
+    for name in ("registry", "os", ""):
         with pytest.raises(KeyError):
             find_command(name)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.varied_flight import MeanWind, vary
+from planfly.campaigns.flights.varied_flight import GivenWind, vary
 from planfly.campaigns.spread.draws import Draw
 from planfly.campaigns.spread.quantities import QUANTITIES
 
@@ -52,7 +52,7 @@ def test_gusts_are_the_flights_own_whatever_the_scenario_states(base: CampaignBa
 
 
 def test_a_mean_wind_takes_the_scenarios_place(base: CampaignBase) -> None:
-    wind = vary(base, drawn(wind_gradient=0.002), MeanWind(11.0, 45.0)).setup.scenario.wind
+    wind = vary(base, drawn(wind_gradient=0.002), GivenWind(11.0, 45.0)).setup.scenario.wind
     assert (wind.speed, math.degrees(wind.from_course), wind.gradient) == (11.0, pytest.approx(45.0), 0.002)
 
 

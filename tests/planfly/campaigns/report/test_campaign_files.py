@@ -7,7 +7,7 @@ import pytest
 
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import fly_one
-from planfly.campaigns.report.campaign_files import clear_campaign, fly_again, write_files
+from planfly.campaigns.report.campaign_files import clear_campaign, fly_row_again, write_files
 from tests.planfly.campaigns.made_campaigns import made_flight
 from tests.planfly.campaigns.report.made_report import made_report
 from world.errors import PlanflyError
@@ -17,7 +17,7 @@ def test_files_are_written_and_cleared_and_no_others(
     base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        "planfly.campaigns.report.campaign_files.fly_again", lambda base, row, log: log.write_bytes(b"")
+        "planfly.campaigns.report.campaign_files.fly_row_again", lambda base, row, log: log.write_bytes(b"")
     )
     (tmp_path / "worst").mkdir()
     (tmp_path / "worst" / "flight-000777.mcap").write_bytes(b"of before")
@@ -35,6 +35,6 @@ def test_files_are_written_and_cleared_and_no_others(
 
 def test_a_flight_that_comes_out_otherwise_is_told(base: CampaignBase, tmp_path: Path) -> None:
     row = fly_one(base, 1)
-    fly_again(base, row, tmp_path / "a.mcap")
+    fly_row_again(base, row, tmp_path / "a.mcap")
     with pytest.raises(PlanflyError, match="comes out otherwise"):
-        fly_again(base, made_flight(base, 1), tmp_path / "a.mcap")
+        fly_row_again(base, made_flight(base, 1), tmp_path / "a.mcap")
