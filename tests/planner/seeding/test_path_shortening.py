@@ -55,7 +55,7 @@ def test_a_string_about_a_sphere(make_limits: Callable[[Scenario], Limits], smal
     string = 2.0 * math.sqrt(3000.0**2 - radius**2) + 2.0 * radius * math.asin(radius / 3000.0)
     # Twelve waypoints on the tangents' ends and between: an arc of a rad is longer by 1/12 of a leg's square.
     assert string * 0.9999 < path_length(path) < string * 1.002
-    assert np.abs(path[[0, -1]] - np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])).max() == 0.0
+    np.testing.assert_allclose(path[[0, -1]], [[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]], atol=1e-9)
 
 
 def test_in_the_open_it_is_straight(make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]) -> None:
