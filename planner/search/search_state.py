@@ -16,10 +16,11 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
 from planner.plan import Certificate, Violation
 from planner.search.algorithms import Algorithm
 from planner.search.score_table import KILL, LENGTH, best_first, no_scores, safe, score_table, violated
-from planner.seeding.path_shortening import MOST_MODELS, shorten
+from planner.seeding.path_shortening import MOST_MODELS, shorten_path
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
+from world.geometry import path_length
 
 Floats = NDArray[np.float64]
 SearchProgress = Callable[[int, int, str], None]
@@ -34,11 +35,6 @@ SPARES = (0.1, 2.0)
 MOST_TIGHTENING = 600
 # Waypoints of paths that are evaluated before the search may end: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
-
-
-def path_length(path: Floats) -> float:
-    """Length of a path (w, 3), m."""
-    return float(np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum())
 
 
 class SearchEnded(Exception):
@@ -187,7 +183,7 @@ class Search:
         for spare in SPARES:
             if self._budget() - self.evaluations < MOST_MODELS:
                 return False
-            path, made = shorten(self.problem.search, path, spare=spare, pause=self.pause)
+            path, made = shorten_path(self.problem.search, path, spare=spare, pause=self.pause)
             self.evaluations += made
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
                 return False
