@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.airspace.airspace_arrays import is_limited
+from planner.evaluation.airspace_scores import airspace_counts
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
@@ -117,8 +118,13 @@ class Search:
     def score(self, vectors: Floats) -> Floats:
         """Scores (n, 8) of vectors (n, d), of which neither archive nor budget takes note."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
-        evaluate = graded_scores if self.algorithm.graded else paper_scores
-        return score_table(*evaluate(self.problem.search, paths))
+        data = self.problem.search
+        if self.algorithm.graded:
+            return score_table(*graded_scores(data, paths))
+        counts, objectives = paper_scores(data, paths)
+        if is_limited(data.airspace):
+            counts[:, Violation.BOUNDS] += airspace_counts(data, paths)
+        return score_table(counts, objectives)
 
     def evaluate(self, vectors: Floats) -> Floats:
         """Scores (n, 8) of vectors (n, d); the archive takes them.  Raises SearchEnded when asked to end."""
