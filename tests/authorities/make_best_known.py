@@ -3,8 +3,8 @@
 ``python -m tests.authorities.make_best_known [NN ...] [planfly] [cmaes] [ompl] [slsqp]`` runs, for each problem: our
 default planner with 20 times the paper's population, seeds 1 and 2; CMA-ES in the smooth basis from our coarse seeds,
 4 seeds, 5 times the paper's budget; OMPL's Informed RRT* for 60 s of CPU; SciPy's SLSQP from 40 ways over a lattice and
-4 plans that know no grids, 100 times the default's CPU time or more (`tests.bench.planning.smooth_search`).  A path that
-is already in the file stays unless a certified one is shorter.
+4 plans that know no grids, 100 times the default's CPU time or more (`tests.bench.planning.smooth_search`).  A path
+that is already in the file stays unless a certified one is shorter.
 """
 
 import json
