@@ -231,7 +231,7 @@ class Search:
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
-        shortest = path_length(self.shortest[0]) / self._straight()
+        shortest = float(path_length(self.shortest[0])) / self._straight()
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
     def finished(self, certificate: Certificate) -> bool:

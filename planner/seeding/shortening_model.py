@@ -117,7 +117,8 @@ def _add_missiles(
         share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
         ax, ay, az = ax + share * dx, ay + share * dy, az + share * dz
         away = max(1e-3, math.sqrt(ax * ax + ay * ay + az * az))
-        slopes[0, 0], slopes[0, 1], slopes[0, 2] = ax / away, ay / away, az / away
+        first = slopes[0]
+        first[0], first[1], first[2] = ax / away, ay / away, az / away
         for axis in range(3):
             slopes[1, axis] = share * slopes[0, axis]
             slopes[0, axis] *= 1.0 - share
@@ -159,9 +160,10 @@ def _add_ground(
                 rise = pixel_height(heights, column, row)
                 column, row = polymap(to_pixel, x, y - GROUND_STEP)
                 by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-                slopes[0, 0], slopes[0, 1], slopes[0, 2] = -by_east, -by_north, 1.0
+                first = slopes[0]
+                first[0], first[1], first[2] = -by_east, -by_north, 1.0
                 if math.isnan(by_east + by_north):
-                    slopes[0, 0], slopes[0, 1] = 0.0, 0.0
+                    first[0], first[1] = 0.0, 0.0
                 for axis in range(3):
                     slopes[1, axis] = share * slopes[0, axis]
                     slopes[0, axis] *= 1.0 - share
@@ -181,7 +183,8 @@ def _add_slopes(
         for kind in range(3):
             tangent = bound.climb[i] if kind == 0 else bound.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
-            slopes[1, 0], slopes[1, 1], slopes[1, 2] = tangent * dx / run, tangent * dy / run, sign
+            second = slopes[1]
+            second[0], second[1], second[2] = tangent * dx / run, tangent * dy / run, sign
             for axis in range(3):
                 slopes[0, axis] = -slopes[1, axis]
             number = at + 3 * i + kind
