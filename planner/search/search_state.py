@@ -92,6 +92,7 @@ class Search:
     history: after each generation length ratio, kill exposure and violations of the best path yet.
     certificates: by the path's vector.
     shortest: the shortest finished path (w, 3) that shortening came to, and its certificate; no interval holds it.
+    spent: whether the budget leaves too little for another shortening.
     """
 
     problem: Problem
@@ -110,6 +111,7 @@ class Search:
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
+    spent: bool = False
 
     def __post_init__(self) -> None:
         """Begin with nothing."""
@@ -188,6 +190,7 @@ class Search:
         """Shorten a path (w, 3) and keep what comes of it if it is the shortest finished one; whether it is."""
         for spare in SPARES:
             if self._budget() - self.evaluations < MOST_MODELS:
+                self.spent = True
                 return False
             path, made = shorten_path(self.problem.search, path, spare=spare, pause=self.pause)
             self.evaluations += made
@@ -203,7 +206,7 @@ class Search:
 
     def over(self) -> bool:
         """Whether the search is to end now."""
-        if self.evaluations >= self._budget():
+        if self.spent or self.evaluations >= self._budget():
             self.ended = "budget"
         elif self.stop is not None:
             self.ended = self.stop() or "completed"

@@ -41,7 +41,7 @@ def test_stop_ends_a_search_with_the_best_plan_yet(scenario: Scenario, limits: L
 
 
 def test_budget_in_evaluations_is_kept(scenario: Scenario, limits: Limits) -> None:
-    for budget in (60, 700):
+    for budget in (60, 300):
         plan = plan_path(with_planner(scenario, "--budget", budget=budget), limits, seed=1)
         assert plan.evaluations <= budget + 60
         assert plan.ended == "budget"
