@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.airspace.airspace_arrays import is_limited
-from planner.evaluation.airspace_counts import airspace_counts
+from planner.evaluation.airspace_scores import airspace_counts
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
