@@ -174,6 +174,11 @@ class Recorder:
         if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
 
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+        return self._file.tell()
+
     def flush(self) -> None:
         """Hand every row received to the operating system now, by the caller's clock.
 

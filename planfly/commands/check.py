@@ -4,6 +4,7 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from logs.field_logs.readers.open_log import is_field_log
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_geometry
 from planfly.named_fences import NamedFences, read_named_fences
@@ -23,6 +24,11 @@ def check(args: argparse.Namespace) -> int:
     target = Path(args.json) if args.json else None
     if target:
         refuse_existing(target, args.overwrite, source)
+    if is_field_log(source):
+        if args.fence:
+            raise ScenarioError(f"{source}: --fence: goes with a log of planfly's: import this one first")
+        return _check_field_log(source, args, target)
+    _refuse_field_options(source, args)
     fences = read_named_fences(args.fence)
     if is_log(source):
         log = _open_log(source, args, fences)
@@ -39,6 +45,27 @@ def check(args: argparse.Namespace) -> int:
     if loss:
         return LOSS
     return FLYABLE if verdict.flyable else NOT_FLYABLE
+
+
+def _check_field_log(source: Path, args: argparse.Namespace, target: Path | None) -> int:
+    # Imported here: no other check needs the libraries that read logs of the field.
+    from planfly.commands.field_options import field_options
+    from planfly.field_flights import import_flight
+
+    flight = import_flight(source, field_options(args), scenario_change(args))
+    if target:
+        write_verdict(target, flight.verdict)
+    print_verdict(flight.verdict, flight.setup.route.notes)
+    if flight.lossy:
+        return LOSS
+    return FLYABLE if flight.verdict.flyable else NOT_FLYABLE
+
+
+def _refuse_field_options(source: Path, args: argparse.Namespace) -> None:
+    """Refuse what only a log of the field can take.  Raises ScenarioError."""
+    for name in ("plan", "flight", "datum"):
+        if getattr(args, name, None) is not None:
+            raise ScenarioError(f"{source}: --{name}: goes with a log of the field, not with this file")
 
 
 def _open_log(source: Path, args: argparse.Namespace, fences: NamedFences) -> FlightLog:

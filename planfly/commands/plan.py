@@ -22,6 +22,7 @@ from planner.search.replan import replan, same_mission
 from planner.search.search_state import SearchProgress, StopCondition
 from world.atomic_files import write_whole
 from world.errors import ScenarioError
+from world.interruption import interrupt
 from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_planner, with_threats
 
@@ -46,16 +47,16 @@ def plan(args: argparse.Namespace) -> int:
 def _best_so_far(seconds: float | None) -> Iterator[StopCondition]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
-    A second Ctrl-C ends the process.
+    A second Ctrl-C ends the command without a plan.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     pressed = False
 
     def press(_signal: int, _frame: FrameType | None) -> None:
         nonlocal pressed
+        if pressed:
+            interrupt(signal.SIGINT)
         pressed = True
-        # Python's own handler would wait again for compiled code to come back.
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def stop() -> str:
         if pressed:

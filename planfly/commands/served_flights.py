@@ -3,6 +3,7 @@
 import contextlib
 import math
 import signal
+import threading
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -36,6 +37,7 @@ from planfly.open_mission import open_mission
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
 from world.frames import to_geo
+from world.interruption import end_when_told
 from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_flight
 
@@ -93,13 +95,18 @@ def open_served(options: ServeOptions) -> ServedScenario:
 
 def fly_process(connection: Connection, options: ServeOptions) -> None:
     """Run the process that flies."""
-    # Ctrl-C reaches the whole group; the link orders this process to end.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    in_service = threading.Event()
+    end_when_told(in_service)
     factory = ServedFlights(options)
     factory.warm()
+    # A signal to the whole group reaches the link too, which orders this process to end: its log is closed first.
+    in_service.set()
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
     send_event(connection, ProcessReady())
     serve_flights(connection, factory)
+    # The link waits for this, and not for the interpreter to be taken down.
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    connection.close()
 
 
 class ServedFlights:

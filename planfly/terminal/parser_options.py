@@ -2,7 +2,7 @@
 
 import argparse
 
-from planfly.terminal.argument_types import positive, wind
+from planfly.terminal.argument_types import positive, positive_count, wind
 
 
 def overwrite_option(parser: argparse.ArgumentParser) -> None:
@@ -70,10 +70,36 @@ def program_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def limit_options(parser: argparse.ArgumentParser) -> None:
+    """Where a flight ends that would go on."""
+    parser.add_argument(
+        "--max-hours",
+        metavar="H",
+        type=positive,
+        default=6.0,
+        help="simulated hours that are flown at most (default: 6)",
+    )
+    parser.add_argument(
+        "--max-log", metavar="MB", type=positive, default=256.0,
+        help="the flight ends when its log has so many MB (default: 256; it grows by some 20 an hour)",
+    )  # fmt: skip
+
+
 def own_link_options(parser: argparse.ArgumentParser, *, bind: str) -> None:
     """Where and with whom a vehicle speaks MAVLink."""
     parser.add_argument("--bind", metavar="IP:PORT", default=bind, help=f"where the vehicle listens (default: {bind})")
     parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
     parser.add_argument(
         "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
+    )
+
+
+def field_log_options(parser: argparse.ArgumentParser) -> None:
+    """What a person says of a log of the field."""
+    parser.add_argument("--plan", metavar="MISSION", help="what was to be flown, in place of the log's own mission")
+    parser.add_argument(
+        "--flight", metavar="N", type=positive_count, help="which of the log's flights (default: the longest in AUTO)"
+    )
+    parser.add_argument(
+        "--datum", choices=("amsl", "ellipsoid"), help="what the log's heights are above, where it does not say"
     )
