@@ -12,10 +12,10 @@ import numpy as np
 from flight.simulation.field_source import Gap, MissionStretch, Quantity
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.field_summary import field_lines
+from logs.verdict.field.field_summary import field_lines
+from logs.verdict.field.flown_legs import FlownLegs, flown_legs
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
 from logs.verdict.flown_findings import flown_findings
-from logs.verdict.flown_legs import FlownLegs, flown_legs
 from logs.verdict.levels import LevelAnswer
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.summary import headline
@@ -96,6 +96,12 @@ def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
         if legs.partial:
             judged = _in_part(judged, legs)
         out.append(_shifted(judged, legs.first, setup))
+    if "stall" not in {item.rule for item in out} and setup.source is not None:
+        lacking = [quantity for quantity in NEEDS["stall"] if quantity not in setup.source.holds]
+        if lacking:
+            # The rule itself says nothing of a flight without numbers.
+            why = f"the log holds no {_CALLED[lacking[0]]}"
+            out.append(make_finding("stall", FLIGHT, ok=None, reason=why, source="aircraft", unit="m/s"))
     return out
 
 
