@@ -6,18 +6,38 @@ from collections.abc import Sequence
 
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.parser import build_parser
+from planfly.terminal.signal_watch import end_process, ended_by_signals
+from world.interruption import Interrupted
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Carry one command out, and return its exit code.
 
-    argv: without the program's name; None takes the process's.
+    argv: without the program's name; None takes the process's, which SIGINT and SIGTERM then end in time.
     """
-    args = build_parser().parse_args(argv)
+    if argv is not None:
+        return _outcome(argv)
+    with ended_by_signals() as heard:
+        try:
+            code = _outcome(argv)
+        except Exception:
+            if not heard:
+                raise
+            # A compiler that is interrupted fails in ways of its own.
+            code = _fail(128 + heard[0], "interrupted")
+    if heard:
+        # Taking an interpreter with compiled code down takes a second.
+        end_process(code)
+    return code
+
+
+def _outcome(argv: Sequence[str] | None) -> int:
     try:
-        return _command(args)
+        return _command(build_parser().parse_args(argv))
     except OSError as error:
         return _fail(FAULT, f"{error.filename or 'file'}: {error.strerror or error}")
+    except Interrupted as interrupted:
+        return _fail(128 + interrupted.number, "interrupted")
     except KeyboardInterrupt:
         return _fail(INTERRUPTED, "interrupted")
 

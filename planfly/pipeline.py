@@ -1,7 +1,7 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +18,15 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
-from logs.recording.recorder import Recorder, thin_track
+from logs.recording.recorder import thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
 from logs.verdict.levels import FlownBeside
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.flights_beside import airframe_answer, find_deciding_parameter
+from planfly.flight_limits import FlightLimits
+from planfly.flights_beside import judge_with_flights_beside
+from planfly.whole_log import WholeLog
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -37,6 +39,7 @@ Advance = Callable[[float, float, str], None]
 BATCH = 60
 # A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
 MOST_STORES = 2.0
+_USUAL_LIMITS = FlightLimits()
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,11 +159,13 @@ def fly_and_judge(
     *,
     every: int = 1,
     autopilot: Path | None = None,
+    most: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
+    most: how long it may fly, and how large its log may grow.
 
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
     one passes, flights with other parameters.
@@ -174,8 +179,9 @@ def fly_and_judge(
         return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
         if autopilot is None:
-            return _record_and_judge(setup, airframe, Flight(setup, airframe.aircraft), log, advance, every)
-        return _fly_program(setup, airframe, log, advance, every, autopilot)
+            flight = Flight(setup, airframe.aircraft)
+            return _record_and_judge(setup, airframe, flight, log, advance, every, most)
+        return _fly_program(setup, airframe, log, advance, every, autopilot, most)
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
 
@@ -194,6 +200,7 @@ def _fly_program(
     advance: Advance | None,
     every: int,
     autopilot: Path,
+    most: FlightLimits,
 ) -> JudgedFlight:
     # Imported here: nobody else needs MAVLink.
     from flight.real_autopilot.autopilot_flight import AutopilotFlight
@@ -201,7 +208,7 @@ def _fly_program(
     with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
         flight.prepare()
         try:
-            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every)
+            judged = _record_and_judge(flight.setup, airframe, flight, log, advance, every, most)
         except FlightError:
             if log is not None:
                 log.unlink(missing_ok=True)
@@ -221,8 +228,16 @@ def autopilot_log(log: Path) -> Path:
 
 
 def _record_and_judge(
-    setup: FlightSetup, airframe: Airframe, flight: Airborne, log: Path | None, advance: Advance | None, every: int
+    setup: FlightSetup,
+    airframe: Airframe,
+    flight: Airborne,
+    log: Path | None,
+    advance: Advance | None,
+    every: int,
+    most: FlightLimits,
 ) -> JudgedFlight:
+    flight.most_ticks = min(flight.most_ticks, most.most_ticks(flight.dt))
+
     def report(done: float, whole: float) -> None:
         if advance is not None:
             advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
@@ -230,8 +245,9 @@ def _record_and_judge(
     if log is None:
         flown = fly_to_end(flight, progress=report)
         return _judged(setup, airframe, flown.track, flown.ended)
-    with Recorder(log, setup, every=every, batch=BATCH) as recorder:
-        flown = fly_to_end(flight, recorder.write_rows, report)
+    with WholeLog(log, setup, every=every, batch=BATCH) as recorder:
+        flown = fly_to_end(flight, recorder.write, report, lambda: most.log_full(recorder.size))
+        recorder.ended = flown.ended
         judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
@@ -249,11 +265,5 @@ def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
 def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    beside = None
-    if setup.parameters is not None:
-        beside = FlownBeside(airframe_answer(setup, airframe.aircraft))
-    verdict = judge_flight(setup, track, ended, beside=beside)
-    if beside is not None and beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
-        beside = replace(beside, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
-        verdict = judge_flight(setup, track, ended, beside=beside)
+    verdict, beside = judge_with_flights_beside(setup, airframe.aircraft, track, ended)
     return JudgedFlight(setup, track, ended, verdict, (event,), beside)

@@ -1,14 +1,19 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and folders that do not outlive their use."""
 
+import contextlib
 import os
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+
+from world.interruption import unfinished, uninterrupted
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
     """Write a file under a temporary name beside its target and rename it: whole, or not at all.
 
-    Text is written in UTF-8.  Raises OSError, and leaves what was there.
+    Text is written in UTF-8.  A target that is a link stays one: the file that it leads to is replaced.  Raises
+    OSError, which names the target, and leaves what was there.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -17,15 +22,32 @@ def write_whole(path: Path, data: str | bytes) -> None:
     {}
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        # mkstemp keeps files private; a result has the permissions that any new file has.
-        mask = os.umask(0)
-        os.umask(mask)
-        Path(temporary).chmod(0o666 & ~mask)
-        Path(temporary).replace(path)
-    except BaseException:
-        Path(temporary).unlink(missing_ok=True)
-        raise
+        target = path.resolve() if path.is_symlink() else path
+        # Cut by bytes, of which a name may have 255: letters may be up to four.
+        name = target.name.encode()[:200].decode("utf-8", "ignore")
+        temporary = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
+        with uninterrupted(), unfinished(temporary):
+            with temporary.open("xb") as file:
+                file.write(content)
+            temporary.replace(target)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        # The user knows the target, not the temporary name.
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+@contextlib.contextmanager
+def temporary_folder(prefix: str) -> Iterator[Path]:
+    """Make a folder among the system's temporary files, and remove it with all that is in it.
+
+    >>> with temporary_folder("planfly-") as folder:
+    ...     _ = (folder / "notes").write_text("gone soon")
+    >>> folder.exists()
+    False
+    """
+    folder = Path(tempfile.gettempdir()) / f"{prefix}{os.getpid()}-{os.urandom(8).hex()}"
+    with unfinished(folder):
+        folder.mkdir(mode=0o700)
+        yield folder

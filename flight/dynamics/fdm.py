@@ -7,10 +7,8 @@ it reads.
 
 import math
 import struct
-import tempfile
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import jsbsim
 import numpy as np
@@ -41,6 +39,7 @@ from flight.dynamics.property_access import Getter, PropertyAccess, Setter
 from flight.dynamics.silence import silence
 from flight.dynamics.state import STATE
 from flight.dynamics.trim import Floats, Trim, air_velocity, body_axes, euler, first_guess, from_vector, solve
+from world.atomic_files import temporary_folder
 from world.errors import FlightError
 from world.kernels import Record, field_names
 
@@ -314,7 +313,7 @@ def _vary(properties: PropertyAccess, aircraft: Aircraft, variation: Variation) 
 
 
 def _load(aircraft: Aircraft, dt: float, flat_earth: bool, tried: bool) -> jsbsim.FGFDMExec:
-    with silence(), tempfile.TemporaryDirectory() as copy:
-        instance = jsbsim.FGFDMExec(copy)
-        load_model(instance, Path(copy), aircraft, dt, flat_earth=flat_earth, tried=tried)
+    with silence(), temporary_folder("planfly-model-") as copy:
+        instance = jsbsim.FGFDMExec(str(copy))
+        load_model(instance, copy, aircraft, dt, flat_earth=flat_earth, tried=tried)
     return instance

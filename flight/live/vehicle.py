@@ -4,7 +4,7 @@ import contextlib
 import errno
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
@@ -33,12 +33,12 @@ from flight.live.station_missions import listed, uploaded
 from flight.live.station_requests import Requests, Response
 from flight.live.status_text import CRITICAL, INFO, WARNING, StatusText
 from flight.live.telemetry import ACTIVE, COMPLETE, Status, telemetry_message
-from flight.mission.items import Home, Mission
+from flight.mission.items import Home, Mission, MissionItem
 
 # Longest wait for the network or the flight, s.
 _NAP = 0.02
-# How long a process that is to end may be silent, s.
-_MOST_SILENCE = 10.0
+# Time that the process that flies has to close its log when the vehicle is shut down, s.
+CLOSING = 0.8
 _MOST_DEATHS = 3
 # Within this time (s) the same text is sent once.
 _SAME_TEXT = 3.0
@@ -83,6 +83,7 @@ class Vehicle:
         # In a row, without being ready in between.
         self._deaths = 0
         self._flight = spawn()
+        self._ready = False
         self._parameters = parameters
         self._show = show
         self._clock = time.monotonic
@@ -100,16 +101,23 @@ class Vehicle:
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
+    def load_fence(self, fences: Sequence[MissionItem]) -> None:
+        """Take a fence from a file, as if a station had uploaded it; missions that follow are judged by it."""
+        self.server.lists[MissionType.FENCE] = tuple(fences)
+        self.server.changed.add(MissionType.FENCE)
+
     def run(self, stop: Callable[[], bool]) -> None:
         """Serve until ``stop`` says so, then end the flight and its process."""
         while not stop():
             self.step(_NAP)
 
     def close(self) -> None:
-        """Have the process that flies end its flight and itself; its last texts go to the terminal."""
+        """Have the process that flies end its flight, if it has begun to serve; its last texts go to the terminal."""
+        until = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
-            self._flight.send(EndFlight(quit=True))
-            while self._flight.poll(_MOST_SILENCE):
+            if self._ready:
+                self._flight.send(EndFlight(quit=True))
+            while self._ready and self._flight.poll(max(0.0, until - self._clock())):
                 found = read_event(self._flight.recv_bytes())
                 if isinstance(found, FlightJudged):
                     self._send_texts(found.texts)
@@ -220,6 +228,7 @@ class Vehicle:
         if self._deaths >= _MOST_DEATHS:
             raise ChildProcessError(errno.ECHILD, "keeps dying", "the process that flies")
         self._flight = self._spawn()
+        self._ready = False
         if self.arming.flying:
             self._ended("lost: the process that flew it has died")
         if self.server.lists[MissionType.MISSION]:
@@ -237,6 +246,7 @@ class Vehicle:
             self._ended(event.ended)
         elif isinstance(event, ProcessReady):
             self._deaths = 0
+            self._ready = True
             self._show("ready")
         else:
             self._send_texts(event.texts)

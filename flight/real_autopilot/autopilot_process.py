@@ -9,14 +9,15 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from flight.mission.items import Home
 from flight.real_autopilot.physics_port import LOOPBACK
+from world.atomic_files import temporary_folder
 from world.errors import FlightError
+from world.interruption import uninterrupted
 
 _DEFAULTS, _OUTPUT = "defaults.parm", "output.txt"
 # How fast the program may run against the clock: as fast as the physics answers.
@@ -69,13 +70,14 @@ class AutopilotProcess:
         link_port: int,
     ) -> None:
         self.binary = binary
-        self._folder = Path(tempfile.mkdtemp(prefix="planfly-autopilot-"))
+        self._place = contextlib.ExitStack()
+        self._folder = self._place.enter_context(temporary_folder("planfly-autopilot-"))
         try:
             text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
             (self._folder / _DEFAULTS).write_text(text, encoding="ascii")
             self._process = self._spawn(home, heading, physics_port, link_port)
         except BaseException:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._place.close()
             raise
 
     def _spawn(self, home: Home, heading: float, physics_port: int, link_port: int) -> "subprocess.Popen[bytes]":
@@ -116,7 +118,7 @@ class AutopilotProcess:
     def __exit__(self, *_: object) -> None:
         """Kill the program and remove its folder."""
         self._kill()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._place.close()
 
     def watch(self) -> None:
         """Raise FlightError where the program has panicked or ended, with its last words."""
@@ -149,7 +151,8 @@ class AutopilotProcess:
         logs = sorted((self._folder / "logs").glob("*.BIN"))
         if not logs:
             return False
-        shutil.move(logs[-1], target)
+        with uninterrupted():
+            shutil.move(logs[-1], target)
         return True
 
     def _kill(self) -> None:

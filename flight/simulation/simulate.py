@@ -82,8 +82,16 @@ def simulate(
     return fly_to_end(Flight(setup, aircraft, variation), sink, progress)
 
 
-def fly_to_end(flight: Airborne, sink: Sink | None = None, progress: Progress | None = None) -> SimulatedFlight:
-    """Fly until the flight ends; sink, progress: as of `simulate`.
+def fly_to_end(
+    flight: Airborne,
+    sink: Sink | None = None,
+    progress: Progress | None = None,
+    stop: Callable[[], str] | None = None,
+) -> SimulatedFlight:
+    """Fly until the flight ends.
+
+    sink, progress: as of `simulate`.  stop: asked after each second of flight; what it gives, if anything, is how the
+    flight ends there.
 
     >>> import numpy as np
     >>> from types import SimpleNamespace
@@ -101,6 +109,8 @@ def fly_to_end(flight: Airborne, sink: Sink | None = None, progress: Progress | 
         blocks.append(rows)
         if sink is not None and len(rows):
             sink(rows)
+        if stop is not None and not ended:
+            ended = stop()
         if progress is not None:
             progress(min(flight.memory.distance, flight.path.length), flight.path.length)
     return SimulatedFlight(as_track(join_rows(blocks)), ended, flight.path)

@@ -3,6 +3,11 @@
 mcap's own `StreamReader` does not check an attachment's CRC and decompresses a chunk to whatever size its frame
 declares, so the framing is read here; records are then parsed by mcap's classes, from bytes that are already bounded
 and CRC-checked.  Reading stops at the first damage: what is given is whole, in order and without a hole.
+
+Any container that the format allows is read: with chunks or without, compressed by zstd, lz4 or not, with or without
+an index, statistics, a summary and CRCs, with records of other kinds, and with more bytes in a record than it needs.  A
+CRC of 0 means that its writer left it out (mcap.dev, "MCAP Format Specification").  Messages outside chunks, which have
+no CRC of their own, are believed only where the data section's end says that all of it is there.
 """
 
 import struct
@@ -12,6 +17,7 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from typing import BinaryIO
 
+import lz4.frame
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -20,6 +26,10 @@ from mcap.records import Attachment, Chunk, DataEnd, Footer
 
 MAGIC = b"\x89MCAP0\r\n"
 RECORD_LIMIT = 64 * 2**20
+# Records outside chunks are given in pieces of at least so many bytes.
+_PIECE = 2**18
+# What may stand outside chunks and is given on.
+_LOOSE = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 # All chunks together may grow to this many times the bytes read so far: honest logs stay under 20.
 _GROWTH = 256
 FRAME = struct.Struct("<BQ")
@@ -44,7 +54,7 @@ class Container:
 
 
 def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
-    """Give the records inside each whole chunk as bytes, and fill ``found`` on the way.
+    """Give the records inside each whole chunk, and those outside chunks, as bytes, and fill ``found`` on the way.
 
     file: stands behind the magic at the start.  Never raises for damage; `Container.problem` says what it was.
     """
@@ -57,12 +67,21 @@ def read_chunks(file: BinaryIO, found: Container) -> Iterator[bytes]:
 def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
     crc = zlib.crc32(MAGIC)
     total = 0
-    ended = False
+    ended = vouched = False
+    loose = bytearray()
     while True:
         at = file.tell()
         head, content = _record(file, at)
         opcode = head[0]
-        if opcode == Opcode.CHUNK:
+        if loose and (opcode not in _LOOSE or len(loose) >= _PIECE):
+            yield bytes(loose)
+            loose.clear()
+        if opcode in _LOOSE:
+            if not vouched:
+                _vouch(file, crc, at)
+                vouched = True
+            loose += head + content
+        elif opcode == Opcode.CHUNK:
             data = _chunk(content, at)
             total += len(data)
             if total > RECORD_LIMIT + _GROWTH * file.tell():
@@ -76,10 +95,30 @@ def _read(file: BinaryIO, found: Container) -> Iterator[bytes]:
             break
         elif opcode == Opcode.FOOTER:
             break
+        elif opcode == 0:
+            raise _Damage(f"the record at byte {at:,} is of no kind")
         crc = zlib.crc32(content, zlib.crc32(head, crc))
     if not ended:
         raise _Damage("the data section has no end record")
     _summary(file)
+
+
+def _vouch(file: BinaryIO, crc: int, at: int) -> None:
+    """See that the data section has its end and its CRC, from the record at byte ``at`` on, which is read again."""
+    back = file.tell()
+    file.seek(at)
+    try:
+        while True:
+            here = file.tell()
+            head, content = _record(file, here)
+            if head[0] in (Opcode.DATA_END, Opcode.FOOTER):
+                break
+            crc = zlib.crc32(content, zlib.crc32(head, crc))
+        if head[0] == Opcode.DATA_END:
+            _data_end(content, here, crc)
+    except _Damage as damage:
+        raise _Damage(f"the records outside chunks, from byte {at:,} on, cannot be checked: {damage}") from None
+    file.seek(back)
 
 
 def _record(file: BinaryIO, at: int) -> tuple[bytes, bytes]:
@@ -122,24 +161,31 @@ def _chunk(content: bytes, at: int) -> bytes:
     size = chunk.uncompressed_size
     if size > RECORD_LIMIT:
         raise _Damage(f"the chunk at byte {at:,} declares {size:,} bytes: at most {RECORD_LIMIT:,} are read")
-    if chunk.compression == "zstd":
-        try:
-            # Bounded by the reader: one call of decompress() would believe the size inside the frame.
-            reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data)
-            data = reader.read(size + 1)
-        except zstandard.ZstdError as error:
-            raise _Damage(f"the chunk at byte {at:,} cannot be decompressed") from error
-    elif chunk.compression == "":
-        data = chunk.data
-    else:
+    if chunk.compression not in ("zstd", "lz4", ""):
         raise _Damage(
-            f"the chunk at byte {at:,} is compressed with {chunk.compression[:20]!r}: zstd or none is expected"
+            f"the chunk at byte {at:,} is compressed with {chunk.compression[:20]!r}: zstd, lz4 or none is expected"
         )
+    try:
+        data = _decompressed(chunk, size)
+    except (zstandard.ZstdError, RuntimeError, EOFError) as error:
+        raise _Damage(f"the chunk at byte {at:,} cannot be decompressed") from error
     if len(data) != size:
         raise _Damage(f"the chunk at byte {at:,} does not decompress to the {size:,} bytes that it declares")
-    if zlib.crc32(data) != chunk.uncompressed_crc:
+    if chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise _Damage(f"the chunk at byte {at:,} is damaged (its CRC differs)")
     return data
+
+
+def _decompressed(chunk: Chunk, size: int) -> bytes:
+    """A chunk's bytes, at most one more than ``size``: one call of decompress() would believe the size in the frame."""
+    if chunk.compression == "zstd":
+        reader = zstandard.ZstdDecompressor(max_window_size=2**27).stream_reader(chunk.data, read_across_frames=True)
+        found: bytes = reader.read(size + 1)
+        return found
+    if chunk.compression == "lz4" and chunk.data:
+        found = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
+        return found
+    return chunk.data
 
 
 def _attachment(content: bytes, at: int, found: Container) -> None:
@@ -147,7 +193,10 @@ def _attachment(content: bytes, at: int, found: Container) -> None:
         attachment = Attachment.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the attachment at byte {at:,} cannot be read") from error
-    if zlib.crc32(content[:-4]) != int.from_bytes(content[-4:], "little"):
+    # Two times, three lengths, and what they are of; the CRC follows, and perhaps bytes that nobody needs.
+    lengths = (len(attachment.name.encode()), len(attachment.media_type.encode()), len(attachment.data))
+    end = 32 + sum(lengths)
+    if int.from_bytes(content[end : end + 4], "little") not in (0, zlib.crc32(content[:end])):
         raise _Damage(f"the attachment at byte {at:,} is damaged (its CRC differs)")
     if attachment.name in found.attachments:
         raise _Damage(f"the attachment at byte {at:,} has the name of an earlier one")
@@ -178,7 +227,7 @@ def _summary(file: BinaryIO) -> None:
         footer = Footer.read(record_stream(content))
     except PARSE_ERRORS as error:
         raise _Damage(f"the footer at byte {at:,} cannot be read") from error
-    if footer.summary_crc not in (0, zlib.crc32(content[:-4], zlib.crc32(head, crc))):
+    if footer.summary_crc not in (0, zlib.crc32(content[:16], zlib.crc32(head, crc))):
         raise _Damage("the summary is damaged (its CRC differs)")
     if file.read(len(MAGIC) + 1) != MAGIC:
         raise _Damage("the file does not end as an MCAP file does")

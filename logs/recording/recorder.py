@@ -50,6 +50,7 @@ from logs.recording.state_channel import (
 from logs.verdict.beside_file import beside_json
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.levels import FlownBeside
+from logs.verdict.measures.airspace import with_fence_zones
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
@@ -173,6 +174,11 @@ class Recorder:
         if self._last_ns // self._batch_ns > before // self._batch_ns:
             self._emit(self._last_ns // SECOND_NS * SECOND_NS)
 
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+        return self._file.tell()
+
     def flush(self) -> None:
         """Hand every row received to the operating system now, by the caller's clock.
 
@@ -224,11 +230,12 @@ class Recorder:
             "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats),
             "/scene/plan": scene.plan_scene(EPOCH_NS, setup.route.waypoints),
         }
-        if setup.scenario.zones:
+        zoned = with_fence_zones(setup).scenario
+        if zoned.zones:
             descriptor = SceneUpdate.DESCRIPTOR
             channel = self._writer.channel(ZONES_TOPIC, descriptor.full_name, schema_of(descriptor))
             self._channels[ZONES_TOPIC] = channel
-            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, setup.scenario, setup.route.waypoints)
+            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, zoned, setup.route.waypoints)
         self._write([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 

@@ -56,6 +56,7 @@ _PACKAGES = (
     "pymavlink",
     "pyproj",
     "rasterio",
+    "shapely",
     "mcap",
     "zstandard",
     "protobuf",

@@ -159,13 +159,6 @@ STALL_TOLERANCE = 0.2
 # Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 
-# The rules about airspace
-
-# m.  What the depth of a path beyond a zone's limit is worked out to: half of what a waypoint is rounded by.
-FENCE_DEPTH = 0.01
-# m.  What the places where a path goes in and out of a zone are worked out to.
-FENCE_EDGE = 1e-3
-
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+from aircraft.path_limits import Limits
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
@@ -21,6 +22,7 @@ from planner.search.replan import replan, same_mission
 from planner.search.search_state import SearchProgress, StopCondition
 from world.atomic_files import write_whole
 from world.errors import ScenarioError
+from world.interruption import interrupt
 from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_planner, with_threats
 
@@ -36,7 +38,7 @@ def plan(args: argparse.Namespace) -> int:
         made = _make_plan(args, scenario, old, airframe, seed, advance)
     target.parent.mkdir(parents=True, exist_ok=True)
     write_whole(target, plan_json(made))
-    _print_plan(made)
+    _print_plan(made, airframe.limits)
     print(f"plan      {target}")
     return FLYABLE if made.safe else NOT_FLYABLE
 
@@ -45,16 +47,16 @@ def plan(args: argparse.Namespace) -> int:
 def _best_so_far(seconds: float | None) -> Iterator[StopCondition]:
     """Give what a search asks between generations: "interrupted" after Ctrl-C, "budget" after so many seconds.
 
-    A second Ctrl-C ends the process.
+    A second Ctrl-C ends the command without a plan.
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     pressed = False
 
     def press(_signal: int, _frame: FrameType | None) -> None:
         nonlocal pressed
+        if pressed:
+            interrupt(signal.SIGINT)
         pressed = True
-        # Python's own handler would wait again for compiled code to come back.
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
 
     def stop() -> str:
         if pressed:
@@ -110,7 +112,7 @@ def _make_plan(
         )
 
 
-def _print_plan(made: Plan) -> None:
+def _print_plan(made: Plan, limits: Limits) -> None:
     """A plan on the terminal."""
     state = "safe" if made.safe else "feasible, but inside a missile's reach" if made.feasible else "no feasible plan"
     length = float(made.objectives[Objective.LENGTH_RATIO])
@@ -123,5 +125,5 @@ def _print_plan(made: Plan) -> None:
     for problem in made.certificate.problems:
         print(f"  failed  {problem}")
     if not made.feasible:
-        for line in what_blocks(made):
+        for line in what_blocks(made, limits):
             print(f"  note    {line}")

@@ -10,13 +10,14 @@ from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
+from planfly.flight_limits import FlightLimits, flight_text
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planfly.refine import refine
 from planfly.terminal.autopilot_option import autopilot_program
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, write_missions, write_pictures, write_verdict
-from planfly.terminal.scenario_options import scenario_change
+from planfly.terminal.scenario_options import flight_limits, scenario_change
 from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
 from world.atomic_files import write_whole
@@ -32,6 +33,7 @@ class _Task:
     command: the line that repeats it, for the report.
     folder: where the results go.
     program: the real autopilot that flies, None for none.
+    most: how long it may fly, and how large its log may grow.
     """
 
     scenario: Scenario
@@ -40,22 +42,19 @@ class _Task:
     command: str
     folder: Path
     program: Path | None
+    most: FlightLimits
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
-    with autopilot_program(args) as program:
-        return _run(args, program)
-
-
-def _run(args: argparse.Namespace, program: Path | None) -> int:
+    program = autopilot_program(args)
     scenario = scenario_change(args)(load_scenario(args.scenario))
     seed = choose_seed(scenario, args.seed)
     airframe = load_airframe(scenario)
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
     if args.out:
         refuse_folder(folder, args.overwrite)
-    task = _Task(scenario, airframe, seed, _command_line(args, seed), folder, program)
+    task = _Task(scenario, airframe, seed, _command_line(args, seed), folder, program, flight_limits(args))
     cleared = False
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
@@ -95,8 +94,8 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
         print(f"results   {folder}/ (plan.json, mission.waypoints, mission.plan, verdict.json; nothing was flown)")
         return verdict, False
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
-    with progress("flying") as advance:
-        flown = fly_and_judge(setup, airframe, folder / "flight.mcap", advance, autopilot=task.program)
+    with progress(f"flying {flight_text(setup)}") as advance:
+        flown = fly_and_judge(setup, airframe, folder / "flight.mcap", advance, autopilot=task.program, most=task.most)
     write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):
         write_pictures(folder, flown.setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)

@@ -1,6 +1,7 @@
 """``planfly serve``: a vehicle that ground stations find, upload to, arm, start and follow."""
 
 import argparse
+import contextlib
 import math
 import multiprocessing
 import time
@@ -13,22 +14,27 @@ from flight.live.snapshot import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 from planfly.commands.served_flights import ServeOptions, fly_process, open_served
+from planfly.named_fences import read_named_fences
 from planfly.terminal.link_options import link_access, stop_signals
 from planfly.terminal.scenario_options import flight_entries
 from world.errors import PlanflyError
 from world.frames import to_geo
+from world.interruption import deaf_children, end_children
 from world.scenario import Scenario
+
+# A process that has been told to end may take this long to do so before it is killed, s.
+_LAST_WORDS = 0.3
 
 
 def serve(args: argparse.Namespace) -> int:
     """``planfly serve``."""
     access = link_access(args)
     mission, logs = args.mission or "", Path(args.log)
-    options = ServeOptions(mission, args.scenario, args.terrain, args.speed, logs, flight_entries(args))
+    fences = read_named_fences(args.fence)
+    options = ServeOptions(mission, args.scenario, args.terrain, args.speed, logs, flight_entries(args), fences)
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():
         raise PlanflyError(f"--log {options.logs}: is a file; a folder is expected")
-    link = Link(access)
     parameters = vehicle_parameters(
         airspeed=served.airframe.airspeed,
         slowest=served.airframe.aircraft.airspeed_min,
@@ -37,9 +43,12 @@ def serve(args: argparse.Namespace) -> int:
         system=SYSTEM,
         speed=options.speed,
     )
-    pool = _FlightPool(options)
     standby = standby_at_start(served.scenario)
-    with stop_signals() as stopped:
+    with stop_signals() as stopped, contextlib.ExitStack() as opened:
+        link = Link(access)
+        opened.callback(link.close)
+        pool = _FlightPool(options)
+        opened.callback(pool.end)
         vehicle = Vehicle(link, pool.spawn, parameters, standby, served.airframe.battery, _show)
         host, port = link.address
         targets = ", ".join(f"{to}:{number}" for to, number in access.to)
@@ -47,12 +56,10 @@ def serve(args: argparse.Namespace) -> int:
         print(f"flight logs go to {options.logs}/; Ctrl-C ends", flush=True)
         if served.mission is not None:
             vehicle.load(served.mission)
-        try:
-            vehicle.run(stopped)
-        finally:
-            vehicle.close()
-            link.close()
-            pool.join()
+        elif fences.items:
+            vehicle.load_fence(fences.items)
+        opened.callback(vehicle.close)
+        vehicle.run(stopped)
     return 0
 
 
@@ -71,15 +78,15 @@ class _FlightPool:
         self._children = [child for child in self._children if child.is_alive()]
         ours, theirs = self._context.Pipe()
         child = self._context.Process(target=fly_process, args=(theirs, self._options), daemon=True)
-        child.start()
+        with deaf_children():
+            child.start()
         theirs.close()
         self._children.append(child)
         return ours
 
-    def join(self) -> None:
-        """Wait for them to end."""
-        for child in self._children:
-            child.join(timeout=5.0)
+    def end(self) -> None:
+        """End those that have not ended yet."""
+        end_children([child for child in self._children if child.is_alive()], _LAST_WORDS)
 
 
 def standby_at_start(scenario: Scenario) -> Standby:

@@ -2,12 +2,11 @@
 
 import itertools
 import os
-import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from planfly.airframe import load_airframe
 from planfly.pipeline import Advance, make_plan
 from planner.plan import Objective
 from planner.search.algorithms import find_algorithm
+from world.interruption import deaf_children, end_children, end_when_told
 from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_planner
 
@@ -164,16 +164,21 @@ def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPl
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
         return
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=_leave_interrupts)
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_when_told)
     try:
-        yield from pool.map(_plan_task, tasks[1:])
+        # All of them are started here.
+        with deaf_children():
+            results = pool.map(_plan_task, tasks[1:])
+        yield from results
+    except BaseException:
+        # What they plan now, nobody waits for.
+        pool.shutdown(wait=False, cancel_futures=True)
+        end_children(active_children())
+        raise
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-
-
-def _leave_interrupts() -> None:
-    """Ctrl-C reaches every process of the group; only the first one may print that it was interrupted."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+        # Their semaphores go with the last who knows of it.
+        del pool
 
 
 def _plan_task(task: tuple[int, str, int]) -> SeededPlan:

@@ -22,8 +22,10 @@ from planfly.terminal.argument_types import (
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from planfly.terminal.field_parser import LOGS, add_field_commands
 from planfly.terminal.parser_options import (
+    fence_option,
     field_log_options,
     flown_by_options,
+    limit_options,
     overwrite_option,
     own_link_options,
     pilot_options,
@@ -94,6 +96,7 @@ def _add_run_and_plan(command: _Command) -> None:
     )
     steering_options(run)
     program_option(run)
+    limit_options(run)
     overwrite_option(run)
     # Names and summaries only: what they stand for is imported with the command.
     from planner.search.algorithms import algorithm_lines
@@ -145,6 +148,7 @@ def _add_export_and_fly(command: _Command) -> None:
     export.add_argument(
         "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
     )
+    fence_option(export)
     overwrite_option(export)
     fly = command(
         "fly", "fly a plan or any mission file, write the log, end with the verdict",
@@ -163,6 +167,7 @@ def _add_export_and_fly(command: _Command) -> None:
     )  # fmt: skip
     steering_options(fly)
     program_option(fly)
+    limit_options(fly)
     overwrite_option(fly)
 
 

@@ -14,6 +14,18 @@ def world_options(parser: argparse.ArgumentParser) -> None:
     """What a mission is judged in."""
     parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
+    fence_option(parser)
+
+
+def fence_option(parser: argparse.ArgumentParser) -> None:
+    """Fences beside the mission's own."""
+    parser.add_argument(
+        "--fence",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="keep to this fence, too: .fence, .waypoints, .txt or .plan, or zones in .geojson or .kml; repeatable",
+    )
 
 
 def flown_by_options(parser: argparse.ArgumentParser) -> None:
@@ -56,6 +68,21 @@ def program_option(parser: argparse.ArgumentParser) -> None:
         metavar="PATH",
         help="a real ArduPlane flies in our physics: its program, as built for software in the loop",
     )
+
+
+def limit_options(parser: argparse.ArgumentParser) -> None:
+    """Where a flight ends that would go on."""
+    parser.add_argument(
+        "--max-hours",
+        metavar="H",
+        type=positive,
+        default=6.0,
+        help="simulated hours that are flown at most (default: 6)",
+    )
+    parser.add_argument(
+        "--max-log", metavar="MB", type=positive, default=256.0,
+        help="the flight ends when its log has so many MB (default: 256; it grows by some 20 an hour)",
+    )  # fmt: skip
 
 
 def own_link_options(parser: argparse.ArgumentParser, *, bind: str) -> None:

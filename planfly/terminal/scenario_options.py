@@ -5,6 +5,7 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+from planfly.flight_limits import FlightLimits
 from world.scenario import Scenario
 from world.scenario_variants import with_flight, with_wind
 
@@ -22,6 +23,11 @@ def flight_entries(args: argparse.Namespace) -> dict[str, str | float | None]:
         # Whatever folder the scenario is in.
         "params": None if params is None else str(Path(params).resolve()),
     }
+
+
+def flight_limits(args: argparse.Namespace) -> FlightLimits:
+    """How long a flight may take, and how large its log may grow."""
+    return FlightLimits(args.max_hours, args.max_log)
 
 
 def scenario_change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:

@@ -18,7 +18,7 @@ from logs.figures.movie_frames import RATE, MovieFrames
 from logs.recording.reader import FlightLog
 from planfly.terminal.progress import progress
 from planfly.terminal.targets import refuse_existing, refuse_folder
-from world.atomic_files import write_whole
+from world.atomic_files import temporary_folder, write_whole
 from world.errors import PlanflyError
 
 # A film lasts this long unless a speed is given, s.
@@ -104,8 +104,8 @@ def _mp4(film: MovieFrames) -> bytes:
     frames = film.frames()
     first = next(frames)
     height, width = first.shape[:2]
-    with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as messages:
-        out = Path(folder) / "film.mp4"
+    with temporary_folder("planfly-movie-") as folder, tempfile.TemporaryFile() as messages:
+        out = folder / "film.mp4"
         command = [
             "ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
             "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),

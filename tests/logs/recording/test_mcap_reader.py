@@ -14,7 +14,7 @@ import zstandard
 
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
-from tests.logs.recording.log_copies import prefix_of, same
+from tests.logs.log_copies import prefix_of, same
 from world.errors import LogError
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))

@@ -120,7 +120,7 @@ def test_a_signal_ends_the_program_and_leaves_none_of_its_files(
     children = Path(f"/proc/{running.pid}/task/{running.pid}/children").read_text().split()
     running.send_signal(number)
     _, complaint = running.communicate(timeout=20)
-    assert running.returncode == 130, complaint
+    assert running.returncode == 128 + number, complaint
     assert list(temporary.glob("planfly-autopilot-*")) == []
     assert len(children) == 1
     assert not Path("/proc", children[0]).exists()

@@ -1,0 +1,92 @@
+"""SIGINT and SIGTERM end a command in time: in order where it comes to it, at once where it does not."""
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from types import FrameType
+from typing import NoReturn
+
+from world.interruption import Interrupted, interrupt, remove_unfinished
+
+ENDING = (signal.SIGINT, signal.SIGTERM)
+# Time from a signal to the end of the process where its command has not ended by itself, s.
+GRACE = 1.4
+_AGAIN = 0.05
+
+
+@contextlib.contextmanager
+def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
+    """Raise `Interrupted` for SIGINT and SIGTERM, and end the process where that has not ended it ``grace`` s later.
+
+    Compiled code and compilers can keep Python's signal handlers waiting, and a wait for others can be long: a thread
+    then kills this process's children, removes its unfinished files and ends it with exit code 128 and the signal's
+    number.  It watches on beyond this block, until the process has ended: for a program's outermost block.
+
+    Gives the list that holds the signal's number once one has come.
+    """
+    read, write = os.pipe()
+    os.set_blocking(write, False)
+    heard: list[int] = []
+    deaf = False
+
+    def hear(number: int, _frame: FrameType | None = None) -> None:
+        # The first interrupts; whatever ends the work then is not to be interrupted.
+        nonlocal deaf
+        if not deaf:
+            deaf = True
+            heard.append(number)
+            interrupt(number)
+
+    def hear_again(lost: "sys.UnraisableHookArgs") -> None:
+        # Raised where nobody could take it, in a compiler's callback: tried again, a little later.
+        nonlocal deaf
+        if isinstance(lost.exc_value, Interrupted):
+            deaf = False
+            threading.Timer(_AGAIN, signal.raise_signal, (lost.exc_value.number,)).start()
+        else:
+            sys.__unraisablehook__(lost)
+
+    watcher = threading.Thread(target=_watch, args=(read, heard, grace), name="signals", daemon=True)
+    watcher.start()
+    # Python's C code writes the signal's number there at once, whatever the main thread does.
+    signal.set_wakeup_fd(write, warn_on_full_buffer=False)
+    for number in ENDING:
+        signal.signal(number, hear)
+    sys.unraisablehook = hear_again
+    try:
+        yield heard
+    finally:
+        # What a signal would interrupt from here on is the end itself.
+        deaf = True
+
+
+def _watch(read: int, heard: list[int], grace: float) -> None:
+    """Wait for the first signal, give the command its time, and end the process."""
+    while (number := os.read(read, 1)[0]) not in ENDING:
+        pass
+    # Here too: a command may have handlers of its own.
+    heard.append(number)
+    time.sleep(grace)
+    with contextlib.suppress(OSError):
+        os.write(2, b"planfly: interrupted\n")
+    _leave(128 + number)
+
+
+def end_process(code: int) -> NoReturn:
+    """End this process with an exit code, its children with it, and leave no unfinished file; what it said is kept."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    _leave(code)
+
+
+def _leave(code: int) -> NoReturn:
+    for child in multiprocessing.active_children():
+        child.kill()
+    remove_unfinished()
+    os._exit(code)

@@ -1,0 +1,92 @@
+"""A flight's log that an interruption leaves whole, with the rows so far, or not at all."""
+
+from pathlib import Path
+from types import TracebackType
+
+from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.track import Rows
+from logs.recording.recorder import Recorder
+from logs.verdict.findings import Verdict
+from logs.verdict.levels import FlownBeside
+from world.interruption import uninterrupted
+
+# How a flight ended that was still under way.
+INTERRUPTED = "interrupted"
+
+
+class WholeLog:
+    """A `Recorder` as a context manager that Ctrl-C may end anywhere: what is written is written whole.
+
+    An interrupted flight's log ends with how far it had got and holds no verdict, which `planfly check` gives; one
+    without a row is removed.  An error leaves the log unfinished, as `Recorder` does.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.recording.reader import read_log
+    >>> from flight.simulation.track import track_rows
+    >>> flown = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "flight.mcap"
+    ...     try:
+    ...         with WholeLog(path, flown.setup) as log:
+    ...             log.write(track_rows(flown.track)[:100])
+    ...             raise KeyboardInterrupt
+    ...     except KeyboardInterrupt:
+    ...         left = read_log(path)
+    >>> left.complete, left.ended, len(left.track)
+    (True, 'interrupted', 100)
+    """
+
+    def __init__(self, path: Path, setup: FlightSetup, *, every: int = 1, batch: int = 1) -> None:
+        self.ended = INTERRUPTED
+        self._path = path
+        self._rows = 0
+        try:
+            with uninterrupted():
+                self._recorder = Recorder(path, setup, every=every, batch=batch)
+                self._open = True
+        except KeyboardInterrupt as interruption:
+            # It came while the log was opened.
+            self.__exit__(type(interruption), interruption, None)
+            raise
+
+    def __enter__(self) -> "WholeLog":
+        """Return the log itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Close what is still open."""
+        if not self._open:
+            return
+        self._open = False
+        with uninterrupted():
+            if kind is None or not issubclass(kind, KeyboardInterrupt):
+                self._recorder.abandon()
+            elif self._rows:
+                self._recorder.finish(self.ended)
+            else:
+                self._recorder.abandon()
+                self._path.unlink(missing_ok=True)
+
+    def write(self, rows: Rows) -> None:
+        """Record rows as a flight hands them on."""
+        with uninterrupted():
+            self._recorder.write_rows(rows)
+            self._rows += len(rows)
+
+    @property
+    def size(self) -> int:
+        """Bytes of the file so far."""
+        return self._recorder.size
+
+    def event(self, time: float, text: str, level: str) -> None:
+        """Record what happened; arguments as of `Recorder.event`."""
+        self._recorder.event(time, text, level)
+
+    def finish(self, ended: str, verdict: Verdict, beside: FlownBeside | None) -> None:
+        """Close the log of a flight that has been judged."""
+        with uninterrupted():
+            self._open = False
+            self._recorder.finish(ended, verdict, beside)

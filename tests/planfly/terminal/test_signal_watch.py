@@ -1,0 +1,54 @@
+"""A signal interrupts once, and where that does not end the process a thread does."""
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+# What a command may do when the signal comes; a file of its own that it has not finished.
+PROGRAM = """
+import hashlib, sys, time
+from pathlib import Path
+from planfly.terminal.signal_watch import end_process, ended_by_signals
+from world.interruption import Interrupted, unfinished
+mine = Path(sys.argv[1])
+with ended_by_signals(grace=0.5) as heard:
+    with unfinished(mine):
+        mine.write_text("half")
+        print("begun", flush=True)
+        {body}
+"""
+BODIES = {
+    # The handler is never run: no bytecode is, though the interpreter's lock is free.
+    "in C": ("hashlib.pbkdf2_hmac('sha256', b'word', b'salt', 100_000_000)", 0.5),
+    "swallowed": ("while True:\n            try: time.sleep(30)\n            except KeyboardInterrupt: pass", 0.5),
+    "in Python": ("time.sleep(30)", 0.0),
+}
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_process_ends_whatever_it_does(body: str, number: signal.Signals, tmp_path: Path) -> None:
+    text, least = BODIES[body]
+    mine = tmp_path / "mine"
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM.format(body=text), str(mine)], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"begun\n"
+    time.sleep(0.2)
+    begun = time.monotonic()
+    process.send_signal(number)
+    _, said = process.communicate(timeout=20.0)
+    took = time.monotonic() - begun
+    if body == "in Python":
+        assert b"Interrupted" in said
+    else:
+        assert process.returncode == 128 + number
+        assert said == b"planfly: interrupted\n"
+    assert least <= took < 2.0
+    assert not mine.exists()

@@ -1,0 +1,210 @@
+"""SIGINT and SIGTERM in any phase of any command: over within 2 s, and nothing left but whole files.
+
+A few moments of a few commands; with PLANFLY_SOAK=1 moments all over the time that every command takes.
+"""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from logs.recording.reader import read_log
+from tests.autopilots import find_arduplane
+from tests.instances import make_instance, scenario_text
+from tests.planfly.conftest import FIELD
+from tests.soak import SOAK, note
+
+LIMIT = 2.0
+MOMENTS = 8
+# Long enough a way that its flight is under way whenever the signal comes: 100 rounds.
+LONG = "\n".join(
+    [
+        "QGC WPL 110",
+        "0 1 0 16 0 0 0 0 46 8 0 1",
+        "1 0 3 16 0 0 0 0 46 8 100 1",
+        "2 0 3 16 0 0 0 0 46 8.02 100 1",
+        "3 0 3 16 0 0 0 0 46.01 8.02 100 1",
+        "4 0 3 177 1 12 0 0 0 0 0 1",
+        "",
+    ]
+)
+# Without seeds a search goes on for all its generations: hours.
+PLANNER = 'algorithm = "umda-smooth"\nwaypoints = 10\npopulation = 2000\ngenerations = 100000\n'
+PAPER = ("paper", "--problems", "7", "--runs", "3", "--jobs", "2", "--out", "out")
+SERVE = ("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command and when it is interrupted: so long after it has printed a line with these words, s."""
+
+    argv: tuple[str, ...]
+    words: str
+    delay: float
+    number: signal.Signals
+    cold: bool = False
+
+
+FEW = (
+    Case(("plan", "endless.toml", "--out", "plan.json"), "planning", 0.5, signal.SIGTERM),
+    Case(("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap"), "flying", 0.5, signal.SIGINT),
+    Case(PAPER, "planning", 1.5, signal.SIGINT),
+    Case(SERVE, "flight logs", 0.3, signal.SIGINT),
+    # Kernels are compiled meanwhile.
+    Case(("run", "jacksboro", "--out", "out"), "", 4.0, signal.SIGTERM, cold=True),
+)
+EVERY = (
+    ("plan", "endless.toml", "--out", "plan.json"),
+    ("run", "tight", "--out", "out"),
+    ("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap"),
+    ("check", "long.waypoints", "--scenario", "field.toml"),
+    ("check", "flight.mcap"),
+    ("report", "flight.mcap", "--out", "out"),
+    ("compare", "flight.mcap", "flight.mcap", "--out", "out"),
+    ("replay", "flight.mcap"),
+    ("replay", "flight.mcap", "--movie", "film.gif"),
+    ("export", "plan.json", "m.plan"),
+    ("recover", "broken.mcap", "--out", "mended.mcap"),
+    ("aircraft", "aerosonde"),
+    ("scenarios",),
+    (*PAPER,),
+    (*SERVE,),
+)
+
+
+@pytest.fixture(scope="module")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files that the commands read."""
+    folder = tmp_path_factory.mktemp("inputs")
+    (folder / "field.toml").write_text(FIELD, encoding="utf-8")
+    (folder / "long.waypoints").write_text(LONG, encoding="ascii")
+    head, tail = scenario_text("endless", make_instance(0, 7), "a search that does not end").split("[planner]\n")
+    text = f"{head}[planner]\n{PLANNER}\n[flight]{tail.split('[flight]')[1]}"
+    (folder / "endless.toml").write_text(text, encoding="utf-8")
+    return folder
+
+
+def alive(session: int) -> list[str]:
+    """Command lines of a session's processes that have not ended."""
+    found = []
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                fields = (entry / "stat").read_text(encoding="ascii", errors="replace").rsplit(")", 1)[1].split()
+                if int(fields[3]) == session and fields[0] != "Z":
+                    found.append((entry / "cmdline").read_text(encoding="utf-8").replace("\0", " "))
+            except OSError:
+                continue
+    return found
+
+
+def interrupted(case: Case, inputs: Path, folder: Path) -> tuple[int | None, float, str]:
+    """Run a command and interrupt it: exit code, seconds that its end took, and what it said.
+
+    A code of None is a command that had ended before the signal came.
+    """
+    work, temporary = folder / "work", folder / "temporary"
+    shutil.copytree(inputs, work)
+    temporary.mkdir()
+    environment = os.environ | {"TMPDIR": str(temporary), "PYTHONUNBUFFERED": "1"}
+    if case.cold:
+        environment["NUMBA_CACHE_DIR"] = str(folder / "kernels")
+    said = folder / "said"
+    with said.open("w") as out:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "planfly", *case.argv], cwd=work, env=environment, stdin=subprocess.DEVNULL,
+            stdout=out, stderr=subprocess.STDOUT, start_new_session=True,
+            # Some shells start what they run in the background deaf.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        )  # fmt: skip
+    try:
+        until = time.monotonic() + 120.0
+        while case.words not in said.read_text(encoding="utf-8") and process.poll() is None:
+            assert time.monotonic() < until, said.read_text(encoding="utf-8")
+            time.sleep(0.02)
+        time.sleep(case.delay)
+        over = process.poll() is not None
+        # Ctrl-C reaches all processes of a terminal, SIGTERM the one that it is sent to.
+        if not over and case.number == signal.SIGINT:
+            os.killpg(process.pid, case.number)
+        elif not over:
+            process.send_signal(case.number)
+        begun = time.monotonic()
+        code = process.wait(60.0)
+        took = time.monotonic() - begun
+        time.sleep(0.1)
+        left = alive(process.pid)
+    finally:
+        for line in alive(process.pid):
+            print("killed", line)
+            os.killpg(process.pid, signal.SIGKILL)
+    assert left == [], f"{case}: a process is left"
+    assert [str(path) for path in temporary.rglob("*")] == [], f"{case}: a temporary file is left"
+    check_whole(work)
+    return (None if over else code), took, said.read_text(encoding="utf-8")
+
+
+def check_whole(folder: Path) -> None:
+    """Every file that is there is whole."""
+    for path in folder.rglob("*"):
+        assert not path.name.startswith("."), f"{path.name}: a temporary file is left"
+        if path.name == "broken.mcap" or path.is_dir():
+            continue
+        if path.suffix == ".mcap":
+            assert read_log(path).complete, path.name
+        elif path.suffix in (".json", ".plan"):
+            json.loads(path.read_text(encoding="utf-8"))
+        elif path.suffix in (".png", ".gif"):
+            assert path.read_bytes().rstrip(b"\0")[-8:].endswith((b"IEND\xaeB`\x82", b";")), path.name
+        elif path.suffix == ".html":
+            assert path.read_text(encoding="utf-8").rstrip().endswith("</html>")
+
+
+@pytest.mark.parametrize("case", FEW, ids=lambda case: f"{case.argv[0]}-{case.number.name}")
+def test_a_command_ends_at_once_and_whole(case: Case, inputs: Path, tmp_path: Path) -> None:
+    code, took, said = interrupted(case, inputs, tmp_path)
+    assert code == (0 if case.argv[0] == "serve" else 128 + case.number), said
+    assert took < LIMIT
+    assert "Traceback" not in said
+    if case.argv[0] == "fly":
+        log = read_log(tmp_path / "work" / "f.mcap")
+        assert (log.ended, log.recorded_verdict) == ("interrupted", None)
+        assert len(log.track) > 100
+
+
+@pytest.mark.skipif(not SOAK, reason="minutes; set PLANFLY_SOAK=1")
+def test_every_command_at_any_moment(inputs: Path, flight: Path, broken: Path, tmp_path: Path) -> None:
+    shutil.copytree(inputs, tmp_path / "inputs")
+    for name in ("flight.mcap", "plan.json"):
+        shutil.copy(flight / name, tmp_path / "inputs" / name)
+    shutil.copy(broken, tmp_path / "inputs")
+    commands = list(EVERY)
+    arduplane = find_arduplane()
+    if arduplane is not None:
+        commands.append((*EVERY[2], "--autopilot", str(arduplane)))
+    rng = np.random.default_rng(17)
+    longest, count = 0.0, 0
+    for n, argv in enumerate(commands):
+        for k in range(MOMENTS):
+            number = (signal.SIGINT, signal.SIGTERM)[k % 2]
+            # Python itself starts in the first 0.4 s.
+            case = Case(argv, "", 0.8 + float(rng.uniform(0.0, 6.0)) * (k + 1) / MOMENTS, number, cold=k == MOMENTS - 1)
+            code, took, said = interrupted(case, tmp_path / "inputs", tmp_path / f"{n}-{k}")
+            if code is None:
+                continue
+            # A few end in order: a search with its best plan, a vehicle with its log, and what was over anyhow.
+            assert code in (128 + number, -number, 0, 3, 4), f"{case}: {code}: {said}"
+            assert took < LIMIT, f"{case}: {took:.2f} s"
+            assert "Traceback" not in said, f"{case}: {said}"
+            longest, count = max(longest, took), count + 1
+            shutil.rmtree(tmp_path / f"{n}-{k}")
+    assert count > len(commands) * MOMENTS // 2
+    note("interruptions", count=count, commands=len(commands), longest_s=round(longest, 2), left=0)

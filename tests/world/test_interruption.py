@@ -1,0 +1,96 @@
+"""Interruption: what is done whole, what is removed, and children that neither hear Ctrl-C nor outlive their parent."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from world.interruption import Interrupted, interrupt, remove_unfinished, unfinished, uninterrupted
+
+
+def test_a_signal_waits_for_the_end_of_what_is_done_whole() -> None:
+    done = []
+    with pytest.raises(Interrupted) as caught, uninterrupted():  # noqa: PT012
+        with uninterrupted():
+            interrupt(signal.SIGTERM)
+            done.append("inner")
+        done.append("outer")
+    assert done == ["inner", "outer"]
+    assert caught.value.number == signal.SIGTERM
+    with pytest.raises(Interrupted):
+        interrupt(signal.SIGINT)
+
+
+def test_what_is_unfinished_is_removed(tmp_path: Path) -> None:
+    folder, file = tmp_path / "folder", tmp_path / "file"
+    with unfinished(folder), unfinished(file):
+        folder.mkdir()
+        (folder / "inside").write_text("", encoding="utf-8")
+        file.write_text("", encoding="utf-8")
+        remove_unfinished()
+        assert list(tmp_path.iterdir()) == []
+        file.write_text("again", encoding="utf-8")
+    assert list(tmp_path.iterdir()) == []
+
+
+PARENT = """
+import multiprocessing, sys, time
+from pathlib import Path
+from world.interruption import deaf_children, end_children, end_when_told, unfinished
+
+def work(folder):
+    end_when_told()
+    with unfinished(Path(folder) / "half"):
+        (Path(folder) / "half").write_text("")
+        Path(folder, "begun").write_text("")
+        time.sleep(60)
+
+if __name__ == "__main__":
+    child = multiprocessing.get_context("spawn").Process(target=work, args=(sys.argv[1],), daemon=True)
+    with deaf_children():
+        child.start()
+    print(child.pid, flush=True)
+    try:
+        time.sleep(60)
+    except KeyboardInterrupt:
+        time.sleep(0.3)
+        print("alive", child.is_alive(), flush=True)
+        end_children([child])
+        print("ended", child.exitcode, flush=True)
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_children_do_not_hear_ctrl_c_and_go_with_their_parent(number: signal.Signals, tmp_path: Path) -> None:
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT, encoding="utf-8")
+    folder = tmp_path / "work"
+    folder.mkdir()
+    paths = os.pathsep.join([str(Path(__file__).parents[2]), os.environ.get("PYTHONPATH", "")])
+    process = subprocess.Popen(
+        [sys.executable, str(script), str(folder)], stdout=subprocess.PIPE, text=True, start_new_session=True,
+        env=os.environ | {"PYTHONPATH": paths},
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert process.stdout is not None
+    child = int(process.stdout.readline())
+    until = time.monotonic() + 30.0
+    while not (folder / "begun").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    if number == signal.SIGINT:
+        os.killpg(process.pid, number)
+    else:
+        process.kill()
+    said, _ = process.communicate(timeout=20.0)
+    if number == signal.SIGINT:
+        assert said == "alive True\nended 143\n"
+    until = time.monotonic() + 2.0
+    while (folder / "half").exists() and time.monotonic() < until:
+        time.sleep(0.02)
+    assert [path.name for path in folder.iterdir()] == ["begun"]
+    stat = Path(f"/proc/{child}/stat")
+    assert not stat.exists() or stat.read_text("ascii").rsplit(")", 1)[1].split()[0] == "Z"
