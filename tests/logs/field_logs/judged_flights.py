@@ -5,8 +5,8 @@ from pathlib import Path
 
 from logs.field_logs.example_raw_log import example_raw_log
 from logs.field_logs.raw_log import RawLog
-from planfly import field_flights
-from planfly.field_flights import FieldOptions, ImportedFlight
+from planfly.field import field_flights
+from planfly.field.field_flights import FieldOptions, ImportedFlight
 
 
 def judged(

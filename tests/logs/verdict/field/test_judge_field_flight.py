@@ -10,7 +10,7 @@ import pytest
 from logs.field_logs.example_raw_log import example_raw_log
 from logs.field_logs.raw_log import LogSeries, ModeChange, RawLog
 from logs.verdict.judge_flight import judge_flight
-from planfly.field_flights import FieldOptions
+from planfly.field.field_flights import FieldOptions
 from tests.logs.field_logs.judged_flights import judged, outcome, reasons
 
 AEROSONDE = FieldOptions(aircraft="aerosonde")

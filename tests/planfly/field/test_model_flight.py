@@ -5,8 +5,8 @@ import pytest
 
 from logs.field_logs.example_raw_log import example_raw_log
 from logs.field_logs.raw_log import ModeChange
-from planfly.field_flights import FieldOptions
-from planfly.model_flight import fly_again
+from planfly.field.field_flights import FieldOptions
+from planfly.field.model_flight import fly_again
 from tests.logs.field_logs.judged_flights import judged
 from world.errors import LogError
 

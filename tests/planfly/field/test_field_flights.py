@@ -17,7 +17,7 @@ from pyproj import Geod
 from logs.field_logs.example_raw_log import example_raw_log
 from logs.field_logs.field_flight import make_flight
 from logs.field_logs.readers.open_log import open_log
-from planfly.field_flights import FieldOptions, ImportedFlight, import_flight
+from planfly.field.field_flights import FieldOptions, ImportedFlight, import_flight
 from tests.logs.field_logs.judged_flights import judged
 from tests.logs.field_logs.pymavlink_rows import FLIGHTS, mission_lines, read_rows
 from world.scenario import load_scenario
