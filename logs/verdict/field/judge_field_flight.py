@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flight.mission.items import Command
 from flight.simulation.field_source import Gap, MissionStretch, Quantity
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
@@ -49,6 +50,8 @@ _DATUMS = {
     "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
     "unstated": "the log does not say what its heights are above (--datum says it)",
 }
+# What the mode is called that flies a return to launch.
+_RETURN = "RTL"
 # Rules that ask for the heights of the plan.
 _OF_PLANNED_HEIGHTS = frozenset({"slope", "height"})
 # Rules that ask what the aircraft can do.
@@ -229,7 +232,9 @@ def _completion(setup: FlightSetup, flown: Sequence[FlownLegs], *, whole: bool) 
     else:
         last = flown[-1]
         what = f"{len(done)} of {legs} legs flown"
-        if last.stretch.ended == "log":
+        if _returns(setup, last):
+            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
+        elif last.stretch.ended == "log":
             unknown.append(f"{_left(last.stretch)}, on the way to {_named(setup, last)}: {what}")
         else:
             faults.append(message(f"{_left(last.stretch)}, on the way to {_named(setup, last)}", f": {what}"))
@@ -257,8 +262,20 @@ def _completion(setup: FlightSetup, flown: Sequence[FlownLegs], *, whole: bool) 
     )
 
 
+def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:
+    """Whether a stretch ended with the return to launch that the mission has next: autopilots have a mode for that."""
+    item = int(setup.route.items[_ahead(setup, legs)])
+    commands = {one.seq: one.command for one in setup.mission.items}
+    return legs.stretch.next_mode == _RETURN and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
+
+
+def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
+    """The waypoint that a stretch was on the way to when it ended."""
+    return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
+
+
 def _named(setup: FlightSetup, legs: FlownLegs) -> str:
-    ahead = min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
+    ahead = _ahead(setup, legs)
     item = int(setup.route.items[ahead])
     return f"waypoint {ahead}" + (f" (item {item})" if item >= 0 else "")
 

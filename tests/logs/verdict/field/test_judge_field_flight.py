@@ -160,3 +160,14 @@ def test_a_log_that_is_not_whole_is_not_complete(tmp_path: Path) -> None:
     flight = judged(tmp_path, options=AEROSONDE)
     assert judge_flight(flight.setup, flight.track, "").flyable
     assert not judge_flight(flight.setup, flight.track, "", whole=False).flyable
+
+
+@pytest.mark.parametrize(("mode", "complete"), [("RTL", True), ("FBWA", False)])
+def test_a_return_that_the_mission_ends_with_completes_it(tmp_path: Path, mode: str, complete: bool) -> None:
+    """Autopilots leave AUTO for a mode of their own where the mission says return to launch."""
+    raw = with_modes((20.0, "AUTO"), (109.0, mode))
+    logged = raw.missions[0]
+    back = replace(logged.mission.items[0], seq=4, command=20, lat_deg=0.0, lon_deg=0.0, alt=0.0)
+    mission = replace(logged.mission, items=(*logged.mission.items, back))
+    flight = judged(tmp_path, replace(raw, missions=(replace(logged, mission=mission),)), AEROSONDE)
+    assert outcome(flight, "completion") == [complete]
