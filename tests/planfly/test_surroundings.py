@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import TypeAlias
 
 import pytest
 
@@ -21,6 +22,7 @@ from world.atomic_files import hold, write_whole
 from world.errors import PlanflyError
 
 ROOT = Path(__file__).parents[2]
+Done: TypeAlias = subprocess.CompletedProcess
 CHECK = ("check", "m.waypoints", "--scenario", "field.toml", "--guidance", "path")
 
 
@@ -32,9 +34,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def program(
-    *argv: str, change: Callable[[], None] | None = None, **environment: str
-) -> "subprocess.CompletedProcess[str]":
+def program(*argv: str, change: Callable[[], None] | None = None, **environment: str) -> Done:
     """Run a command in a process of its own; change: what is done to the process first."""
     return subprocess.run(
         [sys.executable, "-m", "planfly", *argv], capture_output=True, text=True, check=False, timeout=300,
@@ -109,9 +109,8 @@ def test_no_home_and_no_cache(changes: dict[str, str]) -> None:
         "import numpy as np\nfrom world.terrain import steepest_slopes\n"
         "print(steepest_slopes(np.zeros((2, 2), np.float32), 1.0).tolist())"
     )
-    environment = {
-        name: value for name, value in os.environ.items() if name not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
-    }
+    cached = ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")
+    environment = {name: value for name, value in os.environ.items() if name not in cached}
     done = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False,
         env=environment | {"PYTHONPATH": str(ROOT)} | changes,

@@ -81,6 +81,13 @@ def damaged_bytes(data: bytes, rng: random.Random, often: float) -> bytes:
 
 def damaged_json(text: str, rng: random.Random) -> bytes:
     """A JSON file, of whose values some are replaced, dropped, doubled, moved or nested."""
+    try:
+        return _damaged_json(text, rng)
+    except RecursionError:
+        return b"[" * 100_000
+
+
+def _damaged_json(text: str, rng: random.Random) -> bytes:
     whole = {"": json.loads(text)}
     for _ in range(rng.randint(1, 3)):
         places = list(_places(whole))
@@ -96,10 +103,7 @@ def damaged_json(text: str, rng: random.Random) -> bytes:
         else:
             for _ in range(rng.choice((1, 40, 2000))):
                 holder[key] = [holder[key]]
-    try:
-        return damaged_bytes(json.dumps(whole[""]).encode("utf-8", "surrogatepass"), rng, often=0.1)
-    except RecursionError:
-        return b"[" * 100_000
+    return damaged_bytes(json.dumps(whole[""]).encode("utf-8", "surrogatepass"), rng, often=0.1)
 
 
 def _places(value: object) -> "list[tuple[object, object]]":
