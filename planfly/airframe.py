@@ -58,22 +58,33 @@ def load_airframe(scenario: Scenario) -> Airframe:
     ('aerosonde', 25.0, 60.0)
     """
     table = scenario.flight
-    try:
-        aircraft = find_aircraft(table.aircraft)
-        model_hash(aircraft)
-    except ValueError as error:
-        raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
+    aircraft, battery = find_airframe(scenario)
     ardupilot = table.steering.autopilot == "ardupilot"
     parameters = load_parameters(aircraft, table.params) if ardupilot else None
     airspeed = _airspeed(scenario, aircraft, parameters)
     envelope = load_envelope(aircraft, motor_braking=table.motor_braking)
-    battery = aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
     limits = make_limits(scenario, envelope, airspeed, math.radians(table.max_bank_deg))
     if parameters is not None:
         nav, turbulence = table.steering.nav, scenario.wind.turbulence
         tracking = tracking_error(parameters, airspeed, nav, fly_over=table.fly_over, turbulence=turbulence)
         limits = replace(limits, tracking=tracking)
     return Airframe(aircraft, limits, battery, parameters)
+
+
+def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
+    """The scenario's aircraft, and the energy it carries, Wh.  Raises ScenarioError for an unknown aircraft.
+
+    >>> from world.scenario import load_scenario
+    >>> find_airframe(load_scenario("tight"))[0].name
+    'aerosonde'
+    """
+    table = scenario.flight
+    try:
+        aircraft = find_aircraft(table.aircraft)
+        model_hash(aircraft)
+    except ValueError as error:
+        raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
+    return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 
 
 def _airspeed(scenario: Scenario, aircraft: Aircraft, parameters: ArduPilotParameters | None) -> float:

@@ -6,9 +6,10 @@ from aircraft.catalog import Aircraft
 from flight.ardupilot.parameters import ArduPilotParameters
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.levels import AirframeAnswer, DecidingParameter
+from logs.verdict.levels import AirframeAnswer, DecidingParameter, FlownBeside
 from logs.verdict.measures.route_demands import true_route
 from logs.verdict.places import FLIGHT
 from planfly.deciding_parameter import deciding_parameter
@@ -55,6 +56,23 @@ def find_deciding_parameter(setup: FlightSetup, aircraft: Aircraft, verdict: Ver
         return _flown_by_law(replace(same, parameters=parameters), aircraft).flyable
 
     return deciding_parameter(setup.parameters, findings, passes)
+
+
+def judge_with_flights_beside(
+    setup: FlightSetup, aircraft: Aircraft, track: Track, ended: str
+) -> tuple[Verdict, FlownBeside | None]:
+    """Judge an autopilot's flight beside the aircraft's own, and look for the parameter that decides where they differ.
+
+    track, ended: of the flight with the setup.  A flight of planfly's own guidance has none beside it.
+    """
+    if setup.parameters is None:
+        return judge_flight(setup, track, ended), None
+    beside = FlownBeside(airframe_answer(setup, aircraft))
+    verdict = judge_flight(setup, track, ended, beside=beside)
+    if beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
+        beside = replace(beside, deciding=find_deciding_parameter(setup, aircraft, verdict))
+        verdict = judge_flight(setup, track, ended, beside=beside)
+    return verdict, beside
 
 
 def _flown_by_law(setup: FlightSetup, aircraft: Aircraft) -> Verdict:

@@ -11,6 +11,7 @@ from flight.mission.placing import place_stops
 from flight.mission_files.formats import read_mission
 from flight.simulation.flight_setup import FlightSetup
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.named_fences import NamedFences
 from planfly.pipeline import make_setup
 from planner.plan import Plan, read_plan
 from world.errors import MissionError, PlanflyError
@@ -19,6 +20,7 @@ from world.scenario import Scenario, load_scenario
 MCAP_MAGIC = b"\x89MCAP"
 
 ScenarioChange = Callable[[Scenario], Scenario]
+_NO_FENCES = NamedFences()
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,24 +72,29 @@ def open_mission(
     *,
     seed: int | None = None,
     change: ScenarioChange = _unchanged,
+    fences: NamedFences = _NO_FENCES,
 ) -> OpenedMission:
     """Read a plan.json, .waypoints or .plan, in its own, a named or a made scenario.
 
     terrain: replaces the scenario's.  seed: of the turbulence; None takes the plan's, the scenario's, or 1.
-    change: makes another scenario of it, in other wind or with another aircraft.  Raises MissionError, ScenarioError or
-    TerrainError.
+    change: makes another scenario of it, in other wind or with another aircraft.  fences: to be kept to beside its
+    own.  Raises MissionError, ScenarioError or TerrainError.
     """
+
+    def changed(scenario: Scenario) -> Scenario:
+        return fences.on_scenario(change(scenario))
+
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected")
     if path.suffix.lower() == ".json":
-        return _open_planned(path, scenario_name, terrain, seed, change)
-    mission = read_mission(path)
+        return _open_planned(path, scenario_name, terrain, seed, changed, fences)
+    mission = fences.on_mission(read_mission(path))
     if scenario_name is not None:
-        scenario = change(load_scenario(scenario_name, terrain))
+        scenario = changed(load_scenario(scenario_name, terrain))
         placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
     else:
         implied = implied_scenario(mission, terrain, vertical_legs=True)
-        scenario, placed = change(implied.scenario), implied.placed
+        scenario, placed = changed(implied.scenario), implied.placed
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
     return OpenedMission(make_setup(scenario, airframe, mission, number, placed=placed), airframe, path.stem)
@@ -107,15 +114,20 @@ def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _
 
 
 def _open_planned(
-    path: Path, scenario_name: str | None, terrain: str | None, seed: int | None, change: ScenarioChange
+    path: Path,
+    scenario_name: str | None,
+    terrain: str | None,
+    seed: int | None,
+    change: ScenarioChange,
+    fences: NamedFences,
 ) -> OpenedMission:
     """A plan in the scenario it was made for, or its mission in another."""
     opened = open_plan(path, terrain, change)
-    number = seed if seed is not None else opened.plan.seed
+    number, mission = seed if seed is not None else opened.plan.seed, fences.on_mission(opened.mission)
     if scenario_name is not None:
         # The plan's waypoints are in the map of its own scenario: another judges the mission, as a file.
         other = change(load_scenario(scenario_name, terrain))
         airframe = load_airframe(other)
-        return OpenedMission(make_setup(other, airframe, opened.mission, number), airframe, path.stem)
-    setup = make_setup(opened.scenario, opened.airframe, opened.mission, number, plan=opened.plan)
+        return OpenedMission(make_setup(other, airframe, mission, number), airframe, path.stem)
+    setup = make_setup(opened.scenario, opened.airframe, mission, number, plan=opened.plan)
     return OpenedMission(setup, opened.airframe, opened.scenario.name)

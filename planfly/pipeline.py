@@ -1,7 +1,7 @@
 """Plan, export, fly, record, judge: the chain, stage by stage, as functions of frozen data."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +25,7 @@ from logs.verdict.levels import FlownBeside
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.flight_limits import FlightLimits
-from planfly.flights_beside import airframe_answer, find_deciding_parameter
+from planfly.flights_beside import judge_with_flights_beside
 from planfly.whole_log import WholeLog
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
@@ -265,11 +265,5 @@ def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
 def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    beside = None
-    if setup.parameters is not None:
-        beside = FlownBeside(airframe_answer(setup, airframe.aircraft))
-    verdict = judge_flight(setup, track, ended, beside=beside)
-    if beside is not None and beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
-        beside = replace(beside, deciding=find_deciding_parameter(setup, airframe.aircraft, verdict))
-        verdict = judge_flight(setup, track, ended, beside=beside)
+    verdict, beside = judge_with_flights_beside(setup, airframe.aircraft, track, ended)
     return JudgedFlight(setup, track, ended, verdict, (event,), beside)

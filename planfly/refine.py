@@ -10,7 +10,9 @@ from typing import Any, Literal
 
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Change
+from logs.verdict.tolerances import ROUNDING
 from logs.verdict.wording import threat_text
+from planner.evaluation.problem import CERTIFIED_ZONE_MARGIN
 from world.scenario import Scenario, from_spec
 
 Spec = dict[str, Any]
@@ -18,6 +20,7 @@ Spec = dict[str, Any]
 # Beyond what the flight fell short by, m.
 CLEARANCE_BUFFER = 5.0
 MISSILE_BUFFER = 10.0
+ZONE_BUFFER = 5.0
 # Where a limit is already the aircraft's and the flight failed all the same, this share of it is left.
 TIGHTENED_SHARE = 0.9
 # Bank (deg) below which it is not tightened further.
@@ -25,7 +28,10 @@ LEAST_BANK_DEG = 5.0
 # What follows a round that another follows.
 GO_ON = "tightened and planned again"
 
-Tightened = Literal["max_climb_deg", "max_dive_deg", "max_turn_deg", "max_bank_deg", "min_clearance_m", "kill_radius_m"]
+Tightened = Literal[
+    "max_climb_deg", "max_dive_deg", "max_turn_deg", "max_bank_deg", "min_clearance_m", "max_height_m", "kill_radius_m",
+    "zone_margin_m",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +60,10 @@ def tightening_text(change: Tightening) -> str:
             return f"flight.max_bank_deg (of the plan): {change.current:g} to {change.wanted:g}"
         case "kill_radius_m":
             return f"kill radius of {change.name}: {change.current:g} to {change.wanted:g}"
-        case "min_clearance_m":
-            return f"limits.min_clearance_m: {change.current:g} to {change.wanted:g}"
+        case "min_clearance_m" | "max_height_m":
+            return f"limits.{change.what}: {change.current:g} to {change.wanted:g}"
+        case "zone_margin_m":
+            return f"planner.zone_margin_m: {change.current:g} to {change.wanted:g}"
     return f"limits.{change.what}: {change.current} to {change.wanted}"
 
 
@@ -67,6 +75,7 @@ def tighten_limits(scenario: Scenario, verdict: Verdict) -> tuple[Scenario, list
     if not changes:
         # A flight that cannot follow its plan comes down lower and closer too: that is no reason of its own.
         changes = _clearance(spec, scenario, failed) + _missiles(spec, failed)
+        changes += _height(spec, scenario, failed) + _zones(spec, scenario, failed)
     if not changes:
         return scenario, []
     return from_spec(spec, scenario.name, ground=scenario.terrain), changes
@@ -118,6 +127,32 @@ def _clearance(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Ti
     tighter = round(now + max(0.0, *short) + CLEARANCE_BUFFER, 1)
     _limits(spec)["min_clearance_m"] = tighter
     return [Tightening("min_clearance_m", now, tighter)]
+
+
+def _height(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+    """A lower greatest height above ground, where the flight came too high and there is room below."""
+    now = scenario.limits.max_height_m
+    over = [-item.margin for item in failed if item.rule == "height" and item.margin is not None]
+    if now is None or not over:
+        return []
+    tighter = round(now - max(0.0, *over) - CLEARANCE_BUFFER, 1)
+    if tighter <= float(_limits(spec).get("min_clearance_m", scenario.limits.min_clearance_m)):
+        return []
+    _limits(spec)["max_height_m"] = tighter
+    return [Tightening("max_height_m", now, tighter)]
+
+
+def _zones(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tightening]:
+    """More room beside zones, where the flight and not the plan itself violates one."""
+    mine = [item for item in failed if item.rule == "fence" and not (item.planned or 0.0) > ROUNDING]
+    deep = [-item.margin for item in mine if item.margin is not None]
+    if not deep:
+        return []
+    asked = scenario.planner.zone_margin_m
+    now = CERTIFIED_ZONE_MARGIN if asked is None else asked
+    tighter = round(now + max(deep) + ZONE_BUFFER, 1)
+    spec.setdefault("planner", {})["zone_margin_m"] = tighter
+    return [Tightening("zone_margin_m", now, tighter)]
 
 
 def _missiles(spec: Spec, failed: list[Finding]) -> list[Tightening]:

@@ -255,7 +255,8 @@ def _assemble(
     for name, point in ends:
         check_inside(name, point, source, bounds, floor, ceiling, ground)
     zones = make_zones(spec.zones or (), source, origin, ground)
-    check_ends(zones, source, ends if zones else (), ground)
+    # Of a mission that came without a scenario they are where it goes: for the verdict to find, too.
+    check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
         raise ScenarioError(f"{source}: destination: less than 10 m from start")
     wind = Wind(

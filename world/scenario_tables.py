@@ -184,13 +184,17 @@ class GoalsTable(ScenarioTable):
 
 
 class PlannerTable(ScenarioTable):
-    """[planner]."""
+    """[planner].
+
+    zone_margin_m: what a plan keeps from zones, beside how far its autopilot strays; the planner's own where not given.
+    """
 
     algorithm: Name | None = None
     waypoints: Annotated[int, within(3, 500)] = 12
     population: Annotated[int, within(4, 100_000)] = 200
     generations: Annotated[int, within(0, 100_000)] = 100
     across_m: Annotated[float, within(0.0, MAP_EXTENT, above=True)] | None = None
+    zone_margin_m: Annotated[float, within(0.0, 5000.0)] | None = None
     goals: GoalsTable = GoalsTable()
     budget: Annotated[int, within(4, 10**10)] | None = None
     seed: Seed | None = None

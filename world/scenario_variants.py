@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from world.airspace.zone_tables import MOST_ZONES, ZoneTable
+from world.airspace.zones_on_map import check_ends, make_zones
+from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec
 from world.scenario_file import checked_table
 from world.scenario_positions import make_threats
@@ -91,6 +94,26 @@ def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
         kept |= {"autopilot": None, "guidance": None, "params": None}
     table = checked_table(lambda: FlightTable(**(kept | given)), f"{scenario.name}: flight")
     return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
+
+
+def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> Scenario:
+    """A scenario with more zones; source: names them in messages.
+
+    Raises ScenarioError for a shape that is none, for a level above ground where there is no terrain, and for more
+    zones than a scenario may have; and, but in a scenario made around a mission, for a zone that an end violates.
+
+    >>> from world.scenario import load_scenario
+    >>> mast = ZoneTable(name="mast", kind="exclusion", east_m=1300.0, north_m=400.0, radius_m=200.0)
+    >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
+    ['mast']
+    """
+    if len(scenario.zones) + len(tables) > MOST_ZONES:
+        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MOST_ZONES:,} in all")
+    zones = make_zones(tables, source, scenario.origin, scenario.terrain)
+    ends = (("start", scenario.start), ("destination", scenario.destination))
+    check_ends(zones, source, () if scenario.external else ends, scenario.terrain)
+    spec = scenario.spec.model_copy(update={"zones": [*(scenario.spec.zones or ()), *tables]})
+    return replace(scenario, spec=spec, zones=(*scenario.zones, *zones))
 
 
 def with_threats(

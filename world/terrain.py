@@ -128,7 +128,7 @@ def _heights_many(heights: Heights, to_pixel: PolyMapRecord, east: Floats, north
     return out
 
 
-@inlined
+@compiled
 def segment_clearance(
     heights: Heights, to_pixel: PolyMapRecord, a: Floats, b: Floats
 ) -> tuple[float, float]:  # pragma: no cover - compiled

@@ -4,7 +4,7 @@ import contextlib
 import errno
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
@@ -33,7 +33,7 @@ from flight.live.station_missions import listed, uploaded
 from flight.live.station_requests import Requests, Response
 from flight.live.status_text import CRITICAL, INFO, WARNING, StatusText
 from flight.live.telemetry import ACTIVE, COMPLETE, Status, telemetry_message
-from flight.mission.items import Home, Mission
+from flight.mission.items import Home, Mission, MissionItem
 
 # Longest wait for the network or the flight, s.
 _NAP = 0.02
@@ -101,16 +101,18 @@ class Vehicle:
             self.server.lists[kind] = items
         self.server.changed.add(MissionType.MISSION)
 
+    def load_fence(self, fences: Sequence[MissionItem]) -> None:
+        """Take a fence from a file, as if a station had uploaded it; missions that follow are judged by it."""
+        self.server.lists[MissionType.FENCE] = tuple(fences)
+        self.server.changed.add(MissionType.FENCE)
+
     def run(self, stop: Callable[[], bool]) -> None:
         """Serve until ``stop`` says so, then end the flight and its process."""
         while not stop():
             self.step(_NAP)
 
     def close(self) -> None:
-        """Have the process that flies end its flight and itself; its last texts go to the terminal.
-
-        One that is not ready yet has no flight to end, and nothing is waited for.
-        """
+        """Have the process that flies end its flight, if it has begun to serve; its last texts go to the terminal."""
         until = self._clock() + CLOSING
         with contextlib.suppress(OSError, EOFError):
             if self._ready:

@@ -74,7 +74,7 @@ def fence_problem(
 
 
 def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[str, ...]]:
-    """Mission with a scenario's area, threats and zones as its fence and the route's ends as rally points, and notes.
+    """Mission with a scenario's area, threats and zones as its fence, its own beside, the ends as rally points; notes.
 
     The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
     no height: a plan that passes above or below the sphere passes through the cylinder.  Radars are no fence: being
@@ -112,7 +112,8 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
     if scenario.limits.max_height_m is not None:
         above = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the greatest height of {above} is not in it")
-    return replace(mission, fences=numbered(fences), rally=numbered(_rally(mission))), tuple(notes)
+    every = numbered([*fences, *mission.fences])
+    return replace(mission, fences=every, rally=numbered(_rally(mission))), tuple(notes)
 
 
 def _crossings(mission: Mission, fences: list[MissionItem], origin: GeoOrigin) -> list[str]:
@@ -168,7 +169,12 @@ def _zero(item: MissionItem, home: Home) -> float:
 
 
 def numbered(items: Sequence[MissionItem]) -> tuple[MissionItem, ...]:
-    """Items of a fence or of rally points with their numbers from 0, as their lists on a vehicle count."""
+    """Items of a fence or of rally points with their numbers from 0, as their lists on a vehicle count.
+
+    >>> item = MissionItem(7, Command.NAV_RALLY_POINT, Frame.GLOBAL, (0.0,) * 4, 36.5, -84.2, 0.0)
+    >>> [one.seq for one in numbered([item, item])]
+    [0, 1]
+    """
     return tuple(replace(item, seq=k) for k, item in enumerate(items))
 
 

@@ -212,6 +212,10 @@ def renumbered(mission: Mission) -> Mission:
     """Mission with its first item after seq 0, which both file forms keep for home.
 
     All numbers move up together, and the targets of jumps with them.
+
+    >>> way = tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0) for k in range(2))
+    >>> [item.seq for item in renumbered(Mission(None, way)).items]
+    [1, 2]
     """
     if not mission.items or mission.items[0].seq > 0:
         return mission
@@ -236,7 +240,11 @@ def position_problem(lat_deg: float, lon_deg: float) -> str | None:
 
 
 def item_problem(item: MissionItem) -> str | None:
-    """Fault of an item that no autopilot could make sense of, as "field value: allowed"; None if nothing is."""
+    """Fault of an item that no autopilot could make sense of, as "field value: allowed"; None if nothing is.
+
+    >>> item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0))
+    'latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)'
+    """
     if item.frame not in _FRAMES:
         return f"frame {item.frame}: allowed {', '.join(map(str, _FRAMES))}"
     for k, value in enumerate(item.params, 1):

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
-from flight.mission.items import MOST_BYTES, Mission
+from flight.mission.items import MOST_BYTES, Mission, MissionItem
+from flight.mission_files.fence_points import is_point_list, parse_fence_points
 from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
 from flight.mission_files.wpl import fence_text, parse_waypoints, rally_text, waypoints_text
 from world.errors import MissionError
@@ -69,6 +70,26 @@ def parse_mission(text: str, source: str) -> Mission:
     if source.lower().endswith(".plan") and not text.removeprefix("\ufeff").lstrip().startswith("QGC"):
         return parse_plan_file(text, source)
     return parse_waypoints(text, source)
+
+
+def read_fence(path: Path) -> tuple[MissionItem, ...]:
+    r"""Read the fence of a file: of a mission in either form, or a list of points as older tools write it.
+
+    Whatever else the file holds is left.  Raises MissionError as `read_mission` does, and where it holds no fence.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "keep-out.fence"
+    ...     _ = path.write_text("QGC WPL 110\n0 0 0 5004 200 0 0 0 36.51 -84.2 0 1\n", encoding="ascii")
+    ...     [(item.command, item.params[0]) for item in read_fence(path)]
+    [(5004, 200.0)]
+    """
+    mission_kind(path)
+    text = _read_text(path)
+    fences = parse_fence_points(text, str(path)) if is_point_list(text) else parse_mission(text, str(path)).fences
+    if not fences:
+        raise MissionError(f"{path}: no fence in it: items of commands 5001 to 5004 are expected")
+    return fences
 
 
 def mission_text(mission: Mission, kind: FileKind) -> str:

@@ -13,6 +13,7 @@ from flight.guidance.fly_by_path import FlyByPath, fly_by_path
 from flight.mission.items import Mission
 from flight.mission.route import Route
 from flight.simulation.autopilot_program import AutopilotProgram
+from flight.simulation.field_source import FieldSource
 from planner.plan import Plan
 from world.scenario import Scenario
 from world.scenario_types import Guidance, Navigation
@@ -36,6 +37,7 @@ class FlightSetup:
     guidance_hz: how often it steers, and how many rows the track has a second.
     parameters: of the ArduPlane that flies; None where planfly's guidance does.
     program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
+    source: the log of the field that the flight is from; None for a flight of planfly's own.
     path: that is to be followed, of route and limits.
     """
 
@@ -53,6 +55,7 @@ class FlightSetup:
     guidance_hz: Literal[30, 60] = 60
     parameters: ArduPilotParameters | None = None
     program: AutopilotProgram | None = None
+    source: FieldSource | None = None
     path: FlyByPath = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -12,6 +12,7 @@ from flight.simulation.track import COLUMNS, Track
 from logs.figures.elements import style
 from logs.figures.elements.panels import Axis, Panel, Series, doubles, draw_panels
 from logs.figures.map import draw_map
+from logs.verdict.measures.airspace import with_fence_zones
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +36,7 @@ def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
     setup = first.setup
     paths: dict[str, Any] = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
     # The map holds both tracks; the line that joins them is taken out again.
-    figure = draw_map(setup.scenario, **paths, track=both, verdict=None)
+    figure = draw_map(with_fence_zones(setup).scenario, **paths, track=both, verdict=None)
     axes = figure.axes[0]
     next(line for line in axes.lines if line.get_label() == "flown track").remove()
     looks: tuple[dict[str, Any], dict[str, Any]] = (

@@ -20,6 +20,7 @@ from logs.figures.scene import draw_scene
 from logs.figures.time_series import draw_controls, draw_energy, draw_time_plots
 from logs.figures.turns import draw_turns
 from logs.verdict.findings import Verdict
+from logs.verdict.measures.airspace import with_fence_zones
 from world.atomic_files import write_whole
 
 __all__ = [
@@ -32,13 +33,14 @@ FIGURE_FILES = ("map", "profile", "scene", "turns", "envelope")
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Figure]:
     """Draw all pictures of a flight, or of a plan that was not flown, by name; what has no data is left out."""
+    drawn = with_fence_zones(setup)
     plan = setup.plan.waypoints if setup.plan is not None else None
     paths: dict[str, Any] = {"plan_waypoints": plan, "route_waypoints": setup.route.waypoints}
     flown = track if track is not None and len(track) else None
     found: dict[str, Figure | None] = {
-        "map": draw_map(setup.scenario, **paths, track=flown, verdict=verdict),
-        "profile": draw_profile(setup.scenario, **paths, track=flown, verdict=verdict),
-        "scene": draw_scene(setup, flown, verdict),
+        "map": draw_map(drawn.scenario, **paths, track=flown, verdict=verdict),
+        "profile": draw_profile(drawn.scenario, **paths, track=flown, verdict=verdict),
+        "scene": draw_scene(drawn, flown, verdict),
         "turns": draw_turns(setup.scenario.name, verdict),
         "envelope": draw_envelope_and_flight(setup, flown),
     }

@@ -19,6 +19,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
 from logs.figures.map import draw_map
+from logs.verdict.measures.airspace import with_fence_zones
 from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
 
 Floats = NDArray[np.float64]
@@ -61,7 +62,11 @@ class MovieFrames:
         """Each frame as (height, width, 3); both even, as video formats want them."""
         setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
         figure = draw_map(
-            setup.scenario, plan_waypoints=None, route_waypoints=setup.route.waypoints, track=None, verdict=None
+            with_fence_zones(setup).scenario,
+            plan_waypoints=None,
+            route_waypoints=setup.route.waypoints,
+            track=None,
+            verdict=None,
         )
         axes = figure.axes[0]
         figure.set_dpi(_DPI)

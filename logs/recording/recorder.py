@@ -50,6 +50,7 @@ from logs.recording.state_channel import (
 from logs.verdict.beside_file import beside_json
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.levels import FlownBeside
+from logs.verdict.measures.airspace import with_fence_zones
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
@@ -229,11 +230,12 @@ class Recorder:
             "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats),
             "/scene/plan": scene.plan_scene(EPOCH_NS, setup.route.waypoints),
         }
-        if setup.scenario.zones:
+        zoned = with_fence_zones(setup).scenario
+        if zoned.zones:
             descriptor = SceneUpdate.DESCRIPTOR
             channel = self._writer.channel(ZONES_TOPIC, descriptor.full_name, schema_of(descriptor))
             self._channels[ZONES_TOPIC] = channel
-            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, setup.scenario, setup.route.waypoints)
+            scenes[ZONES_TOPIC] = scene.zones_scene(EPOCH_NS, zoned, setup.route.waypoints)
         self._write([single_record(self._channels[name], EPOCH_NS, update) for name, update in scenes.items()])
         self._writer.flush()
 

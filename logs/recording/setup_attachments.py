@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError
 
+from flight.simulation.field_source import FieldSource
 from flight.simulation.flight_setup import FlightSetup, make_limits
 from logs.recording.attachment_names import MISSION_FILE, PLAN_FILE, SCENARIO_FILE, SETUP_FILE, TERRAIN_FILE
 from logs.recording.setup_schema import (
@@ -55,6 +56,7 @@ _PACKAGES = (
     "pymavlink",
     "pyproj",
     "rasterio",
+    "shapely",
     "mcap",
     "zstandard",
     "protobuf",
@@ -75,6 +77,7 @@ class _Setup(SetupModel):
     guidance_hz: Literal[30, 60]
     parameters: ParametersFile | None = None  # a log of before there were any was flown by planfly's guidance
     program: ProgramFile | None = None
+    source: FieldSource | None = None
     mission: MissionFile
     route: RouteFile
     envelope: EnvelopeFile
@@ -140,6 +143,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         guidance_hz=setup.guidance_hz,
         parameters=None if setup.parameters is None else parameters_file(setup.parameters),
         program=None if setup.program is None else program_file(setup.program),
+        source=setup.source,
         mission=mission_file(setup.mission),
         route=route_file(setup.route),
         envelope=envelope_file(setup.envelope),
@@ -185,6 +189,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         guidance_hz=file.guidance_hz,
         parameters=None if file.parameters is None else read_parameters(file.parameters, f"{source}: {SETUP_FILE}"),
         program=None if file.program is None else read_program(file.program),
+        source=file.source,
     )
     return StoredSetup(setup, file.versions)
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict.measures.airspace import with_fence_zones
 from world.airspace.zone_outlines import zone_parts
 from world.frames import to_geo
 
@@ -92,14 +93,14 @@ class MapZone:
 
 
 def map_zones(setup: FlightSetup) -> list[MapZone]:
-    """Zones of a setup's scenario.
+    """Zones of a setup's scenario, and its mission's own fence.
 
     >>> from logs.recording.example_log import example_log
     >>> map_zones(example_log().setup)
     []
     """
     made = []
-    for zone in setup.scenario.zones:
+    for zone in with_fence_zones(setup).scenario.zones:
         parts = tuple(tuple(_geographic(setup, ring) for ring in part) for part in zone_parts(zone))
         top = zone.ceiling
         name = f"{zone.name} ({'keep out' if zone.kind == 'exclusion' else 'stay in'})"

@@ -22,6 +22,7 @@ from logs.report import tables
 from logs.report.captions import report_pictures
 from logs.report.text import badge_of, count_sentence, finding_rows, level_rows, rule_rows
 from logs.verdict.findings import Verdict
+from logs.verdict.measures.airspace import with_fence_zones
 from logs.verdict.measures.leg_numbers import with_legs
 from world.atomic_files import write_whole
 
@@ -125,7 +126,7 @@ def _page(
         command=command,
         origin=tables.origin_facts(setup, versions),
         # Both are made safe for where they stand: the scene by `scene_json`, the script is ours.
-        scene=Markup(scene_json(setup, track, failed)),
+        scene=Markup(scene_json(with_fence_zones(setup), track, failed)),
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii"),
     )

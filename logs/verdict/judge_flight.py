@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.flown_findings import flown_findings
+from logs.verdict.judge_field_flight import judge_field_flight
 from logs.verdict.judge_geometry import (
     flown_level,
     geometric_findings,
@@ -19,24 +21,8 @@ from logs.verdict.judge_geometry import (
 )
 from logs.verdict.levels import FlownBeside, LevelAnswer
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.places import Disagreement, Place
-from logs.verdict.rules.bounds_rule import bounds_findings
-from logs.verdict.rules.clearance_rule import clearance_findings
-from logs.verdict.rules.completion_rule import completion_findings
-from logs.verdict.rules.corridor_rule import corridor_findings
-from logs.verdict.rules.departure_rule import departure_findings
-from logs.verdict.rules.energy_rule import energy_findings
-from logs.verdict.rules.fence_rule import fence_findings
-from logs.verdict.rules.height_rule import height_findings
-from logs.verdict.rules.loiter_rule import fold_loiters
-from logs.verdict.rules.slope_rule import slope_findings
-from logs.verdict.rules.speed_rule import speed_findings
-from logs.verdict.rules.stall_rule import stall_findings
-from logs.verdict.rules.takeoff_landing_rule import takeoff_landing_findings
-from logs.verdict.rules.threat_rule import threat_findings
-from logs.verdict.rules.turn_rule import turn_findings
-from logs.verdict.rules.waypoint_rule import waypoint_findings
 from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 
@@ -55,12 +41,10 @@ def judge_flight(
     """Judge a flown track: level "flown".
 
     Any track is judged, however short or damaged: what cannot be known makes it incomplete.  One without a row is a
-    flight that never began: its route is judged, level "geometric".
+    flight that never began: its route is judged, level "geometric".  One of the field is judged as far as its log goes.
 
-    ended: how the flight ended, "completed" or what stopped it.
-    whole: the record has its end.
-    envelope: whether the aircraft's envelope counts beside what the flight showed; False judges by flown evidence and
-    the scenario's numbers alone.
+    ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.
+    envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
     beside: what other flights have to say of this one.
 
     >>> from aircraft.catalog import find_aircraft
@@ -79,11 +63,13 @@ def judge_flight(
     >>> judge_flight(setup, flown.track, flown.ended).headline
     'flyable'
     """
+    if setup.source is not None:
+        return judge_field_flight(setup, track, whole=whole)
     demands = route_demands(setup, envelope=envelope)
     if not len(track):
         return judge_unflown(demands, ended, whole=whole)
     aligned = lay_track(demands, track)
-    findings = _flown_findings(demands, aligned, ended, whole, envelope)
+    findings = flown_findings(demands, aligned, ended, whole, envelope)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
     findings = with_suggestions(demands, aligned, findings)
@@ -103,31 +89,6 @@ def judge_flight(
         program=setup.program,
         parameters=setup.parameters,
     )
-
-
-def _flown_findings(
-    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
-) -> tuple[Finding, ...]:
-    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
-    findings = (
-        *unflyable_items(demands.setup),
-        *turn_findings(demands, aligned),
-        *slope_findings(demands, aligned),
-        *clearance_findings(demands, aligned),
-        *height_findings(demands, aligned),
-        *fence_findings(demands, aligned),
-        *threat_findings(demands, aligned),
-        *bounds_findings(demands, aligned),
-        *waypoint_findings(demands, aligned),
-        *corridor_findings(demands, aligned),
-        *speed_findings(demands, aligned),
-        *(stall_findings(demands, aligned) if envelope else ()),
-        *takeoff_landing_findings(demands),
-        *energy_findings(demands, aligned),
-        *departure_findings(demands, aligned),
-        *completion_findings(demands, aligned, ended, whole),
-    )
-    return fold_loiters(demands, aligned, findings)
 
 
 def _levels(

@@ -159,13 +159,6 @@ STALL_TOLERANCE = 0.2
 # Share of the battery or the tank that is to be left at the end: the reserve.
 RESERVE = 0.2
 
-# The rules about airspace
-
-# m.  What the depth of a path beyond a zone's limit is worked out to: half of what a waypoint is rounded by.
-FENCE_DEPTH = 0.01
-# m.  What the places where a path goes in and out of a zone are worked out to.
-FENCE_EDGE = 1e-3
-
 # The track beside its route
 
 # m.  A waypoint further than this from the track draws no row to itself.
@@ -175,6 +168,16 @@ CAPTURE_RADIUS = 500.0
 CHORD_TIME = 0.25
 # m.  A waypoint that the track ends at is passed within this of its apex, beside the fly-by's own distance.
 ARRIVED = 10.0
+# s.  A flight of the field that goes on for as long after its last waypoint has flown a part of the next leg.
+PARTLY_FLOWN = 2.0
+# m.  A flight that comes no nearer than this to any waypoint of a plan was flown somewhere else.
+ANOTHER_PLACE = 1000.0
+# m.  How near to a waypoint counts as having passed it, where the order of waypoints is asked: the corridor's half
+# width, within these.
+NEAR_AT_LEAST, NEAR_AT_MOST = 50.0, 150.0
+# Share.  Of the waypoints that were passed at all this many were passed in the plan's order, if the plan is the one
+# that was flown.
+IN_ORDER = 0.8
 # m, m/s.  No position or speed of ours is larger; what is, is garbage.
 FARTHEST, FASTEST = 1e7, 1e4
 # rad, deflection, m/s.  Nor is an attitude, a control or a wind larger.

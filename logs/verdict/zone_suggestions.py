@@ -8,9 +8,9 @@ from logs.verdict.findings import Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.zone_visits import path_zones
+from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
 from logs.verdict.places import Change, Quantity, Suggestion
-from logs.verdict.tolerances import BUFFER_LENGTH, FENCE_DEPTH, ROUNDING, ZONE_TRIES
+from logs.verdict.tolerances import BUFFER_LENGTH, ROUNDING, ZONE_TRIES
 from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.kernels import Records
 from world.terrain import Terrain
@@ -37,9 +37,10 @@ def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: 
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
     record, terrain = zone_records([demands.airspace.zones[z]]), demands.setup.scenario.terrain
     planned, flown = item.planned or 0.0, item.flown or 0.0
-    moves, deeper = planned_moves(demands), max(0.0, flown - planned)
     if aligned is not None and planned <= ROUNDING:
         moves, deeper = flown_moves(aligned, first, last), 0.0
+    else:
+        moves, deeper = planned_moves(demands, first, last), max(0.0, flown - planned)
     near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
     found = []
     for ways in (_LEVEL, _UPRIGHT):
@@ -66,7 +67,7 @@ def _least_shift(
         visit = path_zones(shifted, record, terrain)[0]
         if visit.unknown:
             return None
-        if visit.depth <= FENCE_DEPTH:
+        if visit.depth <= DEPTH_PRECISION:
             return shift
         shift += float(visit.depth)
         if shift >= most:

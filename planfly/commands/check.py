@@ -4,8 +4,10 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+from logs.field_logs.readers.open_log import is_field_log
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.judge_flight import judge_geometry
+from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import is_log, open_mission
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.results import print_verdict, print_warnings, write_verdict
@@ -22,11 +24,17 @@ def check(args: argparse.Namespace) -> int:
     target = Path(args.json) if args.json else None
     if target:
         refuse_existing(target, args.overwrite, source)
+    if is_field_log(source):
+        if args.fence:
+            raise ScenarioError(f"{source}: --fence: goes with a log of planfly's: import this one first")
+        return _check_field_log(source, args, target)
+    _refuse_field_options(source, args)
+    fences = read_named_fences(args.fence)
     if is_log(source):
-        log = _open_log(source, args)
+        log = _open_log(source, args, fences)
         setup, verdict, loss = log.setup, judge_log(log), not log.complete
     else:
-        setup = open_mission(source, args.scenario, args.terrain, change=scenario_change(args)).setup
+        setup = open_mission(source, args.scenario, args.terrain, change=scenario_change(args), fences=fences).setup
         print_warnings(setup.mission.warnings)
         verdict, loss = judge_geometry(setup), False
     if target:
@@ -39,8 +47,32 @@ def check(args: argparse.Namespace) -> int:
     return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
-def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
-    """Read a log, over another terrain where one is named.  Raises ScenarioError for options that it cannot take."""
+def _check_field_log(source: Path, args: argparse.Namespace, target: Path | None) -> int:
+    # Imported here: no other check needs the libraries that read logs of the field.
+    from planfly.commands.field_options import field_options
+    from planfly.field_flights import import_flight
+
+    flight = import_flight(source, field_options(args), scenario_change(args))
+    if target:
+        write_verdict(target, flight.verdict)
+    print_verdict(flight.verdict, flight.setup.route.notes)
+    if flight.lossy:
+        return LOSS
+    return FLYABLE if flight.verdict.flyable else NOT_FLYABLE
+
+
+def _refuse_field_options(source: Path, args: argparse.Namespace) -> None:
+    """Refuse what only a log of the field can take.  Raises ScenarioError."""
+    for name in ("plan", "flight", "datum"):
+        if getattr(args, name, None) is not None:
+            raise ScenarioError(f"{source}: --{name}: goes with a log of the field, not with this file")
+
+
+def _open_log(source: Path, args: argparse.Namespace, fences: NamedFences) -> FlightLog:
+    """Read a log, over another terrain and with more fences where they are named.
+
+    Raises ScenarioError for options that it cannot take.
+    """
     names = ("aircraft", "airspeed", "wind", "turbulence", "params", "guidance")
     given = [name for name in names if getattr(args, name) is not None]
     if given:
@@ -50,9 +82,12 @@ def _open_log(source: Path, args: argparse.Namespace) -> FlightLog:
         )
     if args.scenario:
         raise ScenarioError(
-            f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces it"
+            f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces its ground"
         )
     log = read_log(source)
-    if not args.terrain:
-        return log
-    return replace(log, setup=log.setup.in_scenario(over_terrain(log.setup.scenario, args.terrain)))
+    setup = log.setup
+    if args.terrain:
+        setup = setup.in_scenario(over_terrain(setup.scenario, args.terrain))
+    if args.fence:
+        setup = replace(setup.in_scenario(fences.on_scenario(setup.scenario)), mission=fences.on_mission(setup.mission))
+    return replace(log, setup=setup)

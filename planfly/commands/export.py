@@ -4,11 +4,13 @@ import argparse
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from flight.mission.fences import with_fences
+from flight.mission.fences import numbered, with_fences
 from flight.mission.items import Mission
+from flight.mission.zone_fences import zone_fences
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from logs.recording.reader import FlightLog, read_log
 from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
+from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import is_log, open_mission, open_plan
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.results import print_warnings
@@ -47,7 +49,13 @@ def export(args: argparse.Namespace) -> int:
             _refuse_unknown(target)
         refuse_existing(target, args.overwrite, path)
     maps = any(target.suffix.lower() in MAPS for target in targets)
-    source = _read_log(path) if path.is_file() and is_log(path) else _read_mission(path, maps)
+    fences = read_named_fences(args.fence)
+    if path.is_file() and is_log(path):
+        if args.fence:
+            raise MissionError(f"{path}: --fence: a log is exported with the fence that it was flown with")
+        source = _read_log(path)
+    else:
+        source = _read_mission(path, maps, fences)
     texts = [(target, *_text(source, target, str(path))) for target in targets]
     print_warnings([*source.mission.warnings, *source.notes])
     for target, text, content in texts:
@@ -75,24 +83,32 @@ def _read_log(path: Path) -> _Source:
     return _Source(log.setup.mission, lines, map_zones(log.setup), log=log)
 
 
-def _read_mission(path: Path, maps: bool) -> _Source:
-    """A plan or a mission file; a map wants its route, too, which not every mission has."""
+def _read_mission(path: Path, maps: bool, fences: NamedFences) -> _Source:
+    """A plan or a mission file; a map and zones want its place, too, which not every mission has."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected")
     is_plan = path.suffix.lower() == ".json"
-    if maps:
-        setup = open_mission(path, None, None).setup
+    if maps or (fences.zones and not is_plan):
+        setup = open_mission(path, None, None, fences=fences).setup
         source = _Source(setup.mission, {"plan": plan_line(setup)}, map_zones(setup))
-        return _with_fences(source, setup.scenario) if is_plan else source
+        return _with_fences(source, setup.scenario) if is_plan else _with_zones(source, setup.scenario)
     if not is_plan:
-        return _Source(read_mission(path))
-    opened = open_plan(path)
-    return _with_fences(_Source(opened.mission), opened.scenario)
+        return _Source(fences.on_mission(read_mission(path)))
+    opened = open_plan(path, change=fences.on_scenario)
+    return _with_fences(_Source(fences.on_mission(opened.mission)), opened.scenario)
 
 
 def _with_fences(source: _Source, scenario: Scenario) -> _Source:
+    """A plan's threats, area and zones as its fence, beside the one named."""
     fenced, notes = with_fences(source.mission, scenario)
     return replace(source, mission=fenced, notes=notes)
+
+
+def _with_zones(source: _Source, scenario: Scenario) -> _Source:
+    """The zones named as fence items, beside the mission's own."""
+    items, notes = zone_fences(scenario.zones, scenario.origin)
+    fenced = replace(source.mission, fences=numbered([*source.mission.fences, *items]))
+    return replace(source, mission=fenced, notes=tuple(notes))
 
 
 def _text(source: _Source, target: Path, title: str) -> tuple[str, str]:

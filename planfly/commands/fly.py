@@ -4,6 +4,7 @@ import argparse
 from pathlib import Path
 
 from planfly.flight_limits import flight_text
+from planfly.named_fences import read_named_fences
 from planfly.open_mission import open_mission
 from planfly.pipeline import autopilot_log, fly_and_judge
 from planfly.terminal.autopilot_option import autopilot_program
@@ -18,7 +19,14 @@ def fly(args: argparse.Namespace) -> int:
     """Fly a mission into a log; the exit code is the verdict's."""
     source = Path(args.mission)
     program = autopilot_program(args)
-    opened = open_mission(source, args.scenario, args.terrain, seed=args.seed, change=scenario_change(args))
+    opened = open_mission(
+        source,
+        args.scenario,
+        args.terrain,
+        seed=args.seed,
+        change=scenario_change(args),
+        fences=read_named_fences(args.fence),
+    )
     default = default_folder(opened.name, opened.setup.seed) / "flight.mcap"
     target = named_or_default(args.log, default, args.overwrite, source)
     if program is not None and args.log:

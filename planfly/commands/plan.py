@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
+from aircraft.path_limits import Limits
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
@@ -37,7 +38,7 @@ def plan(args: argparse.Namespace) -> int:
         made = _make_plan(args, scenario, old, airframe, seed, advance)
     target.parent.mkdir(parents=True, exist_ok=True)
     write_whole(target, plan_json(made))
-    _print_plan(made)
+    _print_plan(made, airframe.limits)
     print(f"plan      {target}")
     return FLYABLE if made.safe else NOT_FLYABLE
 
@@ -111,7 +112,7 @@ def _make_plan(
         )
 
 
-def _print_plan(made: Plan) -> None:
+def _print_plan(made: Plan, limits: Limits) -> None:
     """A plan on the terminal."""
     state = "safe" if made.safe else "feasible, but inside a missile's reach" if made.feasible else "no feasible plan"
     length = float(made.objectives[Objective.LENGTH_RATIO])
@@ -124,5 +125,5 @@ def _print_plan(made: Plan) -> None:
     for problem in made.certificate.problems:
         print(f"  failed  {problem}")
     if not made.feasible:
-        for line in what_blocks(made):
+        for line in what_blocks(made, limits):
             print(f"  note    {line}")

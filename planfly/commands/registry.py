@@ -19,8 +19,12 @@ COMMAND_NAMES = (
     "report",
     "compare",
     "paper",
+    "import",
+    "refly",
     "scenarios",
 )
+# Where a command's name is a word of Python's own.
+_MODULES = {"import": "import_log"}
 
 
 def find_command(name: str) -> CommandFunction:
@@ -34,5 +38,6 @@ def find_command(name: str) -> CommandFunction:
     """
     if name not in COMMAND_NAMES:
         raise KeyError(name)
-    command: CommandFunction = getattr(import_module(f"planfly.commands.{name}"), name)
+    module = _MODULES.get(name, name)
+    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), module)
     return command

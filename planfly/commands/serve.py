@@ -15,6 +15,7 @@ from flight.live.snapshot import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 from planfly.commands.served_flights import ServeOptions, fly_process, open_served
+from planfly.named_fences import read_named_fences
 from planfly.terminal.link_options import link_access, stop_signals
 from planfly.terminal.scenario_options import flight_entries
 from world.errors import PlanflyError
@@ -30,7 +31,8 @@ def serve(args: argparse.Namespace) -> int:
     """``planfly serve``."""
     access = link_access(args)
     mission, logs = args.mission or "", Path(args.log)
-    options = ServeOptions(mission, args.scenario, args.terrain, args.speed, logs, flight_entries(args))
+    fences = read_named_fences(args.fence)
+    options = ServeOptions(mission, args.scenario, args.terrain, args.speed, logs, flight_entries(args), fences)
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():
         raise PlanflyError(f"--log {options.logs}: is a file; a folder is expected")
@@ -55,6 +57,8 @@ def serve(args: argparse.Namespace) -> int:
         print(f"flight logs go to {options.logs}/; Ctrl-C ends", flush=True)
         if served.mission is not None:
             vehicle.load(served.mission)
+        elif fences.items:
+            vehicle.load_fence(fences.items)
         opened.callback(vehicle.close)
         vehicle.run(stopped)
     dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)

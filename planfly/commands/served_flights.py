@@ -29,10 +29,10 @@ from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.levels import FlownBeside
-from logs.verdict.wording import place_text
+from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.flights_beside import airframe_answer
+from planfly.flights_beside import judge_with_flights_beside
+from planfly.named_fences import NamedFences
 from planfly.open_mission import open_mission
 from planfly.pipeline import make_setup
 from world.errors import PlanflyError
@@ -55,6 +55,7 @@ class ServeOptions:
     flight: entries of the scenario's [flight] that take the place of its own; None for those it keeps.
     speed: times real time.
     logs: the folder of the flight logs.
+    fences: named beside the mission; a station that uploads another fence replaces the items, not the zones.
     """
 
     mission: str
@@ -63,6 +64,7 @@ class ServeOptions:
     speed: float
     logs: Path
     flight: dict[str, str | float | None] = field(default_factory=dict)
+    fences: NamedFences = field(default_factory=NamedFences)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,9 +84,12 @@ def open_served(options: ServeOptions) -> ServedScenario:
         return with_flight(scenario, **options.flight)
 
     if options.mission:
-        opened = open_mission(Path(options.mission), options.scenario, options.terrain, change=change)
+        opened = open_mission(
+            Path(options.mission), options.scenario, options.terrain, change=change, fences=options.fences
+        )
         return ServedScenario(opened.setup.scenario, opened.airframe, opened.setup.seed, opened.setup.mission)
     scenario = change(load_scenario(options.scenario or DEFAULT_SCENARIO, options.terrain))
+    scenario = options.fences.on_scenario(scenario)
     return ServedScenario(scenario, load_airframe(scenario), choose_seed(scenario, None), None)
 
 
@@ -181,10 +186,10 @@ class ServedLog:
     def finish(self, ended: str) -> FlightJudged:
         """Judge the flight and close the log."""
         track = join_tracks(self._blocks)
-        beside = None
-        if self._setup.parameters is not None and ended == "completed":
-            beside = FlownBeside(airframe_answer(self._setup, self._aircraft))
-        verdict = judge_flight(self._setup, track, ended, beside=beside)
+        if ended == "completed":
+            verdict, beside = judge_with_flights_beside(self._setup, self._aircraft, track, ended)
+        else:
+            verdict, beside = judge_flight(self._setup, track, ended), None
         end = float(track.time[-1]) if len(track) else 0.0
         self._recorder.event(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
         self._recorder.finish(ended, verdict, beside)
@@ -209,10 +214,11 @@ def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     failed = [finding for finding in verdict.findings if finding.ok is False]
     if verdict.flyable:
         return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
+    deciding = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
     lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MOST_TEXTS]]
     if len(failed) > _MOST_TEXTS:
         lines.append(StatusText(f"and {len(failed) - _MOST_TEXTS} more findings", WARNING))
-    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *lines)
+    return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding, *lines)
 
 
 def _heading(item: Finding) -> str:

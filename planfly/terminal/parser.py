@@ -20,7 +20,10 @@ from planfly.terminal.argument_types import (
     time_or_stations,
 )
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
+from planfly.terminal.field_parser import LOGS, add_field_commands
 from planfly.terminal.parser_options import (
+    fence_option,
+    field_log_options,
     flown_by_options,
     limit_options,
     overwrite_option,
@@ -62,6 +65,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_run_and_plan(command)
     _add_export_and_fly(command)
     _add_log_commands(command)
+    add_field_commands(command)
     _add_serve(command)
     _add_paper(command)
     _add_aircraft(command)
@@ -144,6 +148,7 @@ def _add_export_and_fly(command: _Command) -> None:
     export.add_argument(
         "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
     )
+    fence_option(export)
     overwrite_option(export)
     fly = command(
         "fly", "fly a plan or any mission file, write the log, end with the verdict",
@@ -168,10 +173,13 @@ def _add_export_and_fly(command: _Command) -> None:
 
 def _add_log_commands(command: _Command) -> None:
     check = command(
-        "check", "judge a flight from its log alone, or a mission file by its geometry, without flying",
+        "check", "judge a flight from its log, of the field too, or a mission file by its geometry, without flying",
         "planfly check flight.mcap --json verdict.json",
     )  # fmt: skip
-    check.add_argument("file", metavar="LOG.mcap|MISSION", help="a flight log, or plan.json, .waypoints, .plan")
+    check.add_argument(
+        "file", metavar="LOG|MISSION", help=f"a flight log (.mcap, or {LOGS}), or plan.json, .waypoints, .plan"
+    )
+    field_log_options(check)
     world_options(check)
     flown_by_options(check)
     pilot_options(check)

@@ -2,7 +2,7 @@
 
 import argparse
 
-from planfly.terminal.argument_types import positive, wind
+from planfly.terminal.argument_types import positive, positive_count, wind
 
 
 def overwrite_option(parser: argparse.ArgumentParser) -> None:
@@ -14,6 +14,18 @@ def world_options(parser: argparse.ArgumentParser) -> None:
     """What a mission is judged in."""
     parser.add_argument("--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name")
     parser.add_argument("--terrain", metavar="DEM", help="elevation file (.tif, .hgt, .npz) or embedded name")
+    fence_option(parser)
+
+
+def fence_option(parser: argparse.ArgumentParser) -> None:
+    """Fences beside the mission's own."""
+    parser.add_argument(
+        "--fence",
+        metavar="FILE",
+        action="append",
+        default=[],
+        help="keep to this fence, too: .fence, .waypoints, .txt or .plan, or zones in .geojson or .kml; repeatable",
+    )
 
 
 def flown_by_options(parser: argparse.ArgumentParser) -> None:
@@ -79,4 +91,15 @@ def own_link_options(parser: argparse.ArgumentParser, *, bind: str) -> None:
     parser.add_argument("--allow", metavar="IP,IP", help="stations beyond this machine that may talk to the vehicle")
     parser.add_argument(
         "--sign-key", metavar="FILE", help="MAVLink signing key: 64 hex digits or a passphrase; mode 600"
+    )
+
+
+def field_log_options(parser: argparse.ArgumentParser) -> None:
+    """What a person says of a log of the field."""
+    parser.add_argument("--plan", metavar="MISSION", help="what was to be flown, in place of the log's own mission")
+    parser.add_argument(
+        "--flight", metavar="N", type=positive_count, help="which of the log's flights (default: the longest in AUTO)"
+    )
+    parser.add_argument(
+        "--datum", choices=("amsl", "ellipsoid"), help="what the log's heights are above, where it does not say"
     )

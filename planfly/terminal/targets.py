@@ -24,6 +24,10 @@ RUN_FILES = (
 _FIGURES = ("map", "profile", "scene", "turns", "envelope")
 # What `report` and `compare` may write, figures as SVG included.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
+REFLY_FILES = (
+    "simulated.mcap",
+    *(f"refly-{name}.png" for name in ("cross-track", "height", "ground-speed", "bank", "energy")),
+)
 COMPARE_FILES = (
     "compare.html",
     *(f"compare-{name}.{kind}" for name in ("map", "profile") for kind in ("png", "svg")),

@@ -1,4 +1,4 @@
-"""What the airspace adds to the graded scores: depths in zones, and above the greatest height over the ground.
+"""What the airspace adds to scores: depths in zones and above the greatest height, and the paper's kind of counts.
 
 A leg is looked at with the widest that a flight may be beside it, its corners' included; only where that is not enough,
 in parts.
@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 from planner.airspace.zone_depths import zone_excess
 from planner.evaluation.clearance_buffer import RequiredClearance, required_below
 from planner.evaluation.height_lags import below_at
+from planner.evaluation.paper_scores import POINTS
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.evaluation.strayed_pieces import ENDS
 from planner.evaluation.terrain_clearance import segment_pixels, terrain_excess
 from world.kernels import Record, Records, compiled, inlined
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 # Where a leg is cut for the lag of its height, in lengths of the lag.
 _LAG_CUTS = (0.0, 1.0, 2.5)
@@ -137,3 +139,40 @@ def _cut(a: Floats, b: Floats, share: float, until: float, one: Floats, two: Flo
     for axis in range(3):
         one[axis] = a[axis] + share * (b[axis] - a[axis])
         two[axis] = a[axis] + until * (b[axis] - a[axis])
+
+
+def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
+    """How many pieces of the legs of paths (n, w, 3), six a leg, are in a zone or too high over the ground; (n,).
+
+    The paper counts places, six a leg, and has no zones; between two places a path could pass through one.  Pieces
+    are looked at all along.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.evaluation.problem import make_problem
+    >>> from world.scenario import load_scenario
+    >>> from world.scenario_variants import with_zones
+    >>> from world.airspace.zone_tables import ZoneTable
+    >>> mill = ZoneTable(name="mill", kind="exclusion", east_m=1300.0, north_m=0.0, radius_m=100.0)
+    >>> scenario = with_zones(load_scenario("tight"), [mill], "mills")
+    >>> problem = make_problem(scenario, load_airframe(scenario).limits)
+    >>> airspace_counts(problem.search, np.stack([scenario.start, scenario.destination])[None])
+    array([2])
+    """
+    return _count_pieces(data, np.ascontiguousarray(paths))
+
+
+@compiled
+def _count_pieces(data: ProblemArrays, paths: Floats) -> Ints:  # pragma: no cover - compiled
+    number, waypoints, _ = paths.shape
+    counts = np.zeros(number, np.int64)
+    a, b = np.empty(3), np.empty(3)
+    for k in range(number):
+        for i in range(waypoints - 1):
+            for piece in range(POINTS):
+                for axis in range(3):
+                    step = paths[k, i + 1, axis] - paths[k, i, axis]
+                    a[axis] = paths[k, i, axis] + step * piece / POINTS
+                    b[axis] = paths[k, i, axis] + step * (piece + 1) / POINTS
+                if airspace_excess(data, a, b, 0.0, 0.0) > 0.0:
+                    counts[k] += 1
+    return counts

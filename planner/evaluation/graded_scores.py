@@ -192,7 +192,7 @@ def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) 
     return radius
 
 
-@inlined
+@compiled
 def _measure_flown(
     aircraft: PerformanceTable,
     legs_hold_turns: bool,
@@ -243,7 +243,7 @@ def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:
         extents[i] = max(corners[i].before, corners[i].after)
 
 
-@inlined
+@compiled
 def _corner_depth(
     heights: Heights,
     slope_bounds: SlopeBounds,
@@ -262,7 +262,7 @@ def _corner_depth(
     return total
 
 
-@inlined
+@compiled
 def _corner_kill(
     missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled

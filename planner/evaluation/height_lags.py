@@ -14,7 +14,7 @@ from aircraft.envelope import ground_speed
 from aircraft.path_limits import PerformanceTable, wind_speed_at
 from aircraft.tracking import faster_by
 from planner.evaluation.leg_geometry import Wind
-from world.kernels import Record, Records, inlined
+from world.kernels import Record, Records, compiled, inlined
 
 # How far the aircraft is below a leg at a share f of it, m: steady + slant (1 - f) + rest E(f x decay), where E is the
 # decay; and the most and the least of that and 0.
@@ -60,7 +60,7 @@ def set_lag(
     return end
 
 
-@inlined
+@compiled
 def measure_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:  # pragma: no cover - compiled

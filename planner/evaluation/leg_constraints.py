@@ -104,7 +104,7 @@ def _slope_limits_on(
     return climb - data.angle_margin, dive - data.angle_margin
 
 
-@inlined
+@compiled
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
     """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, less the margin."""
     dx, dy = b[0] - a[0], b[1] - a[1]
@@ -142,7 +142,7 @@ def _turn_excess(
     return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
 
 
-@inlined
+@compiled
 def add_leg_violations(
     data: ProblemArrays,
     limits: PrecomputedLimits,

@@ -39,7 +39,7 @@ def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - com
         legs[i].length = math.sqrt(dx * dx + dy * dy + dz * dz)
 
 
-@inlined
+@compiled
 def measure_corners(
     data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
 ) -> None:  # pragma: no cover - compiled
@@ -56,7 +56,7 @@ def measure_corners(
         measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
 
 
-@inlined
+@compiled
 def measure_corner(
     aircraft: PerformanceTable,
     tracking: Record,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from world.geometry import window_exposure
-from world.kernels import Records, inlined
+from world.kernels import Records, compiled, inlined
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -79,7 +79,7 @@ def make_missile_index(threats: Records, side: float | None = None) -> MissileIn
     return MissileIndex(*arrays)
 
 
-@inlined
+@compiled
 def kill_density(
     index: MissileIndex,
     margin: float,

@@ -128,7 +128,7 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
         missiles=make_missile_index(units),
         slope_bounds=_slope_bounds(terrain),
         tracking=tracking,
-        airspace=keep_airspace(scenario, ZoneMargins(CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
+        airspace=keep_airspace(scenario, _zone_margins(scenario, CERTIFIED_ZONE_MARGIN, buffer, share), buffer),
     )
     return _inset(arrays, float(tracking.across), float(tracking.up)) if tracking.strays else arrays
 
@@ -136,8 +136,15 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> KeptAirspace:
     """The airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
-    margins = ZoneMargins(SEARCH_ZONE_MARGIN, buffer, 1.0)
+    margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer, 1.0)
     return keep_airspace(scenario, margins, min(buffer, _most_buffer(certified)))
+
+
+def _zone_margins(scenario: Scenario, beside: float, beyond: float, share: float) -> ZoneMargins:
+    """Margins of zones, m, changed by as much as the scenario asks to keep more or less; in height never less."""
+    asked = scenario.planner.zone_margin_m
+    more = 0.0 if asked is None else asked - CERTIFIED_ZONE_MARGIN
+    return ZoneMargins(beside + more, beyond + max(0.0, more), share)
 
 
 def _most_buffer(certified: ProblemArrays) -> float:

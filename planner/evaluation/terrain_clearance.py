@@ -12,7 +12,7 @@ from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
 from planner.evaluation.height_lags import below_at
 from planner.evaluation.problem_arrays import SlopeBounds
 from world.frames import PolyMapRecord, polymap
-from world.kernels import Records, inlined
+from world.kernels import Records, compiled, inlined
 from world.terrain import TILE, pixel_height
 
 Floats = NDArray[np.float64]
@@ -139,7 +139,7 @@ def _begin_legs(
         column, row = after_column, after_row
 
 
-@inlined
+@compiled
 def sample_terrain(
     heights: Heights,
     slope_bounds: SlopeBounds,

@@ -72,3 +72,35 @@ def times_sparse(rows: Floats, basis: Floats) -> Floats:  # pragma: no cover - c
 def _add_times(values: Floats, factor: float, out: Floats) -> None:  # pragma: no cover - compiled
     for n in range(out.size):
         out[n] += values[n] * factor
+
+
+@compiled
+def band_cholesky(matrix: Floats, out: Floats) -> None:  # pragma: no cover - compiled
+    """Fill the lower factor (d, b) of a positive definite band matrix (d, b).
+
+    Entry [i, k] of either stands in row i and column i - k.  A pivot that rounding leaves below a trillionth of its
+    diagonal entry is taken for that.
+    """
+    size, wide = matrix.shape
+    for i in range(size):
+        for j in range(max(0, i - wide + 1), i + 1):
+            total = matrix[i, i - j]
+            for k in range(max(0, i - wide + 1), j):
+                total -= out[i, i - k] * out[j, j - k]
+            out[i, i - j] = total / out[j, 0] if j < i else np.sqrt(max(total, 1e-12 * matrix[i, 0] + 1e-300))
+
+
+@compiled
+def solve_band(factor: Floats, right: Floats, out: Floats) -> None:  # pragma: no cover - compiled
+    """Fill the solution (d,) of the equations whose matrix has this band factor (d, b)."""
+    size, wide = factor.shape
+    for i in range(size):
+        total = right[i]
+        for k in range(max(0, i - wide + 1), i):
+            total -= factor[i, i - k] * out[k]
+        out[i] = total / factor[i, 0]
+    for i in range(size - 1, -1, -1):
+        total = out[i]
+        for k in range(i + 1, min(size, i + wide)):
+            total -= factor[k, k - i] * out[k]
+        out[i] = total / factor[i, 0]

@@ -2,13 +2,19 @@
 
 import itertools
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
+from aircraft.path_limits import Limits
+from planner.evaluation.clearance_buffer import BUFFER_GROWTH
 from planner.evaluation.encoding import rotated_frame
+from planner.evaluation.problem import Problem, make_problem
 from planner.plan import Plan, Violation
 from planner.search.algorithms import ALGORITHMS
 from planner.search.closing_zones import closing_zones
+from planner.search.limits_for import limits_for
+from planner.search.narrow_bands import highest_allowed, narrow_bands
 from world.airspace.zone_kernels import edge_distance, outside_band, zone_records
 from world.scenario import Scenario
 
@@ -18,8 +24,10 @@ ALONG, ACROSS = 200, 400
 MOST_NAMES, ZONE_PITCH = 4, 20.0
 
 
-def what_blocks(plan: Plan) -> list[str]:
+def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
     """Lines that say what is in the way of a plan that is not feasible, and what a search in its encoding cannot do.
+
+    limits: of the path; where they are given, what a plan keeps in reserve is looked at, too.
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
@@ -33,7 +41,11 @@ def what_blocks(plan: Plan) -> list[str]:
     terrain and missiles together close the way 65 m from the start, at every height
     """
     scenario = plan.scenario
+    chosen = ALGORITHMS.get(plan.algorithm)
     lines = _walls(scenario)
+    if limits is not None:
+        problem = make_problem(scenario, limits if chosen is None else limits_for(chosen, limits))
+        lines += narrow_bands(problem) or ([] if lines else _reserve_walls(problem))
     closed = closing_zones(scenario)
     if closed is not None:
         names = ", ".join(closed.zones[:MOST_NAMES]) + (" and more" if len(closed.zones) > MOST_NAMES else "")
@@ -45,7 +57,6 @@ def what_blocks(plan: Plan) -> list[str]:
         violated = [item.name.lower() for item in Violation if plan.violations[item]]
         if violated:
             lines.append(f"nothing stands across the whole way; the best path fails by: {', '.join(violated)}")
-    chosen = ALGORITHMS.get(plan.algorithm)
     if chosen is not None and chosen.encoding == "rotated" and chosen.seeded:
         lines.append("ways that turn back, or go round to climb, were looked for too, on a coarse lattice")
     elif chosen is not None and chosen.encoding == "rotated":
@@ -61,16 +72,8 @@ def _walls(scenario: Scenario) -> list[str]:
     terrain = scenario.terrain
     if terrain is None:
         return []
-    frame = rotated_frame(scenario.start, scenario.destination)
-    widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
-    across = np.linspace(-widest, widest, ACROSS)
     lines: list[str] = []
-    for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
-        places = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
-        inside = ((places >= scenario.bounds[:, 0]) & (places <= scenario.bounds[:, 1])).all(axis=1)
-        if not inside.any():
-            continue
-        places = places[inside]
+    for along, places in _lines_across(scenario):
         lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
         lowest = np.maximum(lowest, scenario.floor)
         gaps = scenario.ceiling - lowest
@@ -84,6 +87,39 @@ def _walls(scenario: Scenario) -> list[str]:
             lines.append(f"terrain and missiles together close the way {along:.0f} m from the start, at every height")
             break
     return lines
+
+
+def _lines_across(scenario: Scenario) -> Iterator[tuple[float, np.ndarray]]:
+    """Lines across the map between the ends: how far from the start, m, and places (n, 2) on it."""
+    frame = rotated_frame(scenario.start, scenario.destination)
+    widest = float(np.hypot(*np.diff(scenario.bounds, axis=1)[:, 0]))
+    across = np.linspace(-widest, widest, ACROSS)
+    for along in np.linspace(0.0, frame.length, ALONG)[1:-1]:
+        places = frame.restore(np.column_stack([np.full(ACROSS, along), across, np.zeros(ACROSS)]))[:, :2]
+        inside = ((places >= scenario.bounds[:, 0]) & (places <= scenario.bounds[:, 1])).all(axis=1)
+        if inside.any():
+            yield float(along), places[inside]
+
+
+def _reserve_walls(problem: Problem) -> list[str]:
+    """Where, across the whole map, ground, clearance and what a plan keeps in reserve leave no height."""
+    scenario, data = problem.scenario, problem.certified
+    if scenario.terrain is None:
+        return []
+    (top, name), reserve = highest_allowed(problem), float(data.buffer)
+    length = math.dist(scenario.start[:2], scenario.destination[:2])
+    for along, places in _lines_across(scenario):
+        # Near the ends a plan keeps as much as they leave.
+        if min(along, length - along) < reserve / BUFFER_GROWTH:
+            continue
+        lowest = float(np.nanmin(scenario.terrain.height(places[:, 0], places[:, 1]))) + data.clearance
+        if lowest + reserve > top:
+            return [
+                f"the heights left are too narrow {along:.0f} m from the start, across the whole map: its lowest place,"
+                f" the clearance and a reserve of {reserve:.1f} m take {lowest + reserve:.0f} m, {name} leaves"
+                f" {top:.0f} m"
+            ]
+    return []
 
 
 def _unguarded(scenario: Scenario, places: np.ndarray, lowest: np.ndarray) -> bool:

@@ -11,7 +11,7 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
 from planner.search.algorithms import find_algorithm
 from planner.search.limits_for import limits_for
-from planner.search.other_sides import has_safe, search_other_sides
+from planner.search.other_sides import search_other_sides, shorten_best
 from planner.search.path_generations import path_generations
 from planner.search.score_table import no_scores
 from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition
@@ -106,7 +106,7 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
             _attempt(search, number, previous)
         except SearchEnded:
             search.note()
-        found = search.best_certified()
+        found = search.best_path()
         # An earlier attempt's is kept where a later one has nothing better.
         if best is None or (found[1].ok, found[1].kill_distance) > (best[1].ok, best[1].kill_distance):
             best = found
@@ -172,11 +172,21 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
     last = None
     if algorithm.optimiser == "waypoints":
         # Where other sides have been looked at and a path is safe, generations shorten it by ten-thousandths.
-        if not (algorithm.seeded and has_safe(search)):
+        if not (algorithm.seeded and search.has_safe()):
             waypoint_generations(search, population, table.generations)
     else:
         last = path_generations(search, population, table.generations, starts)
     if algorithm.tightened and search.ended == "completed":
+        _finish(search, last)
+
+
+def _finish(search: Search, last: Floats | None) -> None:
+    """Shorten or tighten the best path, and the vector (d,) that generations came to, if there were any."""
+    if search.shortens:
+        if last is not None:
+            search.shorten(search.encoding.decode(last[None])[0])
+        shorten_best(search)
+    if search.shortest is None:
         # What the generations came to, tightened, may be another way than the improved seed's.
         if last is not None:
             search.tighten(last, LAST_ROUNDS, 0.5, LAST_SEARCH)
@@ -184,5 +194,5 @@ def _attempt(search: Search, number: int, previous: Floats | None) -> None:
             if search.over():
                 break
             search.tighten(search.archive.vectors[0], LAST_ROUNDS, scale, LAST_SEARCH)
-        search.note()
-        search.report(0)
+    search.note()
+    search.report(0)

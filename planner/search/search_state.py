@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from planner.airspace.airspace_arrays import is_limited
+from planner.evaluation.airspace_scores import airspace_counts
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
@@ -15,6 +17,7 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
 from planner.plan import Certificate, Violation
 from planner.search.algorithms import Algorithm
 from planner.search.score_table import KILL, LENGTH, best_first, no_scores, safe, score_table, violated
+from planner.seeding.path_shortening import MOST_MODELS, shorten
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
@@ -26,8 +29,15 @@ Improved = Callable[[Floats], None]
 
 # Paths that are kept.
 ARCHIVE_SIZE = 24
+# Room beside spheres and above ground that a path is shortened with until it is certified, m.
+SPARES = (0.1, 2.0)
 # Waypoints of paths that are evaluated before the search may end: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
+
+
+def path_length(path: Floats) -> float:
+    """Length of a path (w, 3), m."""
+    return float(np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum())
 
 
 class SearchEnded(Exception):
@@ -83,6 +93,7 @@ class Search:
     ended: why the search ended.
     history: after each generation length ratio, kill exposure and violations of the best path yet.
     certificates: by the path's vector.
+    shortest: the shortest finished path (w, 3) that shortening came to, and its certificate; no interval holds it.
     """
 
     problem: Problem
@@ -100,6 +111,7 @@ class Search:
     ended: str = "completed"
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
+    shortest: tuple[Floats, Certificate] | None = None
 
     def __post_init__(self) -> None:
         """Begin with nothing."""
@@ -108,8 +120,13 @@ class Search:
     def score(self, vectors: Floats) -> Floats:
         """Scores (n, 8) of vectors (n, d), of which neither archive nor budget takes note."""
         paths = np.ascontiguousarray(self.encoding.decode(vectors))
-        evaluate = graded_scores if self.algorithm.graded else paper_scores
-        return score_table(*evaluate(self.problem.search, paths))
+        data = self.problem.search
+        if self.algorithm.graded:
+            return score_table(*graded_scores(data, paths))
+        counts, objectives = paper_scores(data, paths)
+        if is_limited(data.airspace):
+            counts[:, Violation.BOUNDS] += airspace_counts(data, paths)
+        return score_table(counts, objectives)
 
     def evaluate(self, vectors: Floats) -> Floats:
         """Scores (n, 8) of vectors (n, d); the archive takes them.  Raises SearchEnded when asked to end."""
@@ -139,7 +156,10 @@ class Search:
         before = self.archive.vectors[:1]
         self.archive.take(vectors, scores)
         best = self.archive.vectors[:1]
-        if self.improved is not None and self.archive.feasible() and not np.array_equal(before, best):
+        if self.improved is None or not self.archive.feasible() or np.array_equal(before, best):
+            return
+        ratio = self.archive.scores[0][LENGTH]
+        if self.shortest is None or ratio * self._straight() < path_length(self.shortest[0]):
             self.improved(self.encoding.decode(best)[0])
 
     def improve(self, vector: Floats, most: int) -> Floats:
@@ -159,6 +179,28 @@ class Search:
         self.evaluations += made
         return self.improve(moved, most)
 
+    @property
+    def shortens(self) -> bool:
+        """Whether paths are shortened free of their intervals: not among zones, which shortening does not see."""
+        return self.algorithm.tightened and not is_limited(self.problem.search.airspace)
+
+    def shorten(self, path: Floats) -> bool:
+        """Shorten a path (w, 3) and keep what comes of it if it is the shortest finished one; whether it is."""
+        for spare in SPARES:
+            if self._budget() - self.evaluations < MOST_MODELS:
+                return False
+            path, made = shorten(self.problem.search, path, spare=spare, pause=self.pause)
+            self.evaluations += made
+            if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
+                return False
+            certificate = certify(self.problem, path)
+            if self.finished(certificate):
+                self.shortest = path, certificate
+                if self.improved is not None:
+                    self.improved(path)
+                return True
+        return False
+
     def over(self) -> bool:
         """Whether the search is to end now."""
         if self.evaluations >= self._budget():
@@ -173,9 +215,24 @@ class Search:
 
     def safe_already(self) -> bool:
         """Whether the first safe path was asked for, and is there."""
-        if not self.first_safe or not self.archive.feasible():
+        if not self.first_safe or (self.shortest is None and not self.archive.feasible()):
             return False
-        return self.finished(self.best_certified()[1])
+        return self.shortest is not None or self.finished(self.best_certified()[1])
+
+    def has_safe(self) -> bool:
+        """Whether a path is known that violates nothing and is exposed to no missile."""
+        return self.shortest is not None or (len(self.archive.scores) > 0 and self.best_is_safe())
+
+    def _straight(self) -> float:
+        return math.dist(self.problem.space.start, self.problem.space.destination)
+
+    def length_ratio(self) -> float:
+        """Length ratio of the best path yet."""
+        ratio = float(self.archive.scores[0][LENGTH])
+        if self.shortest is None:
+            return ratio
+        shortest = path_length(self.shortest[0]) / self._straight()
+        return min(ratio, shortest) if self.best_is_safe() else shortest
 
     def finished(self, certificate: Certificate) -> bool:
         """Whether a path of this certificate is what the search is for."""
@@ -190,14 +247,19 @@ class Search:
         best = self.archive.scores[0]
         violations = best[: len(Violation)]
         count = np.count_nonzero(violations) if self.algorithm.graded else violations.sum()
-        self.history.append((best[LENGTH], best[KILL], float(count)))
+        safe_one = self.shortest is not None
+        row = (self.length_ratio(), 0.0, 0.0) if safe_one else (best[LENGTH], best[KILL], float(count))
+        self.history.append(row)
 
     def report(self, left: int) -> None:
         """Tell how far the search has come; left: generations that may follow."""
         if self.progress is not None:
             best = self.archive.scores[0]
-            remark = f"length ratio {best[LENGTH]:.4f}, kill exposure {best[KILL]:.3g}"
-            self.progress(self.done, self.done + left, "no feasible path yet" if violated(best) else remark)
+            remark = f"length ratio {self.length_ratio():.4f}, kill exposure {best[KILL]:.3g}"
+            if self.shortest is not None:
+                remark = f"length ratio {self.length_ratio():.4f}, kill exposure 0"
+            none_yet = self.shortest is None and violated(best)
+            self.progress(self.done, self.done + left, "no feasible path yet" if none_yet else remark)
 
     def best_certified(self) -> tuple[Floats, Certificate]:
         """First of the archive that is certified and out of range; or certified and farthest; or the first."""
@@ -216,6 +278,15 @@ class Search:
         if result is None:  # pragma: no cover - an archive is never empty after an attempt
             raise ScenarioError(f"{self.problem.scenario.name}: planner: nothing was evaluated")
         return result
+
+    def best_path(self) -> tuple[Floats, Certificate]:
+        """The shortest of the certified path of the archive and of the shortened one."""
+        found = self.best_certified()
+        if self.shortest is None or (
+            self.finished(found[1]) and path_length(found[0]) <= path_length(self.shortest[0])
+        ):
+            return found
+        return self.shortest
 
     def _certificate(self, vector: Floats, path: Floats) -> Certificate:
         """Certificate of a vector's path: the same in all attempts, so it is made once."""

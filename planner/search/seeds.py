@@ -11,6 +11,7 @@ from planner.search.score_table import best_first, safe
 from planner.search.search_state import Search
 from planner.seeding.airspace_routes import airspace_routes
 from planner.seeding.grid_routes import GridRoute, grid_routes
+from planner.seeding.path_shortening import evenly
 from planner.seeding.waypoint_fitting import QUICK, fit_waypoints
 
 Floats = NDArray[np.float64]
@@ -56,6 +57,8 @@ def starting_vectors(search: Search, grids: tuple[tuple[int, int], ...], previou
     effort = BAND_EFFORT if math.isfinite(airspace.max_height) else 1
     # Among zones no other sides are looked for: all the routes are followed.
     followed = math.inf if is_limited(airspace) else FOLLOWED
+    if search.shortens and search.algorithm.optimiser == "waypoints":
+        followed = 0
     for number, route in enumerate(_routes(search, grids) if search.algorithm.seeded else ()):
         if search.over() or search.safe_already() or (number >= followed and search.best_is_safe()):
             break
@@ -79,8 +82,14 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
     frame = rotated_frame(space.start, space.destination)
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     found, scores = [], []
+    followed_free = search.shortens and search.algorithm.optimiser == "waypoints" and not search.first_safe
     routes = airspace_routes if is_limited(data.airspace) else grid_routes
     for route in routes(data, frame, span, grids):
+        if followed_free and search.has_safe():
+            search.shorten(evenly(frame.restore(route.points), encoding.waypoints))
+            if search.over():
+                break
+            continue
         found.append(route)
         path = fit_waypoints(data, frame, route.points, encoding.waypoints, QUICK)
         vectors = rotated_vectors(space, encoding, path[None])

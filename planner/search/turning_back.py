@@ -4,15 +4,18 @@ The straight frame holds no path that gets further from the destination along th
 route that may; a frame along that route then holds paths about it, and they are fitted and tightened as elsewhere.
 """
 
+from contextlib import suppress
+
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.encoding import Encoding, along_route, frames_of, rotated_frame
 from planner.frames.waypoint_frames import spread_over
 from planner.plan import Certificate
-from planner.search.score_table import LENGTH
-from planner.search.search_state import Search
+from planner.search.other_sides import shorten_best
+from planner.search.search_state import Search, SearchEnded, path_length
 from planner.seeding.lattice_routes import lattice_route, turning_step
+from planner.seeding.path_shortening import evenly
 from planner.seeding.waypoint_fitting import CLOSE, fit_points
 
 Floats = NDArray[np.float64]
@@ -23,9 +26,9 @@ LONG_WAY = 1.25
 STEPS = (1.0, 0.6)
 # A route is followed if it is shorter than this share of the best safe path.
 WORTH = 0.99
-# Evaluations that a path along a route is improved with, at first and after each move of all its waypoints; and these
-# moves, each of so many rounds, as shares of the first that fit it.
-FIRST_SEARCH, LATER_SEARCH = 2000, 600
+# Searches at first, and evaluations of each and after each move of all waypoints, that a path along a route is improved
+# with before it is shortened; and these moves, each of so many rounds, as shares of the first that fit it.
+FIRST_SEARCHES, FIRST_SEARCH, LATER_SEARCH = 4, 500, 600
 MOVES, ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 
 
@@ -35,7 +38,7 @@ def may_turn_back(search: Search, certificate: Certificate) -> bool:
         return False
     if not search.finished(certificate):
         return True
-    return bool(search.archive.scores[0][LENGTH] > LONG_WAY)
+    return search.length_ratio() > LONG_WAY
 
 
 def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tuple[Floats, Certificate]:
@@ -45,22 +48,21 @@ def search_turning_back(search: Search, found: tuple[Floats, Certificate]) -> tu
     for share in STEPS:
         if search.over():
             break
-        route = lattice_route(data, frame, share * step)
+        try:
+            route = lattice_route(data, frame, share * step, search.pause)
+        except SearchEnded:
+            break
         if not len(route):
             continue
         safe_already = search.finished(found[1])
-        if safe_already and _length(route) > WORTH * _length(found[0]):
+        if safe_already and path_length(route) > WORTH * path_length(found[0]):
             break
         path, certificate = _search_along(search, route)
-        if search.finished(certificate) and (not safe_already or _length(path) < _length(found[0])):
+        if search.finished(certificate) and (not safe_already or path_length(path) < path_length(found[0])):
             return path, certificate
         if not safe_already and (certificate.ok, certificate.kill_distance) > (found[1].ok, found[1].kill_distance):
             found = path, certificate
     return found
-
-
-def _length(path: Floats) -> float:
-    return float(np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum())
 
 
 def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
@@ -74,13 +76,27 @@ def _search_along(search: Search, route: Floats) -> tuple[Floats, Certificate]:
     )  # fmt: skip
     path = fit_points(inner.problem.search, frames_of(encoding), _places(route, encoding), CLOSE)
     vector = np.clip(frames_of(encoding).rotate(path[1:-1]).ravel(), encoding.lower, encoding.upper)
-    inner.improve(vector, FIRST_SEARCH)
+    with suppress(SearchEnded):
+        _improve_along(inner, vector, (path, route))
+    search.evaluations, search.ended = inner.evaluations, inner.ended
+    return inner.best_path()
+
+
+def _improve_along(inner: Search, vector: Floats, ways: tuple[Floats, ...]) -> None:
+    """Work on the path of a vector (d,), then shorten it and ways (k, 3): a bound climb either may end short of."""
+    inner.evaluate(vector[None])
+    for _ in range(FIRST_SEARCHES):
+        if inner.over() or inner.safe_already():
+            return
+        inner.improve(inner.archive.vectors[0], FIRST_SEARCH)
     for scale in MOVES:
         if inner.over() or inner.safe_already():
-            break
+            return
         inner.tighten(inner.archive.vectors[0], ROUNDS, scale, LATER_SEARCH)
-    search.evaluations, search.ended = inner.evaluations, inner.ended
-    return inner.best_certified()
+    if inner.shortens:
+        for way in ways:
+            inner.shorten(evenly(way, inner.encoding.waypoints))
+        shorten_best(inner)
 
 
 def _places(route: Floats, encoding: Encoding) -> Floats:

@@ -51,15 +51,23 @@ def layers_a_step(
 
 
 @compiled
-def _relax(
-    cost: Floats, price: Floats, after: Floats, came: Codes, start: int, end: int, count: int, length: float
+def relax(
+    cost: Floats,
+    price: Floats,
+    after: Floats,
+    came: Codes,
+    start: int,
+    end: int,
+    priced: int,
+    count: int,
+    length: float,
 ) -> None:  # pragma: no cover - compiled
-    """One move from `count` cells beside each other to as many; all arrays flat."""
+    """One move from `count` cells beside each other to as many, at the prices of cells from `priced`; all flat."""
     for k in range(count):
         # Unsigned, or numba would look whether each index counts from the end; and without a branch.  So this, the
         # innermost loop, takes several cells at once.
         i, j = np.uintp(start) + np.uintp(k), np.uintp(end) + np.uintp(k)
-        total = cost[i] + length * price[j]
+        total = cost[i] + length * price[np.uintp(priced) + np.uintp(k)]
         better = total < after[j]
         after[j] = total if better else after[j]
         came[j] = start + k if better else came[j]
@@ -95,7 +103,8 @@ def step_on(
             bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
             for z2 in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
-                _relax(flat, flat_price, flat_after, flat_came, z * wide + a, z2 * wide + a + side, b - a, length)
+                here, there = z * wide + a, z2 * wide + a + side
+                relax(flat, flat_price, flat_after, flat_came, here, there, there, b - a, length)
 
 
 @compiled

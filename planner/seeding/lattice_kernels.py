@@ -141,15 +141,26 @@ def _take_steps(
                 heapq.heappush(open_states, (total + away, code))
 
 
-@compiled
-def cheapest_lattice_route(
-    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, most_states: int
-) -> Records:  # pragma: no cover - compiled
-    """`LATTICE_CELL` records of the cheapest route from start to destination; none where there is none.
+class LatticeSearch(NamedTuple):
+    """A search under way: what it knows of states, and those that are open, in the order of a heap.
 
-    courses: by which one step may differ from the last, in eighths of a circle.  most_states: that are looked at.
+    costs, states: (k,) of the open states.  seen: states that were looked at.  found: the state at the destination, or
+    -1.
     """
-    limits, rises = precompute_limits(data), _rises(data, frame, lattice)
+
+    reached: _Reached
+    costs: Floats
+    states: Codes
+    seen: int
+    found: int
+
+
+@compiled
+def begin_lattice_search(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice
+) -> LatticeSearch:  # pragma: no cover - compiled
+    """The search for a route from start to destination before its first step."""
+    rises = _rises(data, frame, lattice)
     size = lattice.along * lattice.across * lattice.layers * 8
     width = np.max(rises[:, 0]) + np.max(rises[:, 1]) + 1
     reached = _Reached(
@@ -160,24 +171,41 @@ def cheapest_lattice_route(
         np.zeros(size * width, dtype=np.int8),
     )
     first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
+    asked = _asked_course(frame, data.start_course)
+    states = np.arange(first, first + 8) if asked < 0 else np.array([first + asked])
+    for state in states:
+        reached.cost[state] = 0.0
+    return LatticeSearch(reached, np.zeros(states.size), states, 0, -1)
+
+
+@compiled
+def go_on(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, most: int
+) -> LatticeSearch:  # pragma: no cover - compiled
+    """The search after a look at up to so many more states; where none is open any more it is over.
+
+    courses: by which one step may differ from the last, in eighths of a circle.
+    """
+    limits, reached, seen = precompute_limits(data), search.reached, search.seen
     last = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
-    asked, wanted = _asked_course(frame, data.start_course), _asked_course(frame, data.destination_course)
-    open_states = [(0.0, first + max(0, asked))]
-    for course in range(8):
-        if asked < 0 or course == asked:
-            reached.cost[first + course] = 0.0
-            heapq.heappush(open_states, (0.0, first + course))
-    seen = 0
-    while len(open_states) > 0 and seen < most_states:
+    wanted = _asked_course(frame, data.destination_course)
+    # A heap's own order stays one, so that what is handed on needs no sorting.
+    open_states = [(search.costs[k], search.states[k]) for k in range(search.states.size)]
+    found = -1
+    while len(open_states) > 0 and seen < search.seen + most:
         _, state = heapq.heappop(open_states)
         if reached.done[state]:
             continue
         reached.done[state] = True
         seen += 1
         if state // 8 == last and (wanted < 0 or abs((state % 8 - wanted + 4) % 8 - 4) <= courses):
-            return _traced(reached.came, state, lattice)
+            found = state
+            break
         _take_steps(data, limits, frame, lattice, reached, state, courses, open_states)
-    return np.zeros(0, dtype=LATTICE_CELL)
+    costs, states = np.empty(len(open_states)), np.empty(len(open_states), dtype=np.int64)
+    for k in range(len(open_states)):
+        costs[k], states[k] = open_states[k]
+    return LatticeSearch(reached, costs, states, seen, found)
 
 
 @compiled
@@ -198,7 +226,7 @@ def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - c
 
 
 @compiled
-def _traced(came: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
+def traced(came: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
     """`LATTICE_CELL` records from the start to a state."""
     count, state = 0, found
     while state >= 0:

@@ -1,6 +1,7 @@
 """Routes that may turn back and go round to climb: over a lattice of places, heights and courses, pulled taut."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,8 @@ from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.leg_geometry import settling_length
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.lattice_kernels import Lattice, cheapest_lattice_route, pulled_taut
+from planner.seeding.lattice_kernels import LATTICE_CELL, Lattice, begin_lattice_search, go_on, pulled_taut, traced
+from world.kernels import Records
 
 Floats = NDArray[np.float64]
 
@@ -20,6 +22,8 @@ LEAST_STEP, LONGEST_STEP = 100.0, 2000.0
 LAYERS_A_STEP = 2
 # States of a lattice, and how many of them are looked at, at most.
 MOST_LATTICE, MOST_STATES = 4_000_000, 600_000
+# States that are looked at before the caller may end the work: some 10 ms.
+STATES_AT_ONCE = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
@@ -60,12 +64,38 @@ def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Latti
     return Lattice(step, behind, right, along, across, behind + stages, start, pitch, layers, below, goal_layer)
 
 
-def lattice_route(data: ProblemArrays, frame: RotatedFrame, step: float) -> Floats:
-    """World points (k, 3) of a route from start to destination over a lattice of this step (m); (0, 3) for none."""
+def cheapest_lattice_route(
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    lattice: Lattice,
+    courses: int,
+    most_states: int,
+    pause: Callable[[], None] = lambda: None,
+) -> Records:
+    """`LATTICE_CELL` records of the cheapest route from start to destination; none where there is none.
+
+    courses: by which one step may differ from the last, in eighths of a circle.  most_states: that are looked at.
+    """
+    search = begin_lattice_search(data, frame, lattice)
+    while search.found < 0 and len(search.states) and search.seen < most_states:
+        search = go_on(data, frame, lattice, courses, search, min(STATES_AT_ONCE, most_states - search.seen))
+        pause()
+    if search.found < 0:
+        return np.zeros(0, dtype=LATTICE_CELL)
+    return traced(search.reached.came, search.found, lattice)
+
+
+def lattice_route(
+    data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None] = lambda: None
+) -> Floats:
+    """World points (k, 3) of a route from start to destination over a lattice of this step (m); (0, 3) for none.
+
+    pause: called after every `STATES_AT_ONCE` states; what it raises ends the work.
+    """
     lattice = make_lattice(data, frame, step)
     # Right angles at most, where the limits allow them; a way of eight courses has eighths of a circle at least.
     courses = 2 if data.max_turn >= math.radians(90.0) else 1
-    cells = cheapest_lattice_route(data, frame, lattice, courses, MOST_STATES)
+    cells = cheapest_lattice_route(data, frame, lattice, courses, MOST_STATES, pause)
     if not len(cells):
         return np.empty((0, 3))
     places = np.column_stack([cells["along"], cells["across"]]) * lattice.step

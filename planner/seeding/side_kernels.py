@@ -20,6 +20,7 @@ from planner.seeding.grid_kernels import (
     SPAN,
     layers_a_step,
     prune,
+    relax,
     step_on,
     trace_back,
     way_ahead,
@@ -53,20 +54,6 @@ class GridCosts(NamedTuple):
 
 
 @compiled
-def _relax_back(
-    left: Floats, price: Floats, before: Floats, went: Codes, start: int, end: int, count: int, length: float
-) -> None:  # pragma: no cover - compiled
-    """One move back from `count` cells beside each other, at `end`, to as many at `start`; all arrays flat."""
-    for k in range(count):
-        # Unsigned, or numba would look whether each index counts from the end.
-        i, j = np.uintp(start) + np.uintp(k), np.uintp(end) + np.uintp(k)
-        total = left[j] + length * price[j]
-        better = total < before[i]
-        before[i] = total if better else before[i]
-        went[i] = end + k if better else went[i]
-
-
-@compiled
 def _step_back(
     left: Floats,
     price: Floats,
@@ -96,7 +83,8 @@ def _step_back(
             bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
             for z2 in range(bottom, top + 1):
                 length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
-                _relax_back(flat, flat_price, flat_before, flat_went, z * wide + a, z2 * wide + a + side, b - a, length)
+                here, after = z * wide + a, z2 * wide + a + side
+                relax(flat, flat_price, flat_before, flat_went, after, here, after, b - a, length)
 
 
 @compiled

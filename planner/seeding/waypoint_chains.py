@@ -208,7 +208,7 @@ def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
     return math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
 
 
-@inlined
+@compiled
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:  # pragma: no cover - compiled

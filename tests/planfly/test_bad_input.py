@@ -135,6 +135,23 @@ MISSIONS = {
     "deep.json": "[" * 100_000,
 }
 
+# Fences named beside a mission that is well.
+FENCES = {
+    "empty.fence": "",
+    "none.waypoints": WAY,
+    "bow.fence": MISSIONS["bow.waypoints"],
+    "circle.fence": MISSIONS["circle.waypoints"],
+    "open.fence": "36.5 -84.2\n36.6 -84.2\n36.6 -84.1\n36.5 -84.1\n",
+    "comma.txt": "36.5,-84.2\n",
+    "column.txt": "36.5\n",
+    "nan.fence": "nan nan\n" * 5,
+    "far.fence": "136.5 -84.2\n" * 5,
+    "zone.plan": ZONE_FILES["bow.geojson"],
+    "fence.kmz": "PK",
+    "fence.rally": "QGC WPL 110\n0\t0\t3\t5100\t0\t0\t0\t0\t36.5\t-84.1\t50\t1\n",
+    **ZONE_FILES,
+}
+
 LOGS = {
     "empty.mcap": b"",
     "text.mcap": b"this is not a log\n" * 20,
@@ -187,6 +204,15 @@ def test_a_malformed_mission(name: str, command: str, tmp_path: Path, capsys: py
     assert name in refused([command, name], tmp_path, capsys)
 
 
+@pytest.mark.parametrize("name", FENCES)
+@pytest.mark.parametrize("command", [["check"], ["fly"], ["serve"], ["export"]])
+def test_a_malformed_fence(name: str, command: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / name).write_text(FENCES[name], encoding="utf-8")
+    (tmp_path / "well.waypoints").write_text(WAY, encoding="utf-8")
+    targets = ["out.plan"] if command == ["export"] else []
+    assert name in refused([*command, "well.waypoints", *targets, "--fence", name], tmp_path, capsys)
+
+
 @pytest.mark.parametrize("name", LOGS)
 @pytest.mark.parametrize("command", ["check", "replay", "report"])
 def test_a_malformed_log(name: str, command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -202,6 +228,8 @@ def test_a_malformed_log(name: str, command: str, tmp_path: Path, capsys: pytest
         ["export", "missing.json", "out.plan"],
         ["fly", "missing.waypoints"],
         ["check", "missing.mcap"],
+        ["check", "nowhere.waypoints", "--fence", "missing.fence"],
+        ["check", "nowhere.waypoints", "--fence", "missing.kml"],
         ["replay", "missing.mcap"],
         ["report", "missing.mcap"],
     ],

@@ -11,7 +11,9 @@ from flight.ardupilot.parameters import default_parameters, load_parameters
 from flight.simulation.flight_setup import FlightSetup
 from logs.recording.reader import read_log
 from logs.verdict.findings import verdict_json
+from logs.verdict.wording import deciding_text
 from planfly.airframe import load_airframe
+from planfly.commands.served_flights import ServedLog
 from planfly.flights_beside import airframe_answer, find_deciding_parameter
 from planfly.pipeline import JudgedFlight, fly_and_judge
 from planfly.terminal.stored_logs import judge_log
@@ -64,6 +66,19 @@ def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path])
     second = judged.verdict.lines[1]
     assert second.startswith("The aircraft can, ArduPlane with these parameters cannot: TECS_HDEM_TCONST 3 puts it ")
     assert second.endswith(f"m low on leg 1; {deciding.passing:g} would pass")
+
+
+def test_a_served_flight_tells_stations_which_parameter_decides(
+    flown: tuple[JudgedFlight, Path], tmp_path: Path
+) -> None:
+    judged, _ = flown
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
+    served.write(judged.track)
+    told = served.finish(judged.ended)
+    deciding = judged.verdict.deciding
+    assert deciding is not None
+    assert not told.flyable
+    assert deciding_text(deciding) in [text.text for text in told.texts]
 
 
 def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:

@@ -1,14 +1,24 @@
 """A changed scenario is one that a file may have, and goes through JSON and back."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.world.made.made_scenario import made_spec, same_scenario
+from world.airspace.zone_tables import ZoneTable
 from world.errors import ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
-from world.scenario_variants import fixed_ends, over_terrain, with_flight, with_planner, with_threats, with_wind
+from world.scenario_variants import (
+    fixed_ends,
+    over_terrain,
+    with_flight,
+    with_planner,
+    with_threats,
+    with_wind,
+    with_zones,
+)
 
 
 @pytest.fixture
@@ -70,3 +80,31 @@ def test_ends_keep_their_heights_above_the_sea_whatever_is_below() -> None:
     assert np.array_equal(after.start, before.start)
     assert np.array_equal(after.destination, before.destination)
     assert np.array_equal(after.bounds, before.bounds)
+
+
+@pytest.mark.parametrize(("radius", "held"), [(995.0, False), (1005.0, True)])
+def test_more_zones_hold_no_end_but_of_a_scenario_made_around_a_mission(
+    scenario: Scenario, radius: float, held: bool
+) -> None:
+    """A cylinder 1 km beside the start, as wide as nearly that, or a little more."""
+    east, north = float(scenario.start[0]), float(scenario.start[1]) + 1000.0
+    tables = [ZoneTable(name="mill", kind="exclusion", east_m=east, north_m=north, radius_m=radius)]
+    external = replace(scenario, external=True)
+    made = with_zones(external, tables, "mills.geojson")
+    assert [zone.name for zone in made.zones] == ["mill"]
+    again = from_spec(made.to_json(), "a log", ground=made.terrain, external=True)
+    assert again.zones == made.zones
+    if held:
+        with pytest.raises(ScenarioError, match=r"mills\.geojson: zones: mill: start lies inside"):
+            with_zones(scenario, tables, "mills.geojson")
+    else:
+        assert with_zones(scenario, tables, "mills.geojson").zones == made.zones
+
+
+def test_zones_are_counted_with_those_that_are_there(scenario: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("world.scenario_variants.MOST_ZONES", 2)
+    tables = [ZoneTable(name="mill", kind="exclusion", east_m=9000.0, north_m=9000.0, radius_m=5.0)]
+    two = with_zones(with_zones(scenario, tables, "a"), tables, "b")
+    assert len(two.zones) == 2
+    with pytest.raises(ScenarioError, match="c: 1 zones more: at most 2 in all"):
+        with_zones(two, tables, "c")

@@ -10,6 +10,8 @@ from world.airspace.zone_tables import MOST_ZONES, ZoneTable
 from world.errors import ScenarioError
 from world.scenario_file import checked_table
 
+_READERS = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
+SUFFIXES = tuple(_READERS)
 # Bytes of a file at most.
 MOST_BYTES = 16 * 2**20
 
@@ -32,9 +34,17 @@ def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
     """Read the zones of a file, GeoJSON or KML by its suffix.
 
     source: names it in messages.  Raises ScenarioError for a file that cannot be read, and for a zone that is none.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "lake.geojson"
+    ...     _ = path.write_text(
+    ...         '{"type": "Polygon", "coordinates": [[[8, 46], [8.01, 46], [8.01, 46.01], [8, 46]]]}', encoding="ascii"
+    ...     )
+    ...     [(zone.name, zone.kind) for zone in read_zone_file(path, "a file")]
+    [('zone 1', 'exclusion')]
     """
-    readers = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
-    reader = readers.get(path.suffix.lower())
+    reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise ScenarioError(f"{source}: suffix {path.suffix!r}: a file of zones is .geojson, .json or .kml")
     tables = []

@@ -65,15 +65,25 @@ def zone_records(zones: Sequence[Zone]) -> ZoneRecords:
             record.west, record.east = shape.east - shape.radius, shape.east + shape.radius
             record.south, record.north = shape.north - shape.radius, shape.north + shape.radius
         else:
-            easts, norths = zip(*(corner for ring in shape.rings for corner in ring), strict=True)
-            record.west, record.east, record.south, record.north = min(easts), max(easts), min(norths), max(norths)
             rings += shape.rings
-            first += len(easts)
+            first += sum(map(len, shape.rings))
         record.last_edge = first
     edges = _edges(rings)
+    _set_boxes(out, edges)
     for array in (out, edges):
         array.setflags(write=False)
     return ZoneRecords(out, edges)
+
+
+def _set_boxes(zones: Records, edges: Records) -> None:
+    """Fill in the boxes of polygons by their edges."""
+    made = np.flatnonzero(~zones["round"])
+    if made.size:
+        # No polygon is without edges, and their edges follow each other.
+        starts = zones["first_edge"][made]
+        for low, high, name in (("west", "east", "east"), ("south", "north", "north")):
+            zones[low][made] = np.minimum.reduceat(edges[name], starts)
+            zones[high][made] = np.maximum.reduceat(edges[name], starts)
 
 
 def _edges(rings: list[Ring]) -> Records:

@@ -1,6 +1,6 @@
 """The zones that a flight is judged by: those of its scenario, then those of its mission's own fence."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from flight.mission.fence_zones import fence_zones
 from flight.simulation.flight_setup import FlightSetup
@@ -47,3 +47,15 @@ def airspace_of(setup: FlightSetup) -> Airspace:
         fault = str(error)
     zones = (*setup.scenario.zones, *own)
     return Airspace(zones, zone_records(zones), fault, len(setup.scenario.zones))
+
+
+def with_fence_zones(setup: FlightSetup) -> FlightSetup:
+    """The setup with its mission's fence among its scenario's zones, for whatever draws them.
+
+    >>> from logs.recording.example_log import example_log
+    >>> with_fence_zones(example_log().setup).scenario.zones
+    ()
+    """
+    if not setup.mission.fences:
+        return setup
+    return setup.in_scenario(replace(setup.scenario, zones=airspace_of(setup).zones))

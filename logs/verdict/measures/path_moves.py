@@ -52,18 +52,27 @@ def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pra
     )
 
 
-def planned_moves(demands: RouteDemands) -> Records:
-    """Moves of a route's fly-by path, passed at each leg's ground speed, or its airspeed where there is none."""
+def planned_moves(demands: RouteDemands, first: int = 0, last: int | None = None) -> Records:
+    """Moves of a route's fly-by path, passed at each leg's ground speed, or its airspeed where there is none.
+
+    first, last: legs of which they are wanted, default all.
+    """
     speeds = np.where(np.isfinite(demands.ground_speed), demands.ground_speed, demands.route.airspeed)
-    return path_moves(demands.setup.path, speeds)
+    moves = path_moves(demands.setup.path, speeds, first, demands.legs - 1 if last is None else last)
+    return moves[(moves["leg"] >= first) & (moves["leg"] <= (demands.legs if last is None else last))]
 
 
-def path_moves(path: FlyByPath, speeds: Floats) -> Records:
-    """Moves of a fly-by path that is passed at a speed on each leg, (legs,) m/s."""
+def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:
+    """Moves of the pieces of a fly-by path on some legs; their times count from the first of them.
+
+    speeds: (legs,) m/s, at which it is passed.
+    """
     nodes = path.nodes
     breaks = np.concatenate([nodes["distance"] - nodes["half_length"], nodes["distance"] + nodes["half_length"]])
     rows, clock = [], 0.0
     for piece in path.pieces:
+        if piece.leg + 1 < first_leg or piece.leg > last_leg:
+            continue
         start, end = float(piece.start), float(piece.start + piece.length)
         inner = breaks[(breaks > start) & (breaks < end)]
         changes = [piece.leg_change] if start < piece.leg_change < end else []

@@ -79,7 +79,7 @@ class AlignedTrack:
 
 def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     """Lay a track beside a route; None where it has fewer than two usable rows."""
-    good = _usable(track)
+    good = _usable(track, own=demands.setup.source is None)
     if int(good.sum()) < 2:
         return None
     if good.all():
@@ -135,18 +135,24 @@ def approaches(position: Floats, target: Floats) -> tuple[Floats, Floats]:
     return np.hypot(rest[:, 0], rest[:, 1]), fraction
 
 
-def _usable(track: Track) -> NDArray[np.bool_]:
-    """Rows with finite, plausible numbers, later than every usable row before them."""
+def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
+    """Rows with finite, plausible numbers, later than every usable row before them.
+
+    own: the flight is planfly's, which has all numbers in every row; of a log of the field places and velocities count,
+    and each rule looks to what it needs beside them.
+    """
     good = np.isfinite(track.time)
-    for name in ("airspeed", "current", "energy"):
-        good &= np.isfinite(getattr(track, name))
-    for name, largest in (
-        ("position", FARTHEST),
-        ("velocity", FASTEST),
-        ("attitude", MOST_PLAUSIBLE),
-        ("controls", MOST_PLAUSIBLE),
-        ("wind", MOST_PLAUSIBLE),
-    ):
+    plausible: tuple[tuple[str, float], ...] = (("position", FARTHEST), ("velocity", FASTEST))
+    if own:
+        for name in ("airspeed", "current", "energy"):
+            good &= np.isfinite(getattr(track, name))
+        plausible = (
+            *plausible,
+            ("attitude", MOST_PLAUSIBLE),
+            ("controls", MOST_PLAUSIBLE),
+            ("wind", MOST_PLAUSIBLE),
+        )
+    for name, largest in plausible:
         # A NaN is not within any bound.
         good &= (np.abs(getattr(track, name)) <= largest).all(axis=1)
     time = np.where(good, track.time, -math.inf)

@@ -20,7 +20,6 @@ from logs.verdict.measures.zone_parts import (
     farthest_from_outline,
     look_at_zone,
 )
-from logs.verdict.tolerances import FENCE_DEPTH, FENCE_EDGE
 from world.airspace.zone_kernels import ZoneRecords, box_distance
 from world.frames import POLYMAP, PolyMapRecord
 from world.kernels import Record, Records, compiled, record_dtype
@@ -55,8 +54,11 @@ VISIT = record_dtype(
     ("exit_leg", np.int64),
     ("unknown", np.bool_),
 )
-# Parts at a time: halves of halves, of which a way of 1,000 km comes down to `FENCE_EDGE` in 34, the whole move, and
-# one to swap two by.
+# m.  What depths beyond a zone's limit are worked out to, half of what a waypoint is rounded by, and what the places
+# where a path goes in and out are.  Numerical precisions: the verdict tolerates `logs.verdict.tolerances.ROUNDING`.
+DEPTH_PRECISION, EDGE_PRECISION = 0.01, 1e-3
+# Parts at a time: halves of halves, of which a way of 1,000 km comes down to `EDGE_PRECISION` in 34, the whole move,
+# and one to swap two by.
 _MOST_PARTS = 64
 # s.  Two stays that are no further apart are one.
 _TOUCH = 1e-6
@@ -203,9 +205,9 @@ def _cut_move(
         part = parts[left]
         share = part.last - part.first
         run, rise = share * move.length, share * climb
-        enough = 0.0 if ordered else max(visit.depth, known) + FENCE_DEPTH
+        enough = 0.0 if ordered else max(visit.depth, known) + DEPTH_PRECISION
         lowest, highest = between_ends(exclusion, part, run, rise, math.inf)
-        done = highest <= enough or (ordered and lowest > 0.0) or max(run, rise) <= FENCE_EDGE
+        done = highest <= enough or (ordered and lowest > 0.0) or max(run, rise) <= EDGE_PRECISION
         done = done or _is_unknown(exclusion, part)
         if not done:
             # With the edges beside it looked at, which takes longer.

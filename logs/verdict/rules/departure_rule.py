@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import ROLL
-from logs.verdict.findings import Finding, make_finding, message, reason_of
+from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
@@ -21,7 +21,7 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
-    slowest = _slowest(demands, track.position[:, 2])
+    most, slow = _most(bank), _too_slow(demands, aligned)
     faults = []
     if aligned.bad_rows:
         faults.append(
@@ -30,14 +30,13 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
     if (bank > MOST_BANK).any():
         k = int(np.argmax(bank > MOST_BANK))
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
-    if (track.airspeed < slowest).any():
-        k = int(np.argmax(track.airspeed < slowest))
-        faults.append(
-            message(f"airspeed {track.airspeed[k]:.1f} m/s at {track.time[k]:.1f} s, below {slowest[k]:.1f} m/s")
-        )
+    faults += slow
     if (aligned.low <= 0.0).any():
         faults.append(message(f"ground contact at {track.time[int(np.argmax(aligned.low <= 0.0))]:.1f} s"))
-    steady = f"bank at most {math.degrees(bank.max()):.0f}°, airspeed at least {float(track.airspeed.min()):.1f} m/s"
+    least = -_most(-track.airspeed.astype(np.float64))
+    known = [] if math.isnan(most) else [f"bank at most {math.degrees(most):.0f}°"]
+    known += [] if math.isnan(least) else [f"airspeed at least {least:.1f} m/s"]
+    steady = ", ".join(known) or "no ground contact; neither bank nor airspeed is known"
     return [
         make_finding(
             "departure",
@@ -45,15 +44,35 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
             ok=not faults,
             reason=reason_of(faults) if faults else steady,
             faults=faults,
-            flown=math.degrees(bank.max()),
+            flown=math.degrees(most),
             limit=math.degrees(MOST_BANK),
             source="check",
             tolerance=0.0,
-            margin=math.degrees(MOST_BANK - bank.max()),
+            margin=math.degrees(MOST_BANK - most),
             unit="deg",
             method="every row",
         )
     ]
+
+
+def _most(values: Floats) -> float:
+    """The largest number; NaN where there is none."""
+    finite = values[np.isfinite(values)]
+    return float(finite.max()) if finite.size else math.nan
+
+
+def _too_slow(demands: RouteDemands, aligned: AlignedTrack) -> list[Message]:
+    """That the aircraft was too slow to fly; nothing of one that is not known."""
+    source = demands.setup.source
+    if source is not None and not source.aircraft_known:
+        return []
+    track = aligned.track
+    slowest = _slowest(demands, track.position[:, 2])
+    slow = np.flatnonzero(track.airspeed < slowest)
+    if not slow.size:
+        return []
+    k = int(slow[0])
+    return [message(f"airspeed {track.airspeed[k]:.1f} m/s at {track.time[k]:.1f} s, below {slowest[k]:.1f} m/s")]
 
 
 def _time_text(time: float) -> str:

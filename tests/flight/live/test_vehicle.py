@@ -8,6 +8,7 @@ from pathlib import Path
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.flight_process import EndFlight, JudgeMission, StartFlight
+from flight.mission.items import Command, Frame, MissionItem
 from tests.flight.live.fake_vehicle import HEARTBEAT, FakeVehicle, command, packed
 from tests.flight.live.fuzzed_datagrams import fuzzed
 from tests.soak import note, scaled
@@ -49,6 +50,16 @@ def test_a_mission_taken_back_while_it_is_judged_is_not_flown(fake: FakeVehicle)
     fake.send(command(176, 1.0, 10.0))
     assert not fake.vehicle.status.flying
     assert not any(isinstance(order, StartFlight) for order in fake.orders)
+
+
+def test_a_fence_from_a_file_belongs_to_the_mission_that_is_uploaded_next(fake: FakeVehicle) -> None:
+    circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_EXCLUSION, Frame.GLOBAL, (200.0, 0.0, 0.0, 0.0), 46.0, 8.0, 0.0)
+    fake.vehicle.load_fence([circle])
+    fake.turn()
+    assert fake.orders == []
+    fake.upload(many_items(3))
+    assert isinstance(fake.orders[0], JudgeMission)
+    assert fake.orders[0].mission.fences == (circle,)
 
 
 def resident() -> int:

@@ -15,7 +15,7 @@ from logs.recording.reader import read_log
 from logs.recording.recorder import CHUNK_SIZE
 from logs.recording.state_channel import EPOCH_NS
 from tests.logs.made_flight import make_track, record
-from tests.logs.recording.mcap_messages import chunks
+from tests.logs.mcap_messages import chunks
 
 
 @pytest.mark.filterwarnings("ignore:(start|end)_time is deprecated:DeprecationWarning")

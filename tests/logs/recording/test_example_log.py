@@ -5,7 +5,7 @@ from pathlib import Path
 
 from logs.recording.example_log import example_log, write_example_log
 from logs.recording.reader import read_log
-from tests.logs.recording.log_copies import same
+from tests.logs.log_copies import same
 
 
 def test_the_example_comes_back_from_its_file(tmp_path: Path) -> None:

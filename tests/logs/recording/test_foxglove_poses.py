@@ -11,7 +11,7 @@ from logs.recording.chunk_layout import SECOND_NS
 from logs.recording.foxglove_scene import body_rotation
 from logs.recording.state_channel import EPOCH_NS
 from tests.logs.made_flight import make_setup, record
-from tests.logs.recording.mcap_messages import messages
+from tests.logs.mcap_messages import messages
 from world.frames import to_geo
 
 

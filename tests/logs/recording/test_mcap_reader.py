@@ -14,8 +14,8 @@ import zstandard
 
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
+from tests.logs.log_copies import prefix_of, same
 from tests.logs.recording.containers.framing import framed
-from tests.logs.recording.log_copies import prefix_of, same
 from tests.soak import note, scaled
 from world.errors import LogError
 

@@ -14,8 +14,8 @@ from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.recording.state_channel import state_class
+from tests.logs.log_copies import prefix_of, rewrite, same
 from tests.logs.made_flight import make_setup
-from tests.logs.recording.log_copies import prefix_of, rewrite, same
 from world.errors import LogError
 
 

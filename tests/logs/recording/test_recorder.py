@@ -16,7 +16,7 @@ from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
 from logs.recording.state_channel import EPOCH_NS
 from tests.logs.made_flight import make_setup, make_track, record
-from tests.logs.recording.mcap_messages import chunks, messages
+from tests.logs.mcap_messages import chunks, messages
 
 
 def test_the_summary_agrees_with_the_data(log_file: Path, track: Track) -> None:

@@ -20,8 +20,8 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.setup_attachments import pack_setup, unpack_setup
+from tests.logs.log_copies import Attachments, same
 from tests.logs.made_flight import make_setup, record
-from tests.logs.recording.log_copies import Attachments, same
 from world import scenario as scenario_module
 from world.errors import LogError
 from world.scenario import from_spec

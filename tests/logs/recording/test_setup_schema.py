@@ -19,8 +19,8 @@ from logs.recording.setup_schema import (
     read_route,
     route_file,
 )
+from tests.logs.log_copies import same
 from tests.logs.made_flight import make_setup
-from tests.logs.recording.log_copies import same
 from world.errors import LogError
 
 PLAIN = make_setup()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from flight.simulation.track import Track
 from logs.recording.state_channel import EPOCH_NS
-from tests.logs.recording.mcap_messages import messages
+from tests.logs.mcap_messages import messages
 
 
 def test_an_independent_reader_finds_every_row_with_its_values(log_file: Path, track: Track) -> None:

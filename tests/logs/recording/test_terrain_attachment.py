@@ -7,8 +7,8 @@ import pytest
 
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
+from tests.logs.log_copies import same
 from tests.logs.made_flight import make_setup, record
-from tests.logs.recording.log_copies import same
 from world import scenario as scenario_module
 from world.scenario import load_scenario
 

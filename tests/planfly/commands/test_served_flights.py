@@ -12,6 +12,7 @@ from flight.live.status_text import CRITICAL, INFO, WARNING
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
+from logs.verdict.levels import DecidingParameter
 from logs.verdict.places import Place
 from planfly.commands.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
 from tests.logs.made_flight import make_track
@@ -30,6 +31,10 @@ def test_of_a_verdict_the_worst_comes_first_and_the_rest_is_counted() -> None:
     assert texts[0] == ("verdict (geometry): NOT FLYABLE", WARNING)
     assert [text.text for text in texts[1:5]] == [f"slope at leg {k}: too steep" for k in range(4)]
     assert texts[5:] == (("and 2 more findings", WARNING),)
+    late = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.2)
+    decided = verdict_texts("flown", replace(verdict, deciding=late))
+    assert decided[1] == ("TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass", WARNING)
+    assert decided[2:] == texts[1:]
     clean = Verdict((), True, True, ("flyable",), "flown")
     assert verdict_texts("flown", clean) == (("verdict (flown): FLYABLE", INFO),)
 

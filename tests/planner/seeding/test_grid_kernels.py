@@ -11,7 +11,7 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import make_problem
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.grid_kernels import ROUTE_CELL, SIDEWAYS, _relax, cheapest_route, trace_back, way_ahead
+from planner.seeding.grid_kernels import ROUTE_CELL, SIDEWAYS, cheapest_route, relax, trace_back, way_ahead
 from planner.seeding.grid_prices import Grid, Records
 from world.scenario import Scenario
 
@@ -92,13 +92,17 @@ def test_the_way_ahead_is_the_shortest_of_all_ways(left: int) -> None:
 def test_a_move_is_taken_only_where_it_is_cheaper() -> None:
     cost, price = np.array([10.0, 10.0, math.inf, 10.0]), np.array([1.0, 2.0, 1.0, math.inf])
     after, came = np.array([15.1, 19.9, 30.0, math.inf]), np.full(4, -1, dtype=np.int32)
-    _relax(cost, price, after, came, 0, 0, 4, 5.0)
+    relax(cost, price, after, came, 0, 0, 0, 4, 5.0)
     assert after.tolist() == [15.0, 19.9, 30.0, math.inf]
     assert came.tolist() == [0, -1, -1, -1]
     # From cells one place to the left.
-    _relax(cost, price, after, came, 0, 1, 1, 4.0)
+    relax(cost, price, after, came, 0, 1, 1, 1, 4.0)
     assert after[1] == 18.0
     assert came[1] == 0
+    # Back from the second cell to the third, at the second's price.
+    relax(cost, price, after, came, 1, 2, 1, 1, 4.0)
+    assert after[2] == 18.0
+    assert came[2] == 1
 
 
 def test_a_route_is_traced_back_from_its_end() -> None:

@@ -11,7 +11,8 @@ from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import make_problem
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.lattice_kernels import Lattice, cheapest_lattice_route, pulled_taut
+from planner.seeding.lattice_kernels import Lattice, pulled_taut
+from planner.seeding.lattice_routes import cheapest_lattice_route
 from world.kernels import Records
 from world.scenario import Scenario
 

@@ -11,8 +11,16 @@ from aircraft.path_limits import Limits
 from planner.evaluation.certify_kernels import turn_and_roll_lengths
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, make_problem
+from planner.seeding import lattice_routes
 from planner.seeding.lattice_kernels import Lattice
-from planner.seeding.lattice_routes import LEAST_STEP, MOST_LATTICE, lattice_route, make_lattice, turning_step
+from planner.seeding.lattice_routes import (
+    LEAST_STEP,
+    MOST_LATTICE,
+    cheapest_lattice_route,
+    lattice_route,
+    make_lattice,
+    turning_step,
+)
 from world.scenario import Scenario
 
 
@@ -88,3 +96,29 @@ def test_a_route_leaves_a_pocket_and_passes_no_missile(pocket: Problem) -> None:
         for share in np.linspace(0.0, 1.0, 200):
             point = a + share * (b - a)
             assert min(math.dist(point, place) for place in threats.position) > 480.0
+
+
+def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = pocket.search
+    frame = rotated_frame(data.start, data.destination)
+    made = make_lattice(data, frame, 500.0)
+    whole = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
+    asked: list[int] = []
+    monkeypatch.setattr(lattice_routes, "STATES_AT_ONCE", 7)
+    sliced = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
+    assert len(whole) > 0
+    assert len(asked) > 10
+    np.testing.assert_array_equal(whole, sliced)
+    # Not one state more than is allowed: the slices that find it are as many as are needed.
+    needed = 7 * (len(asked) - 1)
+    assert len(cheapest_lattice_route(data, frame, made, 2, needed)) == 0
+    assert len(cheapest_lattice_route(data, frame, made, 2, needed + 7)) == len(whole)
+
+
+def test_what_a_pause_raises_ends_the_search(pocket: Problem) -> None:
+    def end() -> None:
+        raise KeyboardInterrupt
+
+    data = pocket.search
+    with pytest.raises(KeyboardInterrupt):
+        lattice_route(data, rotated_frame(data.start, data.destination), 500.0, end)

@@ -16,8 +16,8 @@ from logs.recording.messages import log_messages
 from logs.recording.reader import read_log
 from logs.recording.recover import recover_log
 from tests.clients import NODE_MODULES, need
+from tests.logs.log_copies import rewrite, same
 from tests.logs.recording.containers.framing import FRAME, MAGIC, framed
-from tests.logs.recording.log_copies import rewrite, same
 from world.errors import LogError
 
 # Options of mcap's writer for Python.
@@ -54,7 +54,7 @@ NODE: dict[str, dict[str, bool]] = {
 
 def copy(source: Path, target: Path, **options: Any) -> Path:
     """A log as mcap's own writer makes it, with another profile and a record of metadata."""
-    from tests.logs.recording import log_copies
+    from tests.logs import log_copies
 
     kept = log_copies.Writer
     log_copies.Writer = lambda out: Writer(out, **options)

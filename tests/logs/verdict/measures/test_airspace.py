@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from flight.mission.items import Command, Frame, MissionItem
-from logs.verdict.measures.airspace import airspace_of
+from logs.verdict.measures.airspace import airspace_of, with_fence_zones
 from logs.verdict.places import Place
 from tests.logs.verdict.judging import ROUTE
 from tests.synthetic import make_setup
@@ -33,3 +33,13 @@ def test_a_fence_that_is_none_is_named_and_left_out() -> None:
     airspace = airspace_of(setup)
     assert airspace.zones == ()
     assert airspace.fault == "the mission: fence item 3: radius -1 m: must be above 0"
+
+
+def test_what_draws_zones_has_the_fence_among_them() -> None:
+    setup = make_setup(ROUTE)
+    assert with_fence_zones(setup) is setup
+    mast = Zone("mast", "exclusion", Cylinder(0.0, 0.0, 9.0))
+    setup = replace(setup, scenario=replace(setup.scenario, zones=(mast,)))
+    fenced = with_fence_zones(replace(setup, mission=replace(setup.mission, fences=(circle(0, 500.0),))))
+    assert [zone.name for zone in fenced.scenario.zones] == ["mast", "fence item 0"]
+    assert [zone.name for zone in setup.scenario.zones] == ["mast"]

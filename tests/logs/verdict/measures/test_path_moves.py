@@ -1,6 +1,7 @@
 """Moves of a path: they join, they lie on legs and arcs by plain geometry, and their heights are the profile's."""
 
 import math
+from dataclasses import fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -25,6 +26,8 @@ def test_a_paths_moves_join() -> None:
     np.testing.assert_allclose(move_point(moves[0], 0.0), CORNER[0], atol=1e-9)
     np.testing.assert_allclose(move_point(moves[-1], 1.0), CORNER[-1], atol=1e-6)
     assert set(moves["leg"]) == {0, 1}
+    # In still air at 25 m/s.
+    np.testing.assert_allclose(moves["length"], 25.0 * moves["lasts"], rtol=1e-9)
     assert float(moves["length"].sum()) == pytest.approx(demands.setup.path.length)
 
 
@@ -70,3 +73,48 @@ def test_a_flights_moves_lead_from_row_to_row() -> None:
     np.testing.assert_array_equal(moves["leg"], np.arange(len(moves)) >= aligned.rows[1])
     for leg in (0, 1):
         np.testing.assert_array_equal(flown_moves(aligned, leg, leg), moves[moves["leg"] == leg])
+
+
+def test_what_came_after_the_last_waypoint_belongs_to_the_last_leg() -> None:
+    setup = make_setup(CORNER)
+    track = fly_path(setup, rate=10.0)
+    count = 30
+    beyond = track.position[-1] + np.arange(1, count + 1)[:, None] * np.array([2.5, 0.0, 0.0])
+    later = track.time[-1] + 0.1 * np.arange(1, count + 1)
+    aligned = lay_track(route_demands(setup), track)
+    assert aligned is not None
+    longer = replace(
+        aligned,
+        track=replace(
+            track,
+            **{
+                name: np.concatenate([column, np.repeat(column[-1:], count, axis=0)])
+                for name, column in ((field.name, getattr(track, field.name)) for field in fields(track))
+                if isinstance(column, np.ndarray) and len(column) == len(track)
+            },
+        ),
+    )
+    longer = replace(
+        longer,
+        track=replace(
+            longer.track,
+            position=np.concatenate([track.position, beyond]),
+            time=np.concatenate([track.time, later]),
+        ),
+    )
+    for moves in (flown_moves(longer), flown_moves(longer, 1, 1)):
+        np.testing.assert_allclose(move_point(moves[-1], 1.0), beyond[-1], atol=1e-9)
+        assert moves[-1].leg == 1
+    before = flown_moves(longer, 0, 0)
+    np.testing.assert_allclose(move_point(before[-1], 1.0), track.position[aligned.rows[1]], atol=1e-9)
+
+
+def test_the_moves_of_some_legs_are_those_of_all_that_are_on_them() -> None:
+    setup = make_setup([[0.0, 0.0, 300.0], [0.0, 2000.0, 400.0], [2000.0, 2000.0, 400.0], [2000.0, 4000.0, 400.0]])
+    demands = route_demands(setup)
+    every = planned_moves(demands)
+    for first, last in ((0, 0), (1, 1), (1, 2), (2, 2)):
+        some = planned_moves(demands, first, last)
+        wanted = every[(every["leg"] >= first) & (every["leg"] <= last)]
+        for name in ("east", "north", "up", "length", "curvature", "climb", "bend", "lasts", "leg"):
+            np.testing.assert_array_equal(some[name], wanted[name])

@@ -20,6 +20,7 @@ from world.airspace.zone_kernels import ZoneRecords, zone_records
 from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
 from world.frames import POLYMAP
 from world.kernels import Record, Records
+from world.terrain import flat_terrain
 
 NO_GROUND = (np.full((2, 2), np.nan, np.float32), np.zeros(1, POLYMAP)[0])
 
@@ -88,3 +89,63 @@ def test_a_copy_is_the_same() -> None:
         parts[0][name] = k + 1
     copy_part(parts[0], parts[1])
     assert parts[0].tolist() == parts[1].tolist()
+
+
+def ends(away: float, to_away: float, off: float, to_off: float) -> Record:
+    """A part by what is asked of its ends alone."""
+    part: Record = np.zeros(1, PART).view(PART)[0]
+    part.away, part.to_away, part.off, part.to_off = away, to_away, off, to_off
+    return part
+
+
+def test_the_bounds_by_plain_sums() -> None:
+    """A place between two ends is nearest to the limit where the ways from both meet."""
+    part = ends(4.0, 2.0, -3.0, -5.0)
+    # Outline: 2..8 m outside over 10 m of way; band: -9..1 m over 10 m of rise.
+    assert between_ends(False, part, 10.0, 10.0, math.inf) == (max(-2.0, -9.0), max(8.0, 1.0))
+    assert between_ends(True, part, 10.0, 10.0, math.inf) == (min(-8.0, -1.0), min(2.0, 9.0))
+    # No place is further than the edges beside it say.
+    assert between_ends(False, part, 10.0, 10.0, 5.0) == (-2.0, 5.0)
+    assert between_ends(True, part, 10.0, 10.0, 1.5) == (-8.0, 1.5)
+    # In the band's upper part the band decides.
+    low = ends(-9.0, -9.0, -1.0, -1.0)
+    assert between_ends(False, low, 2.0, 4.0, math.inf) == (-3.0, 1.0)
+
+
+def test_over_unknown_ground_the_outline_alone_bounds() -> None:
+    part = ends(4.0, 2.0, math.nan, -5.0)
+    assert between_ends(True, part, 10.0, 10.0, math.inf) == (-math.inf, 2.0)
+    assert between_ends(False, part, 10.0, 10.0, math.inf) == (-2.0, math.inf)
+
+
+@pytest.mark.parametrize(("length", "farthest"), [(2000.0, 250.0), (500.0, 300.0 - math.hypot(50.0, 500.0))])
+def test_through_a_cylinder_the_bound_is_where_the_way_is_nearest_to_its_axis(length: float, farthest: float) -> None:
+    """North-east, 50 m beside the axis after 1,000 m; the shorter way ends 500 m before."""
+    half, side = 1000.0 * math.sqrt(0.5), 50.0 * math.sqrt(0.5)
+    records = zone_records([Zone("z", "exclusion", Cylinder(70.0, -40.0, 300.0))])
+    start = (70.0 - half - side, -40.0 - half + side, 0.0)
+    way: Records = np.array([move(*start, course=45.0, length=length)], MOVE)
+    found = farthest_from_outline(records, 0, way[0], whole(way[0], records), length)
+    assert found == pytest.approx(farthest, abs=1e-9)
+
+
+@pytest.mark.parametrize(("turned", "bounded"), [(0.9, True), (1.1, False)])
+def test_an_arc_is_bounded_by_its_bow_up_to_a_radian(turned: float, bounded: bool) -> None:
+    length = 300.0
+    records = zone_records([Zone("z", "inclusion", Cylinder(0.0, 0.0, 900.0))])
+    way: Records = np.array([move(0.0, 0.0, 0.0, length=length, curvature=turned / length)], MOVE)
+    part = whole(way[0], records)
+    found = farthest_from_outline(records, 0, way[0], part, length)
+    bow = 0.125 * turned / length * length**2
+    assert found == (pytest.approx(max(part.away, part.to_away) + bow) if bounded else math.inf)
+
+
+@pytest.mark.parametrize(
+    ("floor", "ceiling", "off"),
+    [(None, ZoneLevel(100.0, "ground"), -30.0), (ZoneLevel(100.0, "ground"), None, 30.0)],
+)
+def test_levels_above_ground_count_from_it(floor: ZoneLevel | None, ceiling: ZoneLevel | None, off: float) -> None:
+    ground = flat_terrain(np.array([[-900.0, 900.0], [-900.0, 900.0]]), 80.0, 100.0)
+    records = zone_records([Zone("z", "exclusion", Cylinder(0.0, 0.0, 300.0), floor, ceiling)])
+    found = look_at_zone(records, 0, ground.heights, ground.to_pixel.record, 0.0, 0.0, 150.0)
+    assert found[1] == pytest.approx(off)

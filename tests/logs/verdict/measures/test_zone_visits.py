@@ -186,3 +186,22 @@ def test_of_many_zones_each_is_judged_by_itself() -> None:
             assert depths[-1] - 0.011 <= one.depth <= 0.0
             assert one.entries == 0
     assert 5 < sum(depth > 0.0 for depth in depths) < 100
+
+
+def test_a_stay_over_several_blocks_of_moves_is_counted_once() -> None:
+    """200 moves of 10 m in 1 s each: the box is 400 m wide, from the 50th move on."""
+    moves = [move(-500.0 + 10.0 * k, 50.0, 100.0, length=10.0, lasts=1.0, time=float(k), leg=k) for k in range(200)]
+    found = visit(moves, box())
+    assert (found.entries, found.beyond) == (1, pytest.approx(40.0, abs=1e-4))
+    assert (found.entry_time, found.exit_time) == pytest.approx((50.0, 90.0), abs=1e-4)
+
+
+@pytest.mark.parametrize("side", ["floor", "ceiling"])
+def test_a_zone_of_one_level_above_a_slope(side: str) -> None:
+    """Level at 100 m over ground that rises by 1 in 5: 60 m above it at 200 m, 40 m at 300 m."""
+    level = ZoneLevel(50.0, "ground")
+    zone = box(floor=level) if side == "floor" else box(ceiling=level)
+    found = visit([move(-300.0, 100.0, 100.0, length=1000.0, lasts=50.0)], zone, slope(0.2))
+    # The floor lets it in up to 250 m, the ceiling from there on.
+    first, last = (0.0, 250.0) if side == "floor" else (250.0, 400.0)
+    assert (found.entry_east, found.exit_east) == pytest.approx((first, last), abs=0.01)

@@ -144,3 +144,38 @@ def test_nothing_flown_is_nothing_judged() -> None:
     track = fly_path(setup)
     (item,) = findings(setup, edited(track, position=np.full_like(track.position, np.nan)))
     assert (item.ok, item.place, item.reason) == (None, FLIGHT, "nothing was flown")
+
+
+def test_of_several_zones_the_nearest_is_named_and_none_is_entered() -> None:
+    far = make_polygon([[(300.0, 500.0), (400.0, 500.0), (400.0, 1000.0), (300.0, 1000.0)]])
+    zones = Zone("far", "exclusion", far), Zone("yard", "exclusion", BESIDE)
+    setup = within_zones(*zones)
+    for item in (findings(setup)[0], findings(setup, fly_path(setup))[0]):
+        assert item.reason.startswith("none of 2 zones is violated; the nearest, yard (exclusion), is 5.0 m away")
+        assert (item.planned, item.flown or 0.0) == (0.0, 0.0)
+
+
+def test_a_zone_that_is_touched_within_rounding_is_told_and_kept_to() -> None:
+    """The leg leads 15 mm inside its western edge; another zone lies apart."""
+    edge = make_polygon([[(-0.015, 500.0), (400.0, 500.0), (400.0, 1000.0), (-0.015, 1000.0)]])
+    far = Zone("far", "exclusion", Cylinder(9000.0, 0.0, 50.0))
+    setup = within_zones(Zone("edge", "exclusion", edge), far)
+    for track in (None, fly_path(setup)):
+        kept, item = findings(setup, track)
+        assert (kept.ok, item.ok, item.reason) == (True, True, "touches it")
+        assert kept.planned == pytest.approx(0.015, abs=0.011)
+        assert kept.planned > 0.0
+        if track is not None:
+            assert kept.flown is not None
+            assert kept.flown > 0.0
+
+
+def test_the_plan_is_not_told_beside_itself() -> None:
+    (item,) = findings(within_zones(Zone("yard", "exclusion", OVER)))
+    assert "the planned path" not in item.reason
+
+
+def test_of_a_zone_over_unknown_ground_no_distance_is_told() -> None:
+    setup = within_zones(Zone("low", "exclusion", Cylinder(0.0, 1000.0, 200.0), None, ZoneLevel(120.0, "ground")))
+    rest, _ = findings(replace(setup, scenario=replace(setup.scenario, terrain=None)))
+    assert (rest.ok, facts(rest), rest.reason) == (True, {}, "the zone is not violated")

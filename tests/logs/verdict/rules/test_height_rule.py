@@ -92,3 +92,86 @@ def test_the_height_over_a_valley_is_found_between_two_points() -> None:
     assert most[:2] == pytest.approx([140.0, 160.0])
     assert at[0] == pytest.approx(500.0 / 900.0)
     assert np.isnan(most[2])
+
+
+def test_the_height_over_a_valley_across_the_map() -> None:
+    """The same with the ground's axes changed over: a place's east counts as it is."""
+    ground = valley()
+    axis = np.arange(-1000.0, 1001.0, 100.0)
+    turned = gridded(ground.heights.T.copy(), axis, axis, source="", sha256="", datum="")
+    points = np.array([[-900.0, 0.0, 200.0], [900.0, 0.0, 200.0]])
+    for terrain in (turned, valley()):
+        most, at = greatest_heights(terrain, points if terrain is turned else points[:, [1, 0, 2]])
+        # As the raster's rows may run to the south, the trench is at 500 m or at -500 m.
+        assert most[0] == pytest.approx(140.0)
+        assert abs(-900.0 + 1800.0 * at[0]) == pytest.approx(500.0)
+
+
+def test_each_leg_is_judged_by_its_own_part_of_the_track() -> None:
+    """The first leg 60 m too high, the others below the limit; the last row, beyond the end, too high again."""
+    setup = limited(390.0)
+    track = fly_path(setup)
+    position = track.position.copy()
+    first = np.hypot(*(position[:, :2] - [0.0, 2000.0]).T).argmin() - 20
+    position[5:first, 2] += 100.0
+    assert [item.ok for item in findings(setup, edited(track, position=position))] == [False, True, True, True]
+    position = track.position.copy()
+    position[-1, 2] += 100.0
+    assert [item.ok for item in findings(setup, edited(track, position=position))] == [True, True, True, False]
+    position = track.position.copy()
+    position[0, 2] += 100.0
+    assert [item.ok for item in findings(setup, edited(track, position=position))] == [False, True, True, True]
+
+
+@pytest.mark.parametrize("row", [0, -1])
+def test_the_ceiling_counts_in_every_row(row: int) -> None:
+    setup = limited(2000.0)
+    setup = replace(setup, scenario=replace(setup.scenario, ceiling=390.0))
+    track = fly_path(setup)
+    assert all(item.ok for item in findings(setup, track))
+    position = track.position.copy()
+    position[row, 2] += 100.0
+    failed = [item for item in findings(setup, edited(track, position=position)) if item.ok is False]
+    assert [item.place for item in failed] == [leg(0 if row == 0 else 3)]
+    assert "400.0 m AMSL, above the scenario's ceiling of 390 m" in failed[0].reason
+
+
+def test_where_it_is_highest_is_told() -> None:
+    """A dip of the ground between two rows: at north 503.3 m after 20.13 s, however the rows lie."""
+    setup = make_setup([[100.0, 0.0, 300.0], [100.0, 900.0, 300.0]], limits={"max_height_m": 150.0})
+    axis = np.arange(-1300.0, 1301.0, 100.0) + 3.3
+    heights = np.full((27, 27), 100.0)
+    heights[np.isclose(np.abs(axis - 3.3), 500.0)] = 60.0
+    ground = gridded(heights, axis, axis, source="", sha256="", datum="")
+    setup = replace(setup, scenario=replace(setup.scenario, terrain=ground))
+    (item,) = findings(setup, fly_path(setup))
+    assert item.flown == pytest.approx(240.0, abs=0.01)
+    assert "240.0 m above ground at 20.1 s, east 100 m, north 503 m" in item.reason
+
+
+@pytest.mark.parametrize(("most", "ok"), [(210.0, None), (190.0, False)])
+def test_ground_that_is_known_in_part_judges_what_is_above_it(most: float, ok: bool | None) -> None:
+    setup = make_setup([[0.0, 0.0, 300.0], [0.0, 900.0, 300.0]], limits={"max_height_m": most})
+    axis = np.arange(-1300.0, 1301.0, 100.0)
+    heights = np.full((27, 27), 100.0)
+    heights[np.abs(axis) > 650.0] = np.nan
+    ground = gridded(heights, axis, axis, source="", sha256="", datum="")
+    setup = replace(setup, scenario=replace(setup.scenario, terrain=ground))
+    track = fly_path(setup)
+    (item,) = findings(setup, track)
+    assert (item.ok, item.flown) == (ok, pytest.approx(200.0))
+    assert "part of the ground below it is not known" in item.reason
+    level = replace(ground, heights=np.full_like(ground.heights, 100.0))
+    (item,) = findings(replace(setup, scenario=replace(setup.scenario, terrain=level)), track)
+    assert item.ok is (most > 200.0)
+    assert "not known" not in item.reason
+
+
+@pytest.mark.parametrize(("over", "told"), [(-0.05, False), (0.05, False), (0.15, True)])
+def test_a_plan_above_the_limit_is_told_beside_a_flight_that_is_not(over: float, told: bool) -> None:
+    setup = make_setup([[0.0, 0.0, 300.0], [0.0, 4000.0, 300.0]], limits={"max_height_m": 300.0 - over})
+    track = fly_path(setup, rate=10.0)
+    low = edited(track, position=track.position - np.array([0.0, 0.0, 9.0]))
+    (item,) = findings(setup, low)
+    assert item.ok is True
+    assert ("the planned path comes up to" in item.reason) is told

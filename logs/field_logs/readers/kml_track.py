@@ -1,0 +1,73 @@
+"""KML tracks: `gx:Track` with times (Google's extension of OGC 12-007); a line without times is no flight."""
+
+from datetime import datetime
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+
+from flight.simulation.field_source import Damage, VerticalDatum
+from logs.field_logs.raw_log import LogSeries, RawLog
+from logs.field_logs.readers.track_text import track_text
+from world.errors import LogError
+
+FORMAT = "KML track"
+
+
+def read_kml(path: Path) -> RawLog:
+    """Read the tracks of a file as one.  Raises LogError for one without places that have times."""
+    try:
+        root = ElementTree.fromstring(track_text(path, xml=True))
+    except (ElementTree.ParseError, ValueError) as error:
+        raise LogError(f"{path}: not a KML file that can be read: {' '.join(str(error).split())[:120]}") from error
+    rows, unreadable, mode = [], 0, "clampToGround"
+    for track in root.iter():
+        if _name(track) != "Track":
+            continue
+        whens = [child.text or "" for child in track if _name(child) == "when"]
+        coords = [child.text or "" for child in track if _name(child) == "coord"]
+        mode = next((str(child.text).strip() for child in track if _name(child) == "altitudeMode"), mode)
+        unreadable += abs(len(whens) - len(coords))
+        for when, coord in zip(whens, coords, strict=False):
+            row = _row(when, coord)
+            if row is None:
+                unreadable += 1
+            else:
+                rows.append(row)
+    if len(rows) < 2:
+        lines = sum(_name(one) == "LineString" for one in root.iter())
+        why = f"; its {lines} lines have no times" if lines else ""
+        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}")
+    table = np.array(rows)
+    datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
+    return RawLog(
+        source=str(path),
+        format=FORMAT,
+        program="",
+        vehicle="unknown",
+        series={"position": LogSeries(f"gx:coord, {mode}", table[:, 0] - table[0, 0], table[:, 1:])},
+        heights=(),
+        datum=datum,
+        clock="start",
+        utc_start=float(table[0, 0]),
+        damage=Damage(unreadable=unreadable),
+    )
+
+
+def _name(element: ElementTree.Element) -> str:
+    """An element's name without its namespace: files have Google's, OGC's or none."""
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+
+
+def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
+    """Time since 1970 (s), latitude, longitude, height; None for what is none."""
+    parts = coord.replace(",", " ").split()
+    try:
+        stamp = datetime.fromisoformat(when.strip().replace("Z", "+00:00")).timestamp()
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        return None
+    if len(numbers) not in (2, 3):
+        return None
+    lon, lat, up = (*numbers, float("nan"))[:3]
+    return stamp, lat, lon, up

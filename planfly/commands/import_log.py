@@ -1,0 +1,38 @@
+"""``planfly import``: a log of the field as a flight log of planfly's own, with its verdict."""
+
+import argparse
+import tempfile
+from pathlib import Path
+
+from logs.recording.recorder import Recorder
+from planfly.commands.field_options import field_options
+from planfly.field_flights import ImportedFlight, import_flight
+from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
+from planfly.terminal.results import print_verdict
+from planfly.terminal.scenario_options import scenario_change
+from planfly.terminal.targets import refuse_existing
+
+
+def import_log(args: argparse.Namespace) -> int:
+    """Import a log; the exit code is the verdict's, or 3 for a log of which some could not be read."""
+    source, target = Path(args.log), Path(args.target)
+    refuse_existing(target, args.overwrite, source)
+    flight = import_flight(source, field_options(args), scenario_change(args))
+    _write(target, flight)
+    print_verdict(flight.verdict, flight.setup.route.notes)
+    print(f"log       {target} ({len(flight.track)} rows)")
+    if flight.lossy:
+        return LOSS
+    return FLYABLE if flight.verdict.flyable else NOT_FLYABLE
+
+
+def _write(target: Path, flight: ImportedFlight) -> None:
+    """The log, whole or not at all."""
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
+        path = Path(folder) / target.name
+        with Recorder(path, flight.setup) as recorder:
+            recorder.write(flight.track)
+            for event in flight.events:
+                recorder.event(event.time, event.text, event.level)
+            recorder.finish(flight.ended, flight.verdict)
+        path.replace(target)

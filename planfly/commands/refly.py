@@ -1,0 +1,63 @@
+"""``planfly refly``: the mission of a flight of the field, flown again in JSBSim: where model and flight differ."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from logs.recording.reader import FlightLog, read_log
+from logs.recording.recorder import Recorder
+from logs.report.refly_lines import refly_lines
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.model_comparison import Reflight
+from planfly.model_flight import fly_again
+from planfly.terminal.exit_codes import FLYABLE, LOSS
+from planfly.terminal.progress import progress
+from planfly.terminal.stored_logs import warn_of_loss
+from planfly.terminal.targets import REFLY_FILES, prepare_folder, refuse_folder
+from world.atomic_files import write_whole
+from world.errors import LogError
+
+
+def refly(args: argparse.Namespace) -> int:
+    """Fly, compare and draw; 3 for a log that is cut short."""
+    source = Path(args.log)
+    log = read_log(source)
+    if log.setup.source is None:
+        raise LogError(f"{source}: flown by planfly itself: refly takes a log that `planfly import` wrote")
+    folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-refly")
+    if args.out:
+        refuse_folder(folder, args.overwrite)
+    with progress("flying again") as advance:
+        again = fly_again(log.setup, log.track, args.aircraft, args.turbulence, advance)
+    prepare_folder(folder, REFLY_FILES)
+    print("\n".join(refly_lines(again)))
+    with progress("drawing"):
+        files = _draw(folder, again)
+    files.append(_record(folder, again, log))
+    for file in files:
+        print(f"refly     {file}")
+    if not log.complete:
+        warn_of_loss(log)
+        return LOSS
+    return FLYABLE
+
+
+def _draw(folder: Path, again: Reflight) -> list[Path]:
+    # matplotlib loads for pictures alone.
+    from logs.figures.refly import refly_pictures
+
+    files = []
+    for name, data in refly_pictures(again).items():
+        write_whole(folder / name, data)
+        files.append(folder / name)
+    return files
+
+
+def _record(folder: Path, again: Reflight, log: FlightLog) -> Path:
+    """The simulated flight as a log of its own, for `compare` and `replay`."""
+    path = folder / "simulated.mcap"
+    verdict = judge_flight(again.setup, again.simulated, again.ended)
+    with Recorder(path, replace(again.setup, seed=log.setup.seed)) as recorder:
+        recorder.write(again.simulated)
+        recorder.finish(again.ended, verdict)
+    return path

@@ -1,0 +1,275 @@
+"""A path's length under its constraints, with derivatives: what `planner.seeding.shortening_kernels` steps down.
+
+The augmented Lagrangian of Hestenes and Powell in the form for inequalities of Rockafellar ("The multiplier method of
+Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
+constraint c >= 0 of multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
+The constraints' own curvature is left out of the Hessian; a constraint binds four waypoints in a row at most, so that
+it is a band.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.clearance_buffer import clearance_at
+from planner.evaluation.leg_constraints import PrecomputedLimits
+from planner.evaluation.leg_geometry import SETTLING_LENGTH, SETTLING_SHARE
+from planner.evaluation.problem_arrays import ProblemArrays
+from planner.seeding.shortening_bindings import GREATEST_TURN, Bindings
+from world.frames import polymap
+from world.kernels import compiled
+from world.terrain import pixel_height
+
+Floats = NDArray[np.float64]
+
+# Variables that one constraint binds at most, which is the Hessian's half band: three of each of four waypoints.
+BAND = 12
+# Length that a rad of turn counts as, m.
+TURN_LENGTH = 200.0
+# Shortest leg, m: a little more than the scores ask for.
+SHORTEST_LEG = 15.0
+# Height by which a leg is less steep than it may be, and length that it has left between its turns, m: what the last
+# steps leave undecided.
+LEVEL_SPARE, TURN_SPARE = 0.2, 1.0
+# Half the way over which the ground's slope is taken, m.
+GROUND_STEP = 8.0
+
+
+class Model(NamedTuple):
+    """Gradient (n,) and band (n, BAND) of the Hessian of a path's inner waypoints; a constraint's slopes (BAND,)."""
+
+    gradient: Floats
+    band: Floats
+    slopes: Floats
+
+
+@compiled
+def _add(
+    value: float, first: int, points: int, multiplier: float, penalty: float, model: Model
+) -> float:  # pragma: no cover - compiled
+    """Add a constraint on so many waypoints from the `first` to the model; what it adds to the merit.
+
+    Its slopes with respect to them stand in `model.slopes`.
+    """
+    push = multiplier - penalty * value
+    if not push > 0.0:
+        return -multiplier * multiplier / (2.0 * penalty)
+    size, begin = model.gradient.size, 3 * (first - 1)
+    for a in range(3 * points):
+        row = begin + a
+        if 0 <= row < size:
+            model.gradient[row] -= push * model.slopes[a]
+            for b in range(a + 1):
+                if begin + b >= 0:
+                    model.band[row, a - b] += penalty * model.slopes[a] * model.slopes[b]
+    return (push * push - multiplier * multiplier) / (2.0 * penalty)
+
+
+@compiled
+def _add_length(path: Floats, model: Model) -> float:  # pragma: no cover - compiled
+    """Add the path's length to the model; the length, m."""
+    total, size, unit = 0.0, model.gradient.size, np.empty(3)
+    for i in range(path.shape[0] - 1):
+        length = 0.0
+        for axis in range(3):
+            unit[axis] = path[i + 1, axis] - path[i, axis]
+            length += unit[axis] * unit[axis]
+        length = max(1e-3, math.sqrt(length))
+        total += length
+        a, b = 3 * (i - 1), 3 * i
+        for axis in range(3):
+            unit[axis] /= length
+            if a >= 0:
+                model.gradient[a + axis] -= unit[axis]
+            if b < size:
+                model.gradient[b + axis] += unit[axis]
+        for axis in range(3):
+            for other in range(3):
+                bend = ((1.0 if axis == other else 0.0) - unit[axis] * unit[other]) / length
+                if a >= 0 and other <= axis:
+                    model.band[a + axis, axis - other] += bend
+                if b < size and other <= axis:
+                    model.band[b + axis, axis - other] += bend
+                if a >= 0 and b < size:
+                    model.band[b + axis, 3 + axis - other] -= bend
+    return total
+
+
+@compiled
+def _add_missiles(
+    data: ProblemArrays,
+    bound: Bindings,
+    path: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    model: Model,
+) -> float:  # pragma: no cover - compiled
+    """Add the distances of legs to missiles; what they add to the merit.  They are the first of the constraints."""
+    merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
+    for p in range(bound.pairs.shape[0]):
+        i, missile = bound.pairs[p, 0], missiles[bound.pairs[p, 1]]
+        ax, ay, az = path[i, 0] - missile.east, path[i, 1] - missile.north, path[i, 2] - missile.up
+        dx, dy, dz = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
+        length2 = max(1e-6, dx * dx + dy * dy + dz * dz)
+        share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
+        ax, ay, az = ax + share * dx, ay + share * dy, az + share * dz
+        away = max(1e-3, math.sqrt(ax * ax + ay * ay + az * az))
+        slopes[0], slopes[1], slopes[2] = ax / away, ay / away, az / away
+        for axis in range(3):
+            slopes[3 + axis] = share * slopes[axis]
+            slopes[axis] *= 1.0 - share
+        values[p] = away - bound.wide[p]
+        merit += _add(values[p], i, 2, multipliers[p], penalty, model)
+    return merit
+
+
+@compiled
+def _add_ground(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    bound: Bindings,
+    path: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    model: Model,
+    at: int,
+) -> float:  # pragma: no cover - compiled
+    """Add the heights of samples of the legs above what is required, constraints from `at`; see `_add_missiles`."""
+    merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
+    for i in range(path.shape[0] - 1):
+        for k in range(bound.samples):
+            share = (k + 1.0) / (bound.samples + 1.0)
+            x = path[i, 0] + share * (path[i + 1, 0] - path[i, 0])
+            y = path[i, 1] + share * (path[i + 1, 1] - path[i, 1])
+            z = path[i, 2] + share * (path[i + 1, 2] - path[i, 2])
+            column, row = polymap(to_pixel, x, y)
+            value = z - pixel_height(heights, column, row) - clearance_at(limits.required, x, y) - bound.low[i]
+            number = at + i * bound.samples + k
+            values[number] = value
+            if multipliers[number] - penalty * value > 0.0:
+                column, row = polymap(to_pixel, x + GROUND_STEP, y)
+                rise = pixel_height(heights, column, row)
+                column, row = polymap(to_pixel, x - GROUND_STEP, y)
+                by_east = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+                column, row = polymap(to_pixel, x, y + GROUND_STEP)
+                rise = pixel_height(heights, column, row)
+                column, row = polymap(to_pixel, x, y - GROUND_STEP)
+                by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
+                slopes[0], slopes[1], slopes[2] = -by_east, -by_north, 1.0
+                if math.isnan(by_east + by_north):
+                    slopes[0], slopes[1] = 0.0, 0.0
+                for axis in range(3):
+                    slopes[3 + axis] = share * slopes[axis]
+                    slopes[axis] *= 1.0 - share
+            merit += _add(value, i, 2, multipliers[number], penalty, model)
+    return merit
+
+
+@compiled
+def _add_slopes(
+    bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: Model, at: int
+) -> float:  # pragma: no cover - compiled
+    """Add what legs are less steep than allowed, m of height, and longer than the shortest; see `_add_missiles`."""
+    merit, slopes = 0.0, model.slopes
+    for i in range(path.shape[0] - 1):
+        dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
+        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        for kind in range(3):
+            tangent = bound.climb[i] if kind == 0 else bound.dive[i] if kind == 1 else 1.0
+            sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
+            slopes[3], slopes[4], slopes[5] = tangent * dx / run, tangent * dy / run, sign
+            for axis in range(3):
+                slopes[axis] = -slopes[3 + axis]
+            number = at + 3 * i + kind
+            values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else LEVEL_SPARE)
+            merit += _add(values[number], i, 2, multipliers[number], penalty, model)
+    return merit
+
+
+@compiled
+def _add_turns(
+    data: ProblemArrays,
+    bound: Bindings,
+    path: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    model: Model,
+    at: int,
+) -> float:  # pragma: no cover - compiled
+    """Add what turns are less than allowed, and what legs have left between theirs; see `_add_missiles`."""
+    merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
+    turn, of_before, of_after = np.zeros(count + 1), np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
+    for i in range(count + 1):
+        ux, uy = math.sin(data.start_course), math.cos(data.start_course)
+        vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
+        if i > 0:
+            ux, uy = path[i, 0] - path[i - 1, 0], path[i, 1] - path[i - 1, 1]
+        if i < count:
+            vx, vy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        if math.isnan(ux + vx):
+            continue
+        cross = ux * vy - uy * vx
+        turn[i] = math.atan2(abs(cross), ux * vx + uy * vy)
+        side, u2, v2 = 1.0 if cross >= 0.0 else -1.0, max(1.0, ux * ux + uy * uy), max(1.0, vx * vx + vy * vy)
+        of_before[i, 0], of_before[i, 1] = side * uy / u2, -side * ux / u2
+        of_after[i, 0], of_after[i, 1] = -side * vy / v2, side * vx / v2
+        slopes[:9] = 0.0
+        _turn_slopes(of_before[i], of_after[i], -TURN_LENGTH, 0, slopes)
+        values[at + i] = TURN_LENGTH * (data.max_turn - turn[i])
+        merit += _add(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
+    if not bound.turns_in_legs:
+        return merit
+    for i in range(count):
+        number = at + count + 1 + i
+        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        run = max(1e-3, math.sqrt(dx * dx + dy * dy))
+        one, two = math.tan(0.5 * min(GREATEST_TURN, turn[i])), math.tan(0.5 * min(GREATEST_TURN, turn[i + 1]))
+        need = bound.after[i] * one + bound.before[i + 1] * two + bound.roll[i]
+        slopes[:] = 0.0
+        for axis, part in ((0, dx / run), (1, dy / run)):
+            slopes[3 + axis], slopes[6 + axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
+        _turn_slopes(of_before[i], of_after[i], -0.5 * bound.after[i] * (1.0 + one * one), 0, slopes)
+        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * bound.before[i + 1] * (1.0 + two * two), 3, slopes)
+        values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - TURN_SPARE
+        merit += _add(values[number], i - 1, 4, multipliers[number], penalty, model)
+    return merit
+
+
+@compiled
+def _turn_slopes(
+    of_before: Floats, of_after: Floats, factor: float, at: int, slopes: Floats
+) -> None:  # pragma: no cover - compiled
+    """Add a factor times the slopes of a turn, by the legs before and after it, to those of its three waypoints."""
+    for axis in range(2):
+        slopes[at + axis] -= factor * of_before[axis]
+        slopes[at + 3 + axis] += factor * (of_before[axis] - of_after[axis])
+        slopes[at + 6 + axis] += factor * of_after[axis]
+
+
+@compiled
+def lagrangian(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    bound: Bindings,
+    path: Floats,
+    multipliers: Floats,
+    values: Floats,
+    penalty: float,
+    model: Model,
+) -> float:  # pragma: no cover - compiled
+    """The augmented length of a path (w, 3), m; fills the constraints' values and the model."""
+    model.gradient[:], model.band[:] = 0.0, 0.0
+    at = bound.pairs.shape[0]
+    merit = _add_length(path, model)
+    merit += _add_missiles(data, bound, path, multipliers, values, penalty, model)
+    merit += _add_ground(data, limits, bound, path, multipliers, values, penalty, model, at)
+    at += bound.samples * (path.shape[0] - 1)
+    merit += _add_slopes(bound, path, multipliers, values, penalty, model, at)
+    at += 3 * (path.shape[0] - 1)
+    merit += _add_turns(data, bound, path, multipliers, values, penalty, model, at)
+    return merit

@@ -1,0 +1,68 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink import mavutil
+
+from logs.field_logs.example_raw_log import example_raw_log
+from logs.field_logs.readers.telemetry_log import read_telemetry
+from tests.logs.field_logs.written_logs import telemetry
+from world.errors import LogError
+
+
+def test_rows_are_what_mavutil_reads(tmp_path: Path) -> None:
+    path = telemetry(tmp_path / "a.tlog")
+    raw = read_telemetry(path)
+    log = mavutil.mavlink_connection(str(path))
+    places = []
+    while (message := log.recv_match(type="GLOBAL_POSITION_INT")) is not None:
+        places.append(message)
+    log.close()
+    position, velocity = raw.series["position"], raw.series["velocity"]
+    assert len(places) == len(position.time) == 460
+    for k in np.linspace(0, 459, 10).astype(int):
+        one = places[k]
+        assert position.time[k] == pytest.approx(one.time_boot_ms * 1e-3)
+        assert position.values[k] == pytest.approx([one.lat * 1e-7, one.lon * 1e-7, one.alt * 1e-3], abs=1e-9)
+        assert velocity.values[k] == pytest.approx([one.vy * 0.01, one.vx * 0.01, -one.vz * 0.01])
+
+
+def test_the_mission_is_the_one_that_went_up(tmp_path: Path) -> None:
+    (logged,) = read_telemetry(telemetry(tmp_path / "a.tlog")).missions
+    wanted = example_raw_log().missions[0].mission
+    assert logged.mission.items == wanted.items
+    assert logged.mission.home == wanted.home
+
+
+def test_a_wind_blows_from_its_direction(tmp_path: Path) -> None:
+    wind = read_telemetry(telemetry(tmp_path / "a.tlog")).series["wind"]
+    assert wind.values[0] == pytest.approx([0.0, -3.0])
+
+
+def test_equivalent_airspeed_becomes_true(tmp_path: Path) -> None:
+    airspeed = read_telemetry(telemetry(tmp_path / "a.tlog")).series["airspeed"]
+    # The standard atmosphere at 500 m has 0.9529 of the density at the sea.
+    assert airspeed.values[0, 0] == pytest.approx(24.4 / 0.9529**0.5, rel=1e-3)
+
+
+def test_the_vehicle_and_its_modes(tmp_path: Path) -> None:
+    raw = read_telemetry(telemetry(tmp_path / "a.tlog"))
+    assert (raw.vehicle, raw.program) == ("plane", "ArduPlane V4.5.0 (abcdef)")
+    assert [(mode.name, mode.automatic) for mode in raw.modes] == [("AUTO", True)]
+    assert read_telemetry(telemetry(tmp_path / "b.tlog", kind=2)).vehicle == "copter"
+    px4 = read_telemetry(telemetry(tmp_path / "c.tlog", autopilot=12, mode=4 << 24 | 4 << 16))
+    assert px4.modes[0].automatic
+
+
+def test_a_log_of_a_station_alone_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no HEARTBEAT of a vehicle"):
+        read_telemetry(telemetry(tmp_path / "a.tlog", kind=6, autopilot=8))
+
+
+def test_a_restart_in_flight_goes_on(tmp_path: Path) -> None:
+    """The clock since boot begins anew; what was received goes on."""
+    path = telemetry(tmp_path / "a.tlog")
+    path.write_bytes(path.read_bytes() * 2)
+    raw = read_telemetry(path)
+    assert len(raw.clock_jumps) == 1
+    assert (np.diff(raw.series["position"].time) >= 0.0).all()
