@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flight.dynamics.fdm import Variation
 from flight.mission.end_courses import with_end_courses
 from flight.mission.fence_zones import fence_zones
 from flight.mission.from_plan import plan_mission
@@ -60,6 +61,18 @@ class PlanThenFly:
     mission: Mission
     track: Track | None
     verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class OffNominal:
+    """How the flight itself differs from what the plan and its guidance know.
+
+    variation: of the aircraft from its model.
+    start_offset: east, north and up from the first waypoint to where the flight begins, m.
+    """
+
+    variation: Variation
+    start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,12 +172,16 @@ def fly_and_judge(
     *,
     every: int = 1,
     autopilot: Path | None = None,
+    off_nominal: OffNominal | None = None,
+    beside: bool = True,
     most: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
 
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
+    off_nominal: how the flight differs from what guidance knows; none of a real ArduPlane's.
+    beside: whether the flights below are flown; whether it is flyable does not depend on them.
     most: how long it may fly, and how large its log may grow.
 
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
@@ -179,8 +196,9 @@ def fly_and_judge(
         return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
         if autopilot is None:
-            flight = Flight(setup, airframe.aircraft)
-            return _record_and_judge(setup, airframe, flight, log, advance, every, most)
+            how = off_nominal or OffNominal(Variation())
+            flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
+            return _record_and_judge(setup, airframe, flight, log, advance, every, most, beside=beside)
         return _fly_program(setup, airframe, log, advance, every, autopilot, most)
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
@@ -235,6 +253,8 @@ def _record_and_judge(
     advance: Advance | None,
     every: int,
     most: FlightLimits,
+    *,
+    beside: bool = True,
 ) -> JudgedFlight:
     flight.most_ticks = min(flight.most_ticks, most.most_ticks(flight.dt))
 
@@ -244,11 +264,11 @@ def _record_and_judge(
 
     if log is None:
         flown = fly_to_end(flight, progress=report)
-        return _judged(setup, airframe, flown.track, flown.ended)
+        return _judged(setup, airframe, flown.track, flown.ended, beside=beside)
     with WholeLog(log, setup, every=every, batch=BATCH) as recorder:
         flown = fly_to_end(flight, recorder.write, report, lambda: most.log_full(recorder.size))
         recorder.ended = flown.ended
-        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended)
+        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, beside=beside)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
         recorder.finish(judged.ended, judged.verdict, judged.beside)
@@ -262,8 +282,10 @@ def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
     return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
-def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str) -> JudgedFlight:
+def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, beside: bool) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    verdict, beside = judge_with_flights_beside(setup, airframe.aircraft, track, ended)
-    return JudgedFlight(setup, track, ended, verdict, (event,), beside)
+    if not beside:
+        return JudgedFlight(setup, track, ended, judge_flight(setup, track, ended), (event,))
+    verdict, others = judge_with_flights_beside(setup, airframe.aircraft, track, ended)
+    return JudgedFlight(setup, track, ended, verdict, (event,), others)

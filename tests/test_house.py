@@ -21,6 +21,7 @@ OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
 # As the README lists them.
 COMMANDS = (
     *("run", "plan", "export", "fly", "check", "aircraft", "serve", "replay", "recover", "report", "compare", "paper"),
+    *("campaign", "winds"),
     *("import", "refly", "scenarios"),
 )
 MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60

@@ -151,7 +151,15 @@ def from_vector(values: Floats, amsl: float) -> Trim:
 def straight(
     simulator: Simulator, airspeed: float, amsl: float, climb: float = 0.0, near: Trim | None = None
 ) -> Trim | None:
-    """Steady flight at this airspeed (m/s), height (m) and air-mass path angle (rad)."""
+    """Steady flight at this airspeed (m/s), height (m) and air-mass path angle (rad); None where there is none.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.fdm import Fdm
+    >>> model = Fdm(load_aircraft("aerosonde"))
+    >>> level = straight(model, 25.0, 500.0)
+    >>> 0.3 < level.throttle < 0.9, straight(model, 90.0, 500.0) is None
+    (True, True)
+    """
     return trim(simulator, amsl, {"airspeed": airspeed, "climb": climb}, near)
 
 

@@ -77,9 +77,14 @@ class Airborne(ABC):
         gains: Gains,
         variation: Variation | None = None,
         local_map: LocalMap | None = None,
+        start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Load it: local_map is the setup's where another flight of it has fitted one already."""
+        """Load it: local_map is the setup's where another flight of it has fitted one already.
+
+        start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
+        """
         self.path = setup.path
+        self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
         self.map = local_map or LocalMap.around(setup)
         self._steps = round(FDM_HZ / setup.guidance_hz)
@@ -124,7 +129,7 @@ class Airborne(ABC):
     def _start(self, setup: FlightSetup) -> Start:
         """Where the route begins.  Raises StartError for a place that is not above the terrain."""
         points = setup.route.waypoints
-        east, north, up = (float(value) for value in points[0])
+        east, north, up = (float(value + off) for value, off in zip(points[0], self._start_offset, strict=True))
         under = self._ground.height(east, north)
         if not math.isnan(under) and up <= under:
             reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"

@@ -125,10 +125,14 @@ class Flight(Airborne):
         aircraft: Aircraft,
         variation: Variation | None = None,
         local_map: LocalMap | None = None,
+        start_offset: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ) -> None:
-        """Start it: local_map is the setup's where another flight of it has fitted one already."""
+        """Start it: local_map is the setup's where another flight of it has fitted one already.
+
+        start_offset: east, north and up from the route's first waypoint to where the flight begins, m.
+        """
         gains = load_gains(aircraft)
-        super().__init__(setup, aircraft, gains, variation, local_map)
+        super().__init__(setup, aircraft, gains, variation, local_map, start_offset)
         # Guidance knows the model, not how the aircraft differs from it.
         model = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking)
         self._begin(setup, model, gains.reference_airspeed)

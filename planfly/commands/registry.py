@@ -19,6 +19,8 @@ COMMAND_NAMES = (
     "report",
     "compare",
     "paper",
+    "campaign",
+    "winds",
     "import",
     "refly",
     "scenarios",

@@ -14,8 +14,8 @@ from flight.live.parameters import vehicle_parameters
 from flight.live.snapshot import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
-from planfly.commands.served_flights import ServeOptions, fly_process, open_served
 from planfly.named_fences import read_named_fences
+from planfly.served_flights import ServeOptions, fly_process, open_served
 from planfly.terminal.link_options import link_access, stop_signals
 from planfly.terminal.scenario_options import flight_entries
 from world.errors import PlanflyError

@@ -19,6 +19,7 @@ from planfly.terminal.argument_types import (
     threat,
     time_or_stations,
 )
+from planfly.terminal.campaign_options import add_campaigns
 from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
 from planfly.terminal.field_parser import LOGS, add_field_commands
 from planfly.terminal.parser_options import (
@@ -68,6 +69,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_field_commands(command)
     _add_serve(command)
     _add_paper(command)
+    add_campaigns(command)
     _add_aircraft(command)
     command("scenarios", "list the embedded scenarios, one line each", "planfly scenarios")
     return parser

@@ -13,9 +13,9 @@ from logs.recording.reader import read_log
 from logs.verdict.findings import verdict_json
 from logs.verdict.wording import deciding_text
 from planfly.airframe import load_airframe
-from planfly.commands.served_flights import ServedLog
 from planfly.flights_beside import airframe_answer, find_deciding_parameter
 from planfly.pipeline import JudgedFlight, fly_and_judge
+from planfly.served_flights import ServedLog
 from planfly.terminal.stored_logs import judge_log
 from tests.setups import setup_maker
 

@@ -25,7 +25,7 @@ from flight.live.flight_process import (
 )
 from planfly.cli import main
 from planfly.commands.registry import COMMAND_NAMES, find_command
-from planfly.commands.served_flights import ServedFlights, ServeOptions
+from planfly.served_flights import ServedFlights, ServeOptions
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission
 from tests.world.made.elevation_files import from_origin, write_raster

@@ -9,8 +9,8 @@ import pytest
 from flight.mission_files.formats import read_fence, read_mission
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.commands.served_flights import ServeOptions, open_served
 from planfly.named_fences import read_named_fences
+from planfly.served_flights import ServeOptions, open_served
 from planner.plan import plan_json
 from tests.mission_lines import a_plan
 from world.errors import MissionError

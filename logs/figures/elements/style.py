@@ -68,6 +68,10 @@ def clean_style() -> Iterator[None]:
     """Draw under matplotlib's own defaults and the settings above, whatever the user's matplotlibrc holds.
 
     The settings in force before come back at the end.
+
+    >>> with clean_style():
+    ...     mpl.rcParams["font.size"]
+    8.5
     """
     with mpl.rc_context():
         mpl.rcdefaults()
@@ -76,7 +80,11 @@ def clean_style() -> Iterator[None]:
 
 
 def new_figure(height: float) -> Figure:
-    """Make an empty figure of the common width, `height` inches tall, with its own canvas (no pyplot state)."""
+    """Make an empty figure of the common width, `height` inches tall, with its own canvas (no pyplot state).
+
+    >>> new_figure(4.0).get_size_inches().tolist()
+    [10.0, 4.0]
+    """
     figure = Figure(figsize=(WIDTH, height), dpi=DPI, facecolor="white")
     FigureCanvasAgg(figure)
     return figure
@@ -108,7 +116,11 @@ def _rendered(figure: Figure, kind: str, metadata: Any) -> bytes:
 
 
 def shorten(text: str, length: int) -> str:
-    """Cut the text with an ellipsis to at most `length` characters."""
+    """Cut the text with an ellipsis to at most `length` characters.
+
+    >>> shorten("clearance, leg 12", 12)
+    'clearance,…'
+    """
     return text if len(text) <= length else text[: length - 1].rstrip() + "…"
 
 

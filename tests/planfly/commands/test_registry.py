@@ -10,7 +10,7 @@ import pytest
 import planfly.commands
 from planfly.commands.registry import COMMAND_NAMES, find_command
 
-HELPERS = {"__init__", "registry", "served_flights"}
+HELPERS = {"__init__", "registry"}
 # Commands whose module stands in a room of its own, or has another name than the command.
 ELSEWHERE = {"import": "field_logs.import_log", "refly": "field_logs.refly"}
 
@@ -25,7 +25,7 @@ def test_the_commands_are_the_modules_of_their_folder() -> None:
 
 
 def test_what_is_no_command_is_not_imported() -> None:
-    for name in ("registry", "served_flights", "os", ""):
+    for name in ("registry", "os", ""):
         with pytest.raises(KeyError):
             find_command(name)
 

@@ -14,7 +14,7 @@ from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.levels import DecidingParameter
 from logs.verdict.places import Place
-from planfly.commands.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
+from planfly.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD
 from tests.setups import waypoint_mission

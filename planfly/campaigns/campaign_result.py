@@ -1,0 +1,133 @@
+"""Campaigns for Python: fly one, and read what came of it."""
+
+import tempfile
+from collections.abc import Iterable, Mapping
+from contextlib import nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.flights.campaign_base import open_campaign
+from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.report.campaign_files import clear_campaign, write_files
+from planfly.campaigns.report.summary import CampaignSummary, summarise
+from planfly.campaigns.spread.spread_file import default_spread, read_spread
+from planfly.campaigns.statistics.decision import Answer, Goal
+from planfly.campaigns.statistics.proportions import Interval
+from planfly.campaigns.storage.store import DATABASE, read_table
+
+# Flights of a campaign that says no number, and the most of one that stops by itself.
+USUAL_FLIGHTS, MOST_FLIGHTS = 300, 5000
+
+
+@dataclass(frozen=True)
+class CampaignResult:
+    """What `planfly.campaign` returns.
+
+    columns: the table of flights, a list a column.
+    """
+
+    summary: CampaignSummary
+    columns: Mapping[str, list[Any]]
+
+    @property
+    def probability(self) -> float:
+        """Share of flights that are flyable."""
+        return self.summary.estimate.tally.share
+
+    @property
+    def interval(self) -> Interval:
+        """Two-sided, with the confidence asked for."""
+        return self.summary.estimate.interval
+
+    @property
+    def bounds(self) -> Interval:
+        """The lower and the upper bound, each with the confidence asked for: what `answer` rests on."""
+        return Interval(self.summary.estimate.lower, self.summary.estimate.upper)
+
+    @property
+    def answer(self) -> Answer:
+        """Whether the target is reached, missed, or undecided."""
+        return self.summary.estimate.answer
+
+    @property
+    def by_rule(self) -> dict[str, int]:
+        """In how many flights each rule failed, of those that did."""
+        return {one.rule: one.flights for one in self.summary.by_rule}
+
+    @property
+    def flights(self) -> Any:
+        """The table of flights: a pandas DataFrame where pandas is there, else its columns as arrays by name."""
+        try:
+            import pandas as pd
+        except ImportError:
+            return {name: np.array(values) for name, values in self.columns.items()}
+        return pd.DataFrame(dict(self.columns))
+
+
+def run_campaign(
+    target: str | Path,
+    *,
+    spread: Path | str | None = None,
+    flights: int | None = None,
+    prove: float | None = None,
+    at_least: float | None = None,
+    confidence: float = 0.95,
+    seed: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: Path | str | None = None,
+    resume: bool = False,
+) -> CampaignResult:
+    """Fly a mission many times, each time as `planfly fly` would in its own wind, aircraft, terrain and start.
+
+    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
+    spread: a TOML file of what varies; None takes planfly's default.
+    flights: how many; None takes 300, or, with ``prove``, 5,000 at most.
+    prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
+    flights.  Not both.
+    confidence: of each bound.
+    seed: of plan and draws; None takes the scenario's, or 1.
+    workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
+    out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
+
+    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
+    Raises a `world.errors.PlanflyError` for bad input.
+    """
+    goal = make_goal(flights, prove, at_least, confidence)
+    chosen = default_spread() if spread is None else read_spread(Path(spread))
+    with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as name:
+        folder = Path(name)
+        if not resume:
+            clear_campaign(folder)
+        base = open_campaign(str(target), chosen, planned=folder / "plan.json", seed=seed)
+        with open_store(base, goal, folder, resume=resume) as store:
+            estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
+            summary = summarise(base, goal, estimate, store)
+            if out is not None:
+                write_files(folder, base, summary, store, f"planfly campaign {target} --seed {base.seed}")
+        return CampaignResult(summary, read_table(folder / DATABASE))
+
+
+def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float) -> Goal:
+    """The goal that options come to.  Raises ValueError for numbers that are none.
+
+    >>> make_goal(None, 0.99, None, 0.95)
+    Goal(target=0.99, stops=True, flights=5000, confidence=0.95)
+    """
+    if prove is not None and at_least is not None:
+        raise ValueError("prove and at_least: give one of them")
+    for name, value in _shares(prove, at_least, confidence):
+        if value is not None and not 0.5 <= value < 1.0:
+            raise ValueError(f"{name}: {value}: at least 0.5 and below 1 is expected")
+    if flights is not None and not 1 <= flights <= 10_000_000:
+        raise ValueError(f"flights: {flights}: 1 to 10,000,000 is expected")
+    number = flights or (USUAL_FLIGHTS if prove is None else MOST_FLIGHTS)
+    return Goal(prove if prove is not None else at_least, prove is not None, number, confidence)
+
+
+def _shares(prove: float | None, at_least: float | None, confidence: float) -> Iterable[tuple[str, float | None]]:
+    return (("prove", prove), ("at_least", at_least), ("confidence", confidence))

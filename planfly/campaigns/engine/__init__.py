@@ -1,0 +1,1 @@
+"""Workers that fly, on this machine or on a cluster."""

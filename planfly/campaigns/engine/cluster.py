@@ -1,0 +1,112 @@
+"""Workers: processes of this machine, or those of a running dask scheduler."""
+
+import contextlib
+import ipaddress
+import logging
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+from urllib.parse import urlsplit
+
+from world.errors import PlanflyError
+
+# A flight is given up when a second worker dies on it.
+ALLOWED_FAILURES = 1
+_CONNECT_SECONDS = 20
+
+
+class SchedulerError(PlanflyError):
+    """A scheduler cannot be used as it stands."""
+
+
+@dataclass(frozen=True)
+class Workers:
+    """Where a campaign is flown.
+
+    count: processes on this machine; None for as many as it has cores.
+    scheduler: address of a running one; None for workers of our own.
+    """
+
+    count: int | None = None
+    scheduler: str | None = None
+
+
+@contextlib.contextmanager
+def connected(workers: Workers) -> Iterator[Any]:
+    """A `distributed.Client` of these workers; workers of our own end with it.
+
+    Raises SchedulerError for an address that may not be used, and a scheduler that does not answer.
+    """
+    import dask
+    import distributed
+
+    # It states no types.
+    cluster_types: Any = distributed
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    settings = {
+        "distributed.scheduler.allowed-failures": ALLOWED_FAILURES,
+        "distributed.worker.memory.terminate": False,
+        "distributed.worker.memory.pause": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.worker.memory.target": False,
+        "logging": {"distributed": "critical", "tornado": "critical", "asyncio": "critical"},
+    }
+    with dask.config.set(settings):
+        if workers.scheduler is not None:
+            address = checked_address(workers.scheduler)
+            try:
+                client = cluster_types.Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
+            except (OSError, TimeoutError, ValueError) as error:
+                raise SchedulerError(f"--scheduler {address}: no scheduler answers: {error}") from error
+            with client:
+                yield client
+            return
+        cluster = cluster_types.LocalCluster(
+            n_workers=workers.count or os.cpu_count() or 1,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            worker_dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+        )
+        with cluster, cluster_types.Client(cluster, set_as_default=False) as client:
+            yield client
+
+
+def checked_address(address: str) -> str:
+    """A scheduler's address, if flights may be sent there: TLS anywhere, plain TCP on loopback only.
+
+    A scheduler's workers run whatever they are sent.  Raises SchedulerError.
+
+    >>> checked_address("127.0.0.1:8786"), checked_address("tls://10.0.0.7:8786")
+    ('tcp://127.0.0.1:8786', 'tls://10.0.0.7:8786')
+    >>> checked_address("tcp://10.0.0.7:8786")
+    Traceback (most recent call last):
+    ...
+    planfly.campaigns.engine.cluster.SchedulerError: --scheduler tcp://10.0.0.7:8786: plain TCP beyond loopback; ...
+    """
+    whole = address if "://" in address else f"tcp://{address}"
+    try:
+        parts = urlsplit(whole)
+        host, port = parts.hostname, parts.port
+    except ValueError:
+        host = port = None
+    if not host or not port or parts.scheme not in ("tcp", "tls"):
+        raise SchedulerError(f"--scheduler {address}: tcp://HOST:PORT on this machine, or tls://HOST:PORT, is expected")
+    if parts.scheme == "tcp" and not _is_loopback(host):
+        raise SchedulerError(
+            f"--scheduler {address}: plain TCP beyond loopback; use tls://, with certificates in dask's configuration"
+        )
+    return whole
+
+
+def _is_loopback(host: str) -> bool:
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"

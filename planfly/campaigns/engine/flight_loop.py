@@ -1,0 +1,94 @@
+"""Flights sent to workers and taken back, as many at a time as there are workers."""
+
+import uuid
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, cast
+
+from planfly.campaigns.engine.fingerprint import fingerprint
+from planfly.campaigns.engine.flight_tasks import CampaignPlugin, FlyOne, fly_task
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flights.varied_flight import GivenWind
+from world.errors import PlanflyError
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """A flight to fly: its index, and the mean wind that takes the scenario's place, None for none."""
+
+    index: int
+    wind: GivenWind | None = None
+
+
+class Flown(NamedTuple):
+    """An order, and what came of it."""
+
+    order: Order
+    row: FlightRow
+
+
+class Pilots:
+    """Workers that fly the flights of a campaign; client: a `distributed.Client`."""
+
+    def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
+        self._client, self._base = client, base
+        self._name = f"planfly-{uuid.uuid4().hex[:12]}"
+        mine = fingerprint(base.scenario.flight.aircraft)
+        client.register_plugin(CampaignPlugin(self._name, base, mine, fly))
+
+    def close(self) -> None:
+        """Let workers that live on forget the campaign."""
+        self._client.unregister_worker_plugin(self._name)
+
+    def threads(self) -> int:
+        """Flights that the workers can fly at a time, at least 1."""
+        threads: dict[str, int] = self._client.nthreads()
+        return max(1, sum(threads.values()))
+
+    def fly(self, following: Callable[[], Order | None]) -> Iterator[Flown]:
+        """Fly orders as they are asked for, and hand each back as it is done, in whatever order that is.
+
+        following: gives the next order, None for none at present; asked again after each flight.
+        Raises what a flight raised of `world.errors.PlanflyError`, and OSError where the scheduler is lost.
+        """
+        from distributed import as_completed
+
+        flying: dict[str, Order] = {}
+        done: Any = cast("Any", as_completed)(loop=self._client.loop)
+
+        def send() -> None:
+            while len(flying) < self.threads():
+                order = following()
+                if order is None:
+                    return
+                key = f"{self._name}-{order.index}-{uuid.uuid4().hex[:8]}"
+                flying[key] = order
+                done.add(self._client.submit(fly_task, self._name, order.index, order.wind, key=key, pure=False))
+
+        try:
+            send()
+            while flying:
+                future = next(done)
+                order = flying.pop(future.key)
+                row = self._result(future, order)
+                future.release()
+                yield Flown(order, row)
+                send()
+        finally:
+            self._client.cancel(list(done.futures), force=True)
+
+    def _result(self, future: Any, order: Order) -> FlightRow:
+        from distributed import KilledWorker
+
+        if future.status == "finished":
+            row: FlightRow = future.result()
+            return row
+        if future.status == "error":
+            error = future.exception()
+            if isinstance(error, KilledWorker):
+                return lost_row(self._base, order.index, "lost: its worker died twice")
+            if isinstance(error, PlanflyError):
+                raise error
+            raise RuntimeError(f"flight {order.index}: {type(error).__name__}: {error}") from error
+        raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")

@@ -1,0 +1,1 @@
+"""One flight of a campaign: varied, flown, judged, and told as a row."""

@@ -1,0 +1,142 @@
+"""What all flights of a campaign have in common: the mission, planned once, its world, its aircraft, its spread."""
+
+import hashlib
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from aircraft.catalog import model_hash
+from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.trim import straight
+from flight.mission.from_plan import plan_mission
+from flight.mission.items import Mission
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission_files.formats import mission_text
+from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.campaigns.spread.spread_file import FlightSpread, SpreadError
+from planfly.open_mission import OpenedMission, ScenarioChange, open_mission
+from planfly.pipeline import Advance, make_plan, make_setup
+from planner.plan import Plan, plan_json, read_plan
+from world.atomic_files import write_whole
+from world.errors import MissionError
+from world.scenario import Scenario, load_scenario
+
+
+@dataclass(frozen=True)
+class CampaignBase:
+    """One mission, and what varies about it.
+
+    scenario: as planned in; `mission` is flown in it by every flight, in the flight's own wind.
+    airframe: of that scenario.
+    placed: the mission on the terrain that its planner knows, whatever the terrain of a flight is.
+    plan: the mission's; None for one that a person brought.
+    seed: of the draws.
+    name: a stem for file names.
+    """
+
+    scenario: Scenario
+    airframe: Airframe
+    mission: Mission
+    placed: PlacedMission
+    plan: Plan | None
+    spread: FlightSpread
+    seed: int
+    name: str
+
+    def world_hash(self) -> str:
+        """Hash of all that decides what flight k does, but for the code: scenario, mission, model, spread and seed."""
+        model = self.airframe.aircraft
+        terrain = self.scenario.terrain
+        parts = (
+            json.dumps(self.scenario.to_json(), sort_keys=True),
+            "" if terrain is None else hashlib.sha256(terrain.heights.tobytes()).hexdigest(),
+            mission_text(self.mission, "waypoints"),
+            model_hash(model),
+            repr(self.airframe.parameters),
+            json.dumps(self.spread.to_json(), sort_keys=True),
+            str(self.seed),
+        )
+        return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:16]
+
+
+def open_campaign(
+    target: str,
+    spread: FlightSpread,
+    *,
+    planned: Path | None = None,
+    scenario_name: str | None = None,
+    terrain: str | None = None,
+    seed: int | None = None,
+    change: ScenarioChange = lambda scenario: scenario,
+    advance: Advance | None = None,
+) -> CampaignBase:
+    """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
+
+    target: an embedded scenario's name, a scenario's TOML file, a plan.json, .waypoints or .plan.
+    planned: where a scenario's plan is kept: it is read from there if it is there already, else written.
+    scenario_name, terrain, change: as of `planfly.open_mission.open_mission`.
+    seed: of plan and draws; None takes the scenario's, or 1.
+    Raises a PlanflyError for bad input, a plan that is not feasible, and a spread whose middle is no aircraft that
+    flies.
+    """
+    path = Path(target)
+    if path.suffix.lower() not in (".json", ".waypoints", ".plan"):
+        scenario = change(load_scenario(target, terrain))
+        kept = planned is not None and planned.is_file()
+        plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
+        if kept and plan.scenario.to_json() != scenario.to_json():
+            raise MissionError(f"{planned}: is the plan of another scenario than {target}")
+        if planned is not None and not kept:
+            write_whole(planned, plan_json(plan))
+        base = _of_plan(plan, spread, choose_seed(scenario, seed))
+    else:
+        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change)
+        base = _of_mission(opened, spread, path.name)
+    check_middle(base)
+    # A mission that cannot be laid out is refused here, not by a worker.
+    make_setup(base.scenario, base.airframe, base.mission, base.seed, plan=base.plan, placed=base.placed)
+    return base
+
+
+def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
+    plan = make_plan(scenario, load_airframe(scenario), choose_seed(scenario, seed), advance=advance)
+    if not plan.feasible:
+        raise MissionError(f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why")
+    return plan
+
+
+def _of_plan(plan: Plan, spread: FlightSpread, seed: int) -> CampaignBase:
+    scenario = plan.scenario
+    airframe = load_airframe(scenario)
+    tracking = airframe.limits.tracking
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="plan.json", tracking=tracking)
+    placed = place_stops(mission, scenario.origin, scenario.terrain)
+    return CampaignBase(scenario, airframe, mission, placed, plan, spread, seed, scenario.name)
+
+
+def _of_mission(opened: OpenedMission, spread: FlightSpread, source: str) -> CampaignBase:
+    setup = opened.setup
+    # By its name alone: the folder that it lies in is nothing of the flight's.
+    mission = replace(setup.mission, source=source)
+    scenario = setup.scenario
+    placed = place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=setup.plan is None)
+    return CampaignBase(scenario, opened.airframe, mission, placed, setup.plan, spread, setup.seed, opened.name)
+
+
+def check_middle(base: CampaignBase) -> None:
+    """Refuse a spread with whose medians the aircraft holds no level flight.  Raises SpreadError."""
+    medians = {one.quantity.name: one.value(0.5) for one in base.spread.varying}
+    variation = Variation(
+        mass=medians.get("mass", 1.0), drag=medians.get("drag", 1.0), control=medians.get("control_power", 1.0)
+    )
+    aircraft = base.airframe.aircraft
+    model = Fdm(aircraft, motor_braking=base.scenario.flight.motor_braking, variation=variation)
+    amsl = float(base.scenario.start[2])
+    if straight(model, base.airframe.airspeed, amsl) is None:
+        factors = ", ".join(
+            f"{name} {medians[name]:g}" for name in ("mass", "drag", "control_power") if name in medians
+        )
+        raise SpreadError(
+            f"{base.spread.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
+            f" {base.airframe.airspeed:g} m/s"
+        )

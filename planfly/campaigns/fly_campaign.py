@@ -1,0 +1,139 @@
+"""A campaign from its first flight to its answer: flown in parallel, written down by index, told from the table."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from planfly.campaigns.engine.cluster import Workers, connected
+from planfly.campaigns.engine.fingerprint import code_hash
+from planfly.campaigns.engine.flight_loop import Order, Pilots
+from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import FlightRow, fly_one
+from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
+from planfly.campaigns.statistics.proportions import Tally
+from planfly.campaigns.storage.store import DATABASE, Store
+
+Advance = Callable[[float, float, str], None]
+# Seconds between two lines of progress.
+_TOLD_EVERY = 0.5
+
+
+@dataclass
+class _Book:
+    """Which flights are known, and what the first of them without a gap come to.
+
+    beyond: outcome of the known ones after the first gap.
+    """
+
+    estimator: Estimator
+    goal: Goal
+    tally: Tally = field(default_factory=lambda: Tally(0, 0))
+    beyond: dict[int, str] = field(default_factory=dict)
+    sent: int = 0
+    decided: bool = False
+
+    def add(self, index: int, outcome: str) -> None:
+        """Take a flight in, and decide as soon as the flights without a gap do."""
+        self.beyond[index] = outcome
+        while not self.decided and (known := self.beyond.pop(self.tally.flown, None)) is not None:
+            self.tally = _with_outcome(self.tally, known)
+            self.decided = self.goal.stops and self.estimator.decides(self.tally)
+
+    def following(self) -> Order | None:
+        """The next flight to send."""
+        self.sent = max(self.sent, self.tally.flown)
+        while self.sent in self.beyond:
+            self.sent += 1
+        if self.decided or self.sent >= self.goal.flights:
+            return None
+        self.sent += 1
+        return Order(self.sent - 1)
+
+
+def _with_outcome(tally: Tally, outcome: str) -> Tally:
+    flyable, failed, lost = tally
+    return Tally(flyable + (outcome == "flyable"), failed + (outcome == "not flyable"), lost + (outcome == "lost"))
+
+
+def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
+    """The campaign's table in a folder, new or to go on with."""
+    settings = {
+        "name": base.name,
+        "seed": base.seed,
+        "target": goal.target,
+        "stops": goal.stops,
+        "flights": goal.flights,
+        "confidence": goal.confidence,
+        "spread": base.spread.to_json(),
+    }
+    return Store(folder / DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
+
+
+def fly_campaign(
+    base: CampaignBase,
+    goal: Goal,
+    workers: Workers,
+    store: Store,
+    advance: Advance | None = None,
+    fly: FlyOne = fly_one,
+) -> Estimate:
+    """Fly what the table has not, until the goal's number of flights or its answer.
+
+    Flights are decided upon in the order of their indices, so that answer and table do not depend on who was quicker;
+    those beyond the one that decides are taken out again.  What was flown before an error or Ctrl-C stays in the table.
+    """
+    estimator = Estimator(goal)
+    book = _Book(estimator, goal)
+    for index, outcome in store.outcomes().items():
+        if index < goal.flights:
+            book.add(index, outcome)
+    if not book.decided and book.tally.flown < goal.flights:
+        with connected(workers) as client:
+            _fly_rest(Pilots(client, base, fly), book, store, _Pace(goal, estimator, advance))
+    store.drop_from(book.tally.flown)
+    return estimator.estimate(store.tally())
+
+
+def _fly_rest(pilots: Pilots, book: _Book, store: Store, pace: "_Pace") -> None:
+    try:
+        for _, row in pilots.fly(book.following):
+            _take(row, book, store)
+            pace.tell(book.tally)
+            if book.decided:
+                break
+    finally:
+        pilots.close()
+
+
+def _take(row: FlightRow, book: _Book, store: Store) -> None:
+    store.add(row)
+    book.add(row.draw.index, row.outcome)
+
+
+class _Pace:
+    """Progress, told now and then."""
+
+    def __init__(self, goal: Goal, estimator: Estimator, advance: Advance | None) -> None:
+        self._goal, self._estimator, self._advance = goal, estimator, advance
+        self._started = self._last = time.monotonic()
+        self._first: int | None = None
+
+    def tell(self, tally: Tally) -> None:
+        """How far it is: flights, P with its bounds, flights a minute, time left."""
+        now = time.monotonic()
+        if self._first is None:
+            self._first = tally.flown
+        if self._advance is None or not tally.flown or now - self._last < _TOLD_EVERY:
+            return
+        self._last = now
+        found = self._estimator.estimate(tally)
+        rate = (tally.flown - self._first) / max(now - self._started, 1e-3)
+        whole = max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
+        left = (whole - tally.flown) / rate if rate > 0.0 else 0.0
+        remark = (
+            f"{tally.flown} flights, P {tally.share:.4f} ({found.lower:.4f} to {found.upper:.4f}),"
+            f" {60.0 * rate:.0f} a minute, {left:.0f} s left"
+        )
+        self._advance(float(tally.flown), float(whole), remark)

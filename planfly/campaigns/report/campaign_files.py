@@ -1,0 +1,64 @@
+"""The files of a campaign's folder beside its table: summary, report, and the logs of its worst flights."""
+
+from pathlib import Path
+
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import FlightRow, fly_one
+from planfly.campaigns.report.summary import CampaignSummary, log_name, summary_json
+from planfly.campaigns.storage.store import Store, same_flight
+from planfly.pipeline import Advance
+from world.atomic_files import write_whole
+from world.errors import PlanflyError
+
+# What a campaign writes into its folder, and clears where it is replaced.
+CAMPAIGN_FILES = (
+    "campaign.sqlite", "campaign.sqlite-wal", "campaign.sqlite-shm", "summary.json", "report.html", "plan.json",
+)  # fmt: skip
+
+
+def clear_campaign(folder: Path) -> None:
+    """Make a folder, and clear what an earlier campaign left there; anything else stays."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in (*(folder / name for name in CAMPAIGN_FILES), *_logs(folder)):
+        path.unlink(missing_ok=True)
+
+
+def _logs(folder: Path) -> list[Path]:
+    return sorted((folder / "worst").glob("flight-[0-9]*.mcap"))
+
+
+def write_files(
+    folder: Path,
+    base: CampaignBase,
+    summary: CampaignSummary,
+    store: Store,
+    command: str,
+    advance: Advance | None = None,
+) -> None:
+    """Write ``summary.json``, ``report.html`` and the worst flights' logs; logs of flights that are none stay not."""
+    from planfly.campaigns.report.page import campaign_page
+
+    (folder / "worst").mkdir(exist_ok=True)
+    kept = {folder / log_name(row) for row in summary.worst}
+    for path in _logs(folder):
+        if path not in kept:
+            path.unlink()
+    for count, row in enumerate(summary.worst):
+        path = folder / log_name(row)
+        if row.duration > 0.0 and not path.exists():
+            fly_row_again(base, row, path)
+        if advance is not None:
+            advance(count + 1.0, float(len(summary.worst)), f"flight {row.draw.index}")
+    write_whole(folder / "summary.json", summary_json(summary))
+    write_whole(folder / "report.html", campaign_page(base, summary, store, command))
+
+
+def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
+    """Fly a flight of the table once more, into a log.
+
+    Raises PlanflyError where it does not come out as the table has it: the machine that flew it computes otherwise.
+    """
+    again = fly_one(base, row.draw.index, log=log)
+    if not same_flight(row, again):
+        raise PlanflyError(f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown")
+    return again

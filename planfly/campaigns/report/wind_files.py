@@ -1,0 +1,85 @@
+"""The files of a go/no-go chart: data, picture and page."""
+
+import json
+import math
+from pathlib import Path
+
+from logs.figures.elements.style import png_bytes
+from planfly.campaigns.find_winds import WindsFound
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.pictures.go_no_go import Spoke, draw_go_no_go
+from planfly.campaigns.report.page import winds_page
+from world.atomic_files import write_whole
+
+SCHEMA = "planfly.winds/1"
+
+
+def spokes(found: WindsFound) -> list[Spoke]:
+    """The chart's data."""
+    out = []
+    for number, boundary in enumerate(found.boundaries):
+        counts: dict[float, list[bool]] = {}
+        for direction, speed, flyable in found.flights:
+            if direction == number:
+                counts.setdefault(speed, []).append(flyable)
+        marks = tuple((speed, len(all_), sum(all_)) for speed, all_ in sorted(counts.items()))
+        out.append(
+            Spoke(found.from_deg(number), boundary.estimate, boundary.low, boundary.high, boundary.beyond, marks)
+        )
+    return out
+
+
+def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: str) -> None:
+    """Write ``winds.json``, ``winds.png`` and ``winds.html``."""
+    goal, chart = found.goal, spokes(found)
+    wind = base.scenario.wind
+    own = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
+    figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, own)
+    rows = [
+        (f"{one.from_deg:g}°", _speed_text(one.boundary, goal.most), f"{one.low:.1f} to {one.high:.1f}",
+         str(sum(count for _, count, _ in one.flights)))
+        for one in chart
+    ]  # fmt: skip
+    data = {
+        "schema": SCHEMA,
+        "name": base.name,
+        "seed": base.seed,
+        "target": goal.target,
+        "confidence": goal.confidence,
+        "most": goal.most,
+        "flights": len(found.flights),
+        "directions": [
+            {
+                "from_deg": one.from_deg,
+                "boundary_mps": round(one.boundary, 3),
+                "interval_mps": [round(one.low, 3), round(one.high, 3)],
+                "beyond": one.reaches,
+                "flown": [
+                    {"speed_mps": round(v, 3), "flights": count, "flyable": good} for v, count, good in one.flights
+                ],
+            }
+            for one in chart
+        ],
+        "spread": base.spread.to_json(),
+    }
+    page = winds_page(base.name, figure, wind_lines(found), rows, command)
+    write_whole(folder / "winds.json", json.dumps(data, indent=1, allow_nan=False) + "\n")
+    write_whole(folder / "winds.png", png_bytes(figure))
+    write_whole(folder / "winds.html", page)
+
+
+def _speed_text(speed: float, most: float) -> str:
+    return f"over {most:g} m/s" if speed >= most - 1e-9 else f"{speed:.1f} m/s"
+
+
+def wind_lines(found: WindsFound) -> list[str]:
+    """What was found, in a few lines."""
+    chart = spokes(found)
+    least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
+    most = found.goal.most
+    return [
+        f"flies with P >= {found.goal.target:g} in wind up to {_speed_text(least.boundary, most)}"
+        f" from {least.from_deg:g}° (the least), {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        f"{len(found.flights)} flights; intervals at {100 * found.goal.confidence:g} %, by probit regression"
+        " of each direction",
+    ]

@@ -1,0 +1,191 @@
+"""The spread of a campaign: which quantities vary and by which distribution, read from a TOML file.
+
+A table a quantity, named as in `planfly.campaigns.spread.quantities`; `distribution` is the name of one of
+`scipy.stats`' distributions, the other keys are its parameters, and `source` says where the numbers are from:
+
+    [wind_speed]
+    distribution = "norm"
+    scale = 1.5
+    source = "two years of the airfield's records"
+"""
+
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from planfly.campaigns.spread.quantities import BY_NAME, NAMES, Quantity
+from world.errors import PlanflyError
+from world.text_files import read_small_file, utf8_text
+
+# Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
+INSIDE = 0.99
+MOST_BYTES = 100_000
+DEFAULT = "planfly's default spread"
+
+
+class SpreadError(PlanflyError):
+    """A spread file cannot be used as it stands."""
+
+
+@dataclass(frozen=True)
+class Varying:
+    """One quantity and its distribution.
+
+    distribution: a name of `scipy.stats`.
+    parameters: by keyword, as `scipy.stats` takes them.
+    source: where the numbers are from.
+    """
+
+    quantity: Quantity
+    distribution: str
+    parameters: tuple[tuple[str, float], ...]
+    source: str
+
+    @cached_property
+    def _frozen(self) -> Any:
+        from scipy import stats
+
+        return getattr(stats, self.distribution)(**dict(self.parameters))
+
+    @cached_property
+    def _inside(self) -> tuple[float, float]:
+        """The distribution function below the range, and at its end."""
+        low = self.quantity.low - (0.5 if self.quantity.whole else 0.0)
+        return float(self._frozen.cdf(low)), float(self._frozen.cdf(self.quantity.high))
+
+    @property
+    def share_inside(self) -> float:
+        """How much of the distribution lies within the quantity's range, 0 to 1; NaN for parameters that it has not."""
+        low, high = self._inside
+        return high - low
+
+    def value(self, uniform: float) -> float:
+        """The quantity at this share (0 to 1) of the distribution within its range: the inverse of the distribution.
+
+        >>> Varying(BY_NAME["mass"], "uniform", (("loc", 0.9), ("scale", 0.2)), "by hand").value(0.25)
+        0.95
+        """
+        low, high = self._inside
+        drawn = float(self._frozen.ppf(low + uniform * (high - low)))
+        return min(self.quantity.high, max(self.quantity.low, drawn))
+
+
+@dataclass(frozen=True)
+class FlightSpread:
+    """All that varies, in the order of `planfly.campaigns.spread.quantities.QUANTITIES`; name: where it is from."""
+
+    varying: tuple[Varying, ...]
+    name: str
+
+    def without(self, names: tuple[str, ...]) -> "FlightSpread":
+        """The spread in which these quantities do not vary."""
+        return FlightSpread(tuple(one for one in self.varying if one.quantity.name not in names), self.name)
+
+    def to_json(self) -> dict[str, dict[str, Any]]:
+        """As plain data, a table a quantity."""
+        return {
+            one.quantity.name: {"distribution": one.distribution, **dict(one.parameters), "source": one.source}
+            for one in self.varying
+        }
+
+
+def default_spread() -> FlightSpread:
+    """The spread that campaigns have where no other is given.
+
+    >>> [one.quantity.name for one in default_spread().varying][:3]
+    ['wind_speed', 'wind_from', 'wind_gradient']
+    """
+    text = (resources.files("planfly.campaigns.spread") / "default_spread.toml").read_text(encoding="utf-8")
+    return parse_spread(text, DEFAULT)
+
+
+def read_spread(path: Path) -> FlightSpread:
+    """Read a spread file.  Raises SpreadError for one that cannot be read or used."""
+    return parse_spread(
+        utf8_text(read_small_file(path, MOST_BYTES, "spread", SpreadError), path, SpreadError), str(path)
+    )
+
+
+def parse_spread(text: str, name: str) -> FlightSpread:
+    r"""The spread of a file's text; name: of the file in messages.
+
+    Raises SpreadError, in one line, for what is no TOML, an unknown quantity, an unknown distribution, a parameter that
+    the distribution has not or may not have, and a distribution that lies outside the quantity's range.
+
+    >>> parse_spread('[mass]\ndistribution = "norm"\nloc = 9.0\nscale = 0.1\nsource = "a guess"', "mine.toml")
+    Traceback (most recent call last):
+    ...
+    planfly.campaigns.spread.spread_file.SpreadError: mine.toml: mass: norm(loc=9, scale=0.1): 0.0 % ... 0.5..2 ...
+    """
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SpreadError(f"{name}: {' '.join(str(error).split())}") from None
+    unknown = [key for key in tables if key not in BY_NAME]
+    if unknown:
+        raise SpreadError(f"{name}: {unknown[0]}: unknown; it is one of {', '.join(NAMES)}")
+    varying = tuple(_varying(BY_NAME[key], tables[key], f"{name}: {key}") for key in NAMES if key in tables)
+    if not varying:
+        raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}")
+    return FlightSpread(varying, name)
+
+
+def _varying(quantity: Quantity, table: Any, where: str) -> Varying:
+    if not isinstance(table, dict):
+        raise SpreadError(f"{where}: a table is expected, with distribution, its parameters, and source")
+    entries = dict(table)
+    distribution, source = entries.pop("distribution", None), entries.pop("source", None)
+    _check_distribution(quantity, distribution, where)
+    if not isinstance(source, str) or not source.strip():
+        raise SpreadError(f"{where}.source: missing; say where the numbers are from")
+    _check_parameters(str(distribution), entries, where)
+    varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
+    share = _share_inside(varying, where)
+    if not share >= INSIDE:
+        raise SpreadError(
+            f"{where}: {_call(varying)}: {100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
+            f" {quantity.unit or 'of the nominal'}; at least {100.0 * INSIDE:.0f} % has to"
+        )
+    return varying
+
+
+def _check_distribution(quantity: Quantity, name: Any, where: str) -> None:
+    from scipy import stats
+
+    kind = stats.rv_discrete if quantity.whole else stats.rv_continuous
+    if not isinstance(name, str):
+        raise SpreadError(f"{where}.distribution: missing; the name of one of scipy.stats' distributions is expected")
+    if not isinstance(getattr(stats, name, None), kind):
+        sort = "a discrete one, such as randint" if quantity.whole else "a continuous one, such as norm"
+        raise SpreadError(f"{where}.distribution: {name!r}: no distribution of scipy.stats; {sort}, is expected")
+
+
+def _check_parameters(distribution: str, entries: dict[str, Any], where: str) -> None:
+    from scipy import stats
+
+    frozen: Any = getattr(stats, distribution)
+    shapes = frozen.shapes.replace(",", " ").split() if frozen.shapes else []
+    allowed = [*shapes, "loc"] if isinstance(frozen, stats.rv_discrete) else [*shapes, "loc", "scale"]
+    for key, value in entries.items():
+        if key not in allowed:
+            raise SpreadError(f"{where}.{key}: not a parameter of {distribution}, which has {', '.join(allowed)}")
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise SpreadError(f"{where}.{key}: {value!r}: a finite number is expected")
+    missing = [key for key in shapes if key not in entries]
+    if missing:
+        raise SpreadError(f"{where}.{missing[0]}: missing; {distribution} needs {', '.join(shapes)}")
+
+
+def _share_inside(varying: Varying, where: str) -> float:
+    share = varying.share_inside
+    if math.isnan(share):
+        raise SpreadError(f"{where}: {_call(varying)}: no parameters that {varying.distribution} may have")
+    return share
+
+
+def _call(varying: Varying) -> str:
+    return f"{varying.distribution}({', '.join(f'{key}={value:g}' for key, value in varying.parameters)})"

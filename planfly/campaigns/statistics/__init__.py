@@ -1,0 +1,1 @@
+"""What a number of flights says of the probability that one flies."""

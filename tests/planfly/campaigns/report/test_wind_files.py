@@ -1,0 +1,32 @@
+"""The go/no-go chart's files."""
+
+import json
+from pathlib import Path
+
+from planfly.campaigns.find_winds import WindsFound, WindsGoal
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.report.wind_files import spokes, wind_lines, write_winds
+from planfly.campaigns.statistics.wind_boundary import WindBoundary
+
+FOUND = WindsFound(
+    WindsGoal(0.9, 0.95, 4, 20.0, 99),
+    (*(WindBoundary(7.0 + k, 6.5 + k, 7.5 + k, False) for k in range(3)), WindBoundary(20.0, 18.0, 20.0, True)),
+    ((0, 8.0, True), (0, 8.0, False), (1, 5.0, True), (2, 5.0, True), (3, 20.0, True)),
+)
+
+
+def test_flights_are_counted_by_wind() -> None:
+    first = spokes(FOUND)[0]
+    assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
+    assert wind_lines(FOUND)[0].startswith("flies with P >= 0.9 in wind up to 7.0 m/s from 0° (the least), over 20 m/s")
+
+
+def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
+    write_winds(tmp_path, base, FOUND, "planfly winds x")
+    data = json.loads((tmp_path / "winds.json").read_text())
+    assert [one["boundary_mps"] for one in data["directions"]] == [7.0, 8.0, 9.0, 20.0]
+    assert data["directions"][3]["beyond"] is True
+    assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
+    page = (tmp_path / "winds.html").read_text()
+    assert "over 20 m/s" in page
+    assert page.count("<img") == 1

@@ -1,0 +1,86 @@
+"""The bound that holds at every number of flights: against the definition, and 1,000 campaigns of known probability."""
+
+import math
+import os
+
+import numpy as np
+import pytest
+from scipy.special import betaln
+
+from planfly.campaigns.statistics.proportions import Tally
+from planfly.campaigns.statistics.stopping_bound import StoppingBound
+
+SOAK = "PLANFLY_SOAK" in os.environ
+
+
+@pytest.mark.parametrize(("target", "flights"), [(0.9, 29), (0.95, 59), (0.99, 299)])
+def test_without_a_failure_it_takes_no_more_flights_than_a_fixed_number(target: float, flights: int) -> None:
+    bound = StoppingBound(target)
+    assert bound.fewest == flights == math.ceil(math.log(0.05) / math.log(target))
+    assert bound.interval(flights, 0).low >= target > bound.interval(flights - 1, 0).low
+
+
+def test_the_mixture_is_a_martingale_that_begins_at_one() -> None:
+    """From any s and f, the mean of E over the next flight is E itself: the sum that all of it rests on."""
+    bound, p = StoppingBound(0.99), 0.93
+    assert bound.evidence(0, 0, p) == pytest.approx(0.0, abs=1e-12)
+    for s, f in ((0, 0), (5, 0), (40, 3), (300, 1)):
+        mean = p * math.exp(bound.evidence(s + 1, f, p)) + (1 - p) * math.exp(bound.evidence(s, f + 1, p))
+        assert mean == pytest.approx(math.exp(bound.evidence(s, f, p)), rel=1e-9)
+
+
+def test_its_edges_are_where_the_evidence_is_twenty() -> None:
+    bound = StoppingBound(0.95)
+    low, high = bound.interval(180, 20)
+    assert 0.0 < low < 0.9 < high < 1.0
+    for edge in (low, high):
+        terms = [w * math.exp(betaln(180 + a, 20 + b) - betaln(a, b)) for w, a, b in bound.parts]
+        assert sum(terms) / (edge**180 * (1 - edge) ** 20) == pytest.approx(20.0, rel=1e-6)
+
+
+def looks(most: int) -> list[int]:
+    """Numbers of flights at which the campaigns are looked at: each up to 60, then a twentieth more each time."""
+    out = list(range(1, 61))
+    while out[-1] < most:
+        out.append(math.ceil(1.05 * out[-1]))
+    return out
+
+
+@pytest.mark.parametrize("p", [0.5, 0.9, 0.99, 0.999])
+def test_it_covers_at_all_stopping_times_and_prove_errs_in_at_most_a_twentieth(p: float) -> None:
+    campaigns, most = (1000, 20_000) if SOAK else (300, 3000)
+    bound, enough = StoppingBound(0.99), -math.log(0.05)
+    random = np.random.default_rng(7)
+    parts = np.array(bound.parts)
+    left = erred = 0
+    when = np.array([n for n in looks(most) if n <= most])
+    for _ in range(campaigns):
+        success = np.cumsum(random.random(most) < p)[when - 1]
+        failure = when - success
+
+        def evidence(q: float, s: np.ndarray = success, f: np.ndarray = failure) -> np.ndarray:
+            terms = [math.log(w) + betaln(s + a, f + b) - betaln(a, b) for w, a, b in parts]
+            return np.logaddexp.reduce(terms, axis=0) - s * math.log(q) - f * math.log1p(-q)
+
+        left += bool((evidence(p) >= enough).any())
+        # As --prove: the first time that the target is excluded, on the side where the share lies.
+        decided = np.flatnonzero(evidence(0.99) >= enough)
+        if decided.size:
+            reached = success[decided[0]] / when[decided[0]] > 0.99
+            erred += bool(reached) != (p >= 0.99)
+    assert left <= 0.05 * campaigns
+    assert erred <= 0.05 * campaigns
+
+
+def test_a_target_far_off_is_refuted_soon() -> None:
+    bound = StoppingBound(0.99)
+    # Half of the flights fail: by hand 0.01^10 0.99^10 is 9e-21 of what Beta(1/2, 1/2) makes of it.
+    assert bound.interval(10, 10).high < 0.99
+
+
+def test_lost_flights_count_against_both_ways() -> None:
+    bound = StoppingBound(0.9)
+    low, high = bound.bounds(Tally(200, 5, 10))
+    assert low == bound.interval(200, 15).low
+    assert high == bound.interval(210, 5).high
+    assert bound.interval(0, 0) == (0.0, 1.0)

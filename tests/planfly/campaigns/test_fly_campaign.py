@@ -1,0 +1,145 @@
+"""The table does not depend on who flew, in which order, or how often it was interrupted."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.fly_campaign import _Book, fly_campaign, open_store
+from planfly.campaigns.statistics.decision import Estimator, Goal
+from planfly.campaigns.statistics.proportions import Tally
+from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, read_table
+from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, short_base
+
+SOAK = "PLANFLY_SOAK" in os.environ
+pytestmark = pytest.mark.filterwarnings("default")
+
+
+def table(folder: Path) -> dict[str, list[object]]:
+    return {name: values for name, values in read_table(folder / DATABASE).items() if name not in NOT_THE_SAME}
+
+
+def flown(base: CampaignBase, goal: Goal, folder: Path, workers: Workers, fly: object = made_flight) -> object:
+    folder.mkdir(exist_ok=True)
+    resume = (folder / DATABASE).exists()
+    with open_store(base, goal, folder, resume=resume) as store:
+        return fly_campaign(base, goal, workers, store, fly=fly)
+
+
+def expected(base: CampaignBase, folder: Path, count: int, fly: object = made_flight) -> dict[str, list[object]]:
+    """The table as one process writes it, flight after flight."""
+    folder.mkdir()
+    with open_store(base, Goal(None, False, count), folder, resume=False) as store:
+        for k in range(count):
+            store.add(fly(base, k))
+    return table(folder)
+
+
+@pytest.mark.parametrize("order", range(6))
+def test_it_decides_in_the_order_of_indices_whoever_was_quicker(order: int) -> None:
+    goal = Goal(0.95, True, 500)
+    shuffled = list(range(80))
+    random.Random(order).shuffle(shuffled)
+    book = _Book(Estimator(goal), goal)
+    for index in shuffled:
+        book.add(index, "flyable")
+    # 59 flights without a failure show 0.95; those beyond are not looked at.
+    assert book.decided
+    assert book.tally == Tally(59, 0)
+    assert book.following() is None
+
+
+def test_what_is_known_is_not_sent_again() -> None:
+    goal = Goal(None, False, 6)
+    book = _Book(Estimator(goal), goal)
+    for known in (0, 1, 3):
+        book.add(known, "flyable")
+    sent = []
+    while (order := book.following()) is not None:
+        sent.append(order.index)
+    assert sent == [2, 4, 5]
+
+
+def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBase, tmp_path: Path) -> None:
+    count = 60 if SOAK else 24
+    goal, want = Goal(None, False, count), expected(base, tmp_path / "one", count)
+    for workers in (1, 2, 4) if SOAK else (2,):
+        flown(base, goal, tmp_path / f"w{workers}", Workers(workers))
+        assert table(tmp_path / f"w{workers}") == want
+    # Part of it first, with a gap, as one who was stopped leaves it.
+    folder = tmp_path / "part"
+    folder.mkdir()
+    with open_store(base, Goal(None, False, count), folder, resume=False) as store:
+        for k in (0, 1, 2, 5, 9):
+            store.add(made_flight(base, k))
+    flown(base, goal, folder, Workers(2))
+    assert table(folder) == want
+
+
+def test_prove_keeps_the_flights_that_decide_and_no_more(base: CampaignBase, tmp_path: Path) -> None:
+    goal = Goal(0.9, True, 500)
+    found = flown(base, goal, tmp_path / "p", Workers(2), all_fly)
+    assert found.answer == "reached"
+    assert table(tmp_path / "p") == expected(base, tmp_path / "one", 29, all_fly)
+
+
+_CLIENT = """
+import sys
+from pathlib import Path
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.statistics.decision import Goal
+from tests.planfly.campaigns.made_campaigns import short_base, slow_flight
+
+if __name__ == "__main__":
+    folder = Path(sys.argv[1])
+    base, goal = short_base(folder), Goal(None, False, int(sys.argv[2]))
+    with open_store(base, goal, folder, resume=(folder / "campaign.sqlite").exists()) as store:
+        fly_campaign(base, goal, Workers(2), store, fly=slow_flight)
+"""
+
+
+@pytest.mark.skipif(not SOAK, reason="twenty kills of the client: in make soak")
+def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
+    folder, count = tmp_path / "killed", 300
+    folder.mkdir()
+    script = tmp_path / "client.py"
+    script.write_text(_CLIENT)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    moments, known = random.Random(3), 0
+    for _ in range(20):
+        client = subprocess.Popen([sys.executable, str(script), str(folder), str(count)], env=environment)
+        time.sleep(moments.uniform(1.0, 8.0))
+        client.send_signal(signal.SIGKILL)
+        client.wait()
+        if (folder / DATABASE).exists():
+            now = len(table(folder)["flight"]) if table(folder) else 0
+            assert now >= known
+            known = now
+    subprocess.run([sys.executable, str(script), str(folder), str(count)], env=environment, check=True)
+    assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
+
+
+@pytest.mark.skipif(not SOAK, reason="a scheduler and two workers of their own: in make soak")
+def test_a_real_scheduler_gives_the_same_table(base: CampaignBase, tmp_path: Path) -> None:
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path.cwd()), *sys.path])}
+    dask = [sys.executable, "-m", "dask"]
+    scheduler = subprocess.Popen(
+        [*dask, "scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard"], env=environment
+    )
+    line = [*dask, "worker", "tcp://127.0.0.1:18786", "--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard"]
+    workers = [subprocess.Popen(line, env=environment) for _ in range(2)]
+    try:
+        flown(base, Goal(None, False, 40), tmp_path / "far", Workers(None, "tcp://127.0.0.1:18786"))
+    finally:
+        for process in (*workers, scheduler):
+            process.terminate()
+            process.wait()
+    assert table(tmp_path / "far") == expected(base, tmp_path / "one", 40)

@@ -1,0 +1,63 @@
+"""``planfly campaign``: from its first flight to its report, on, again, and one line for what cannot be."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from planfly.cli import main
+from tests.planfly.campaigns.made_campaigns import write_short
+
+pytestmark = pytest.mark.filterwarnings("default")
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[str], Path]:
+    folder = tmp_path_factory.mktemp("campaign")
+    mission, scenario = write_short(folder)
+    line = ["campaign", str(mission), "--scenario", str(scenario), "--workers", "1", "--out", str(folder / "out")]
+    assert main([*line, "--flights", "4", "--at-least", "0.9"]) == 3
+    return line, folder / "out"
+
+
+def test_it_leaves_its_files_and_says_undecided(flown: tuple[list[str], Path]) -> None:
+    _, out = flown
+    assert {path.name for path in out.iterdir()} == {"campaign.sqlite", "summary.json", "report.html", "worst"}
+    summary = json.loads((out / "summary.json").read_text())
+    assert (summary["flights"], summary["answer"]) == (4, "undecided")
+    assert len(list((out / "worst").iterdir())) == 4
+
+
+def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) -> None:
+    line, out = flown
+    assert main([*line, "--refly", "2"]) == 0
+    assert (out / "flights/flight-000002.mcap").read_bytes() == (out / "worst/flight-000002.mcap").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--refly", "9"], "no such flight"),
+        ([], "--resume goes on with it"),
+        (["--resume", "--seed", "2"], "another campaign"),
+        (["--resume", "--spread", "none.toml"], "cannot be read"),
+        (["--resume", "--scheduler", "tcp://10.0.0.1:8786", "--flights", "5"], "plain TCP beyond loopback"),
+    ],
+)
+def test_one_line_and_nothing_lost(
+    flown: tuple[list[str], Path], more: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    line, out = flown
+    before = (out / "summary.json").read_bytes()
+    assert main([*line, *more]) == 2
+    told = [one for one in capsys.readouterr().err.splitlines() if one.startswith("planfly: ")]
+    assert len(told) == 1
+    assert words in told[0]
+    assert (out / "summary.json").read_bytes() == before
+
+
+def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    line, _ = flown
+    assert main([*line[:-1], str(tmp_path / "none"), "--resume"]) == 2
+    assert "no campaign there" in capsys.readouterr().err
+    assert not (tmp_path / "none").exists()
