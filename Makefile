@@ -6,10 +6,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 # A file's tests run in one of two processes, so that what they share is made once; files in their own order.
 TWO := -n 2 --dist loadfile --no-loadscope-reorder
+# Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
+LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
+	tests/flight/live tests/logs/recording tests/logs/verdict
 READY := $(VENV)/.ready
 TESTED := $(VENV)/.ready-test
 
-.PHONY: demo test bench soak dev setup clients clean
+# make low: the tests with the lowest versions supported
+.PHONY: demo test bench soak low dev setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
@@ -19,15 +23,25 @@ test: $(TESTED) clients
 	$(BIN)/ruff format --check .
 # Compiled once, while types are checked: each of pytest's processes would compile for itself.
 	$(BIN)/python -m tests.kernels >/dev/null & compiled=$$!; $(BIN)/mypy && wait $$compiled
+	$(BIN)/python -m pip list 2>/dev/null | grep -i -E "^(jsbsim|llvmlite|mcap|numba|numpy|pydantic|scipy) "
 	$(BIN)/python -m pytest $(TWO)
 
 bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
+# Full counts: hours.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of them.
 soak: $(TESTED) clients
+	rm -f build/soak.json
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest $(TWO)
 	$(BIN)/python -m tests.mutations --count 200
+
+# The tests with the lowest versions that pyproject.toml allows, in an environment of their own.
+low:
+	$(PYTHON) -m venv build/low
+	build/low/bin/python -m pip install --quiet --constraint constraints-low.txt --editable . hypothesis pytest pytest-xdist
+	build/low/bin/python -m pip list | grep -i -E "numba|numpy|jsbsim|mcap|pydantic"
+	build/low/bin/python -m pytest $(TWO) $(LOW)
 
 dev: $(TESTED)
 

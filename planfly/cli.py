@@ -5,6 +5,7 @@ import sys
 from collections.abc import Sequence
 
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
+from planfly.terminal.output import open_standard_streams, printable, tolerate_closed_output
 from planfly.terminal.parser import build_parser
 from planfly.terminal.signal_watch import end_process, ended_by_signals
 from world.interruption import Interrupted
@@ -17,6 +18,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     if argv is not None:
         return _outcome(argv)
+    open_standard_streams()
     with ended_by_signals() as heard:
         try:
             code = _outcome(argv)
@@ -45,7 +47,6 @@ def _outcome(argv: Sequence[str] | None) -> int:
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
     from planfly.commands.registry import find_command
-    from planfly.terminal.output import tolerate_closed_output
     from world.errors import PlanflyError
 
     try:
@@ -56,7 +57,7 @@ def _command(args: argparse.Namespace) -> int:
 
 
 def _fail(code: int, message: object) -> int:
-    print(f"planfly: {' '.join(str(message).split())}", file=sys.stderr)
+    print(f"planfly: {printable(str(message))}", file=sys.stderr)
     return code
 
 

@@ -1,5 +1,7 @@
 """A flight's log that an interruption leaves whole, with the rows so far, or not at all."""
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 
@@ -8,6 +10,7 @@ from flight.simulation.track import Rows
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Verdict
 from logs.verdict.levels import FlownBeside
+from world.atomic_files import hold
 from world.interruption import uninterrupted
 
 # How a flight ended that was still under way.
@@ -41,13 +44,21 @@ class WholeLog:
         self.ended = INTERRUPTED
         self._path = path
         self._rows = 0
+        self._open = False
+        self._held = contextlib.ExitStack()
+        existed = path.exists()
         try:
-            with uninterrupted():
+            with uninterrupted(), self._named_errors():
+                path.touch()
+                # Before it is emptied: another's log stays as it is.
+                self._held.enter_context(hold(path))
                 self._recorder = Recorder(path, setup, every=every, batch=batch)
                 self._open = True
-        except KeyboardInterrupt as interruption:
-            # It came while the log was opened.
-            self.__exit__(type(interruption), interruption, None)
+        except BaseException as error:
+            # A signal may have come while the log was opened.
+            self.__exit__(type(error), error, None)
+            if not existed and not self._rows:
+                path.unlink(missing_ok=True)
             raise
 
     def __enter__(self) -> "WholeLog":
@@ -58,9 +69,12 @@ class WholeLog:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Close what is still open."""
-        if not self._open:
-            return
-        self._open = False
+        with self._held:
+            if self._open:
+                self._open = False
+                self._leave(kind)
+
+    def _leave(self, kind: type[BaseException] | None) -> None:
         with uninterrupted():
             if kind is None or not issubclass(kind, KeyboardInterrupt):
                 self._recorder.abandon()
@@ -72,7 +86,7 @@ class WholeLog:
 
     def write(self, rows: Rows) -> None:
         """Record rows as a flight hands them on."""
-        with uninterrupted():
+        with uninterrupted(), self._named_errors():
             self._recorder.write_rows(rows)
             self._rows += len(rows)
 
@@ -87,6 +101,16 @@ class WholeLog:
 
     def finish(self, ended: str, verdict: Verdict, beside: FlownBeside | None) -> None:
         """Close the log of a flight that has been judged."""
-        with uninterrupted():
+        with uninterrupted(), self._named_errors():
             self._open = False
             self._recorder.finish(ended, verdict, beside)
+
+    @contextlib.contextmanager
+    def _named_errors(self) -> Iterator[None]:
+        """A full disk is told with the file that it is about."""
+        try:
+            yield
+        except OSError as error:
+            if error.filename is not None or error.errno is None:
+                raise
+            raise OSError(error.errno, error.strerror, str(self._path)) from error

@@ -1,11 +1,13 @@
-"""Files that are written whole or not at all, and folders that do not outlive their use."""
+"""Files that are written whole or not at all, folders that do not outlive their use, targets kept to one process."""
 
 import contextlib
+import fcntl
 import os
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from world.errors import PlanflyError
 from world.interruption import unfinished, uninterrupted
 
 
@@ -51,3 +53,30 @@ def temporary_folder(prefix: str) -> Iterator[Path]:
     with unfinished(folder):
         folder.mkdir(mode=0o700)
         yield folder
+
+
+@contextlib.contextmanager
+def hold(path: Path) -> Iterator[None]:
+    """Keep a file or folder that is there to this process: another that would hold it is refused meanwhile.
+
+    The system lets go of it when the process ends, however that is.  Raises PlanflyError where another holds it, and
+    OSError where it cannot be opened.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder, hold(Path(folder)):
+    ...     try:
+    ...         with hold(Path(folder)):
+    ...             print("never")
+    ...     except PlanflyError:
+    ...         print("held")
+    held
+    """
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise PlanflyError(f"{path}: another planfly is writing there; name another target") from error
+        yield
+    finally:
+        os.close(handle)

@@ -4,18 +4,18 @@ The application turns a signal into a call of `interrupt`; what may not be cut i
 """
 
 import contextlib
-import multiprocessing
 import os
 import shutil
 import signal
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
-from multiprocessing import resource_tracker
-from multiprocessing.process import BaseProcess
 from pathlib import Path
 from types import FrameType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from multiprocessing.process import BaseProcess
 
 # How long a process that is asked to end may take before it is killed, s.
 CHILD_PATIENCE = 0.5
@@ -29,7 +29,6 @@ class Interrupted(KeyboardInterrupt):
         self.number = number
 
 
-@dataclass(slots=True)
 class _State:
     """What an interruption has to know.
 
@@ -37,9 +36,9 @@ class _State:
     unfinished: temporary files and folders of this process that are there now.
     """
 
-    depth: int = 0
-    waiting: int = 0
-    unfinished: set[Path] = field(default_factory=set)
+    def __init__(self) -> None:
+        self.depth = self.waiting = 0
+        self.unfinished: set[Path] = set()
 
 
 _state = _State()
@@ -130,6 +129,9 @@ def deaf_children() -> Iterator[None]:
     >>> with deaf_children():
     ...     child = Process(target=print)
     """
+    # Imported here: few commands have children, and --help answers at once.
+    from multiprocessing import resource_tracker
+
     # It unblocks the signal again where it is started later.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -147,6 +149,9 @@ def end_when_told(in_service: threading.Event | None = None) -> None:
     >>> import multiprocessing
     >>> child = multiprocessing.get_context("spawn").Process(target=end_when_told)
     """
+    # Imported here: few processes are children, and --help answers at once.
+    import multiprocessing
+
     signal.signal(signal.SIGTERM, _end)
     parent = multiprocessing.parent_process()
 
@@ -164,7 +169,7 @@ def _end(number: int, _frame: FrameType | None = None) -> None:
     os._exit(128 + number)
 
 
-def end_children(children: Sequence[BaseProcess], patience: float = CHILD_PATIENCE) -> None:
+def end_children(children: Sequence["BaseProcess"], patience: float = CHILD_PATIENCE) -> None:
     """End processes: SIGTERM to all, and SIGKILL after ``patience`` s to those that have not ended.
 
     >>> end_children([])

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.mavlink_frames import LARGEST, Decoder, split_frames
 from flight.live.mission_server import Station
-from flight.live.signing import Signing
+from flight.live.signing import Refused, Signing
 from flight.live.telemetry import PERIODS
 from world.errors import FlightError
 
@@ -50,6 +50,26 @@ class Peer:
     def station(self) -> Station:
         """The station for the mission protocol."""
         return Station(self.address, self.system, self.component)
+
+
+@dataclass(slots=True)
+class Dropped:
+    """Frames that were not taken, by the reason.
+
+    address: from an address that is not allowed, datagrams.  unsigned, forged: without a signature, and with one that
+    the key did not make.  replayed: signed by the key, and no newer than one before it in its stream.  old: the first
+    of a stream, and from more than a minute ago.  streams: of more streams than are kept.  stranger: from nobody that
+    has sent a HEARTBEAT.  others: to another system, or from ours.
+    """
+
+    address: int = 0
+    unsigned: int = 0
+    forged: int = 0
+    replayed: int = 0
+    old: int = 0
+    streams: int = 0
+    stranger: int = 0
+    others: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +126,7 @@ class Link:
         check_access(access)
         self.access = access
         self.peers: dict[Address, Peer] = {}
+        self.dropped = Dropped()
         self._clock, self._wall = clock, wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
@@ -151,12 +172,15 @@ class Link:
     def take(self, data: bytes, source: Address) -> list[tuple[Any, Peer]]:
         """Messages of one datagram; makes the sender a peer if there is a HEARTBEAT among them."""
         if self.access.allowed and not is_loopback(source[0]) and source[0] not in self.access.allowed:
+            self.dropped.address += 1
             return []
         found = []
         for frame in split_frames(data):
             if frame.system == SYSTEM or frame.system == 0:
+                self.dropped.others += 1
                 continue
-            if self._signing is not None and not self._signing.accepts(frame, self._wall()):
+            if self._signing is not None and (reason := self._signing.refuses(frame, self._wall())):
+                self._count(reason)
                 continue
             message = self._decoder.message(frame)
             if message is None:
@@ -164,10 +188,22 @@ class Link:
             peer = self.peers.get(source)
             if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
                 peer = self._heard(source, frame.system, frame.component)
-            if peer is not None and self._for_us(message):
+            if peer is None:
+                self.dropped.stranger += 1
+            elif not self._for_us(message):
+                self.dropped.others += 1
+            else:
                 peer.system, peer.component = frame.system, frame.component
                 found.append((message, peer))
         return found
+
+    def _count(self, reason: Refused) -> None:
+        dropped = self.dropped
+        dropped.unsigned += reason is Refused.UNSIGNED
+        dropped.forged += reason is Refused.FORGED
+        dropped.replayed += reason is Refused.REPLAYED
+        dropped.old += reason is Refused.OLD
+        dropped.streams += reason is Refused.STREAMS
 
     def _heard(self, source: Address, system: int, component: int) -> Peer | None:
         now = self._clock()

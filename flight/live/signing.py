@@ -11,6 +11,7 @@ import re
 import stat
 import struct
 from dataclasses import dataclass, field
+from enum import Enum, auto
 from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -59,6 +60,16 @@ def read_key(path: Path) -> bytes:
     return hashlib.sha256(data).digest()
 
 
+class Refused(Enum):
+    """Why a frame is not believed; see `flight.live.link.Dropped`."""
+
+    UNSIGNED = auto()
+    FORGED = auto()
+    REPLAYED = auto()
+    OLD = auto()
+    STREAMS = auto()
+
+
 @dataclass(slots=True)
 class Signing:
     """Signs what goes out and checks what comes in.
@@ -71,28 +82,31 @@ class Signing:
     newest: int = 0
     _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
 
-    def accepts(self, frame: MavlinkFrame, wall: float) -> bool:
-        """Whether a frame is signed with our key and newer than all before it in its stream.
+    def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
+        """Why a frame is not believed; None for one that is signed with our key and newer than all before it.
 
-        wall: s since 1970.  A frame with a bad signature leaves no trace.
+        A stream is a system, its component and its link id.  wall: s since 1970.  A frame with a bad signature leaves
+        no trace.
         """
         if not frame.signed:
-            return False
+            return Refused.UNSIGNED
         body, tag = frame.raw[:-6], frame.raw[-6:]
         if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], tag):
-            return False
+            return Refused.FORGED
         link = frame.raw[-SIGNATURE]
         stamp = int.from_bytes(frame.raw[-12:-6], "little")
         stream = (frame.system, frame.component, link)
         last = self._streams.get(stream)
         if last is None:
             # By our clock, not by others' timestamps: a station whose clock runs ahead locks nobody out.
-            if stamp + _MOST_LAG < _stamp(wall) or len(self._streams) >= _MOST_STREAMS:
-                return False
+            if stamp + _MOST_LAG < _stamp(wall):
+                return Refused.OLD
+            if len(self._streams) >= _MOST_STREAMS:
+                return Refused.STREAMS
         elif stamp <= last:
-            return False
+            return Refused.REPLAYED
         self._streams[stream] = stamp
-        return True
+        return None
 
     def sign(self, packed: bytes, wall: float) -> bytes:
         """Sign a packed MAVLink 2 frame that is not signed yet."""

@@ -59,6 +59,12 @@ def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = UP) -> RawL
         datum="amsl",
         modes=(ModeChange(20.0, "AUTO", True),),
         missions=(LoggedMission(20.0, Mission(home, items, source="example.BIN"), "CMD"),),
-        parameters={"WP_RADIUS": 60.0, "AIRSPEED_CRUISE": 25.0, "ROLL_LIMIT_DEG": 45.0},
+        parameters={
+            "WP_RADIUS": 60.0,
+            "AIRSPEED_CRUISE": 25.0,
+            "AIRSPEED_MIN": 18.0,
+            "AIRSPEED_MAX": 32.0,
+            "ROLL_LIMIT_DEG": 45.0,
+        },
         utc_start=1_700_000_000.0,
     )

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from flight.simulation.track import TRACK_ROW, Track, as_track
 from logs.figures.elements import style
 from logs.figures.elements.panels import Axis, Panel, Series, draw_panels
-from logs.verdict.model_comparison import Reflight
+from logs.verdict.field.model_comparison import Reflight
 
 _SIMULATED = "#D55E00"
 # File name, field of a profile, axis label, factor, least span.
@@ -24,8 +24,8 @@ def refly_pictures(again: Reflight) -> dict[str, bytes]:
 
     >>> from flight.simulation.field_source import MissionStretch
     >>> from logs.recording.example_log import example_log
-    >>> from logs.verdict.flown_legs import flown_legs
-    >>> from logs.verdict.model_comparison import compare_with_model
+    >>> from logs.verdict.field.flown_legs import flown_legs
+    >>> from logs.verdict.field.model_comparison import compare_with_model
     >>> log = example_log()
     >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
     >>> again = compare_with_model(log.setup, flown, log.track, "completed")

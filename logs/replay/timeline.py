@@ -244,7 +244,10 @@ def _end(log: FlightLog) -> list[TimelineEntry]:
     steps = np.diff(track.position, axis=0)
     flown = float(np.nansum(np.sqrt((steps**2).sum(axis=1))))
     how = log.ended if log.ended is not None else "not recorded"
-    text = f"{how}; {log.end_time:.1f} s, {flown / 1000.0:.2f} km, {float(track.energy[-1]):.1f} Wh from the battery"
+    used = float(track.energy[-1])
+    # A log of the field may hold no battery.
+    drawn = f", {used:.1f} Wh from the battery" if math.isfinite(used) else ""
+    text = f"{how}; {log.end_time:.1f} s, {flown / 1000.0:.2f} km{drawn}"
     entries = [TimelineEntry(log.end_time, "end", text)]
     if not log.complete:
         entries.append(TimelineEntry(log.end_time, "log", f"the log is not complete: {log.problem}"))

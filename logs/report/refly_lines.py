@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from logs.report.text import number
-from logs.verdict.model_comparison import Reflight
+from logs.verdict.field.model_comparison import Reflight
 
 _CALLED = {"cross_track": "cross-track", "height_error": "height", "ground_speed": "ground speed", "bank": "bank"}
 _HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)", "energy (Wh)")
@@ -15,8 +15,8 @@ def refly_lines(again: Reflight) -> list[str]:
 
     >>> from flight.simulation.field_source import MissionStretch
     >>> from logs.recording.example_log import example_log
-    >>> from logs.verdict.flown_legs import flown_legs
-    >>> from logs.verdict.model_comparison import compare_with_model
+    >>> from logs.verdict.field.flown_legs import flown_legs
+    >>> from logs.verdict.field.model_comparison import compare_with_model
     >>> log = example_log()
     >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
     >>> again = compare_with_model(log.setup, flown, log.track, "completed")

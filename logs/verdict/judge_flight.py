@@ -8,9 +8,9 @@ from collections.abc import Mapping
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
+from logs.verdict.field.judge_field_flight import judge_field_flight
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.flown_findings import flown_findings
-from logs.verdict.judge_field_flight import judge_field_flight
 from logs.verdict.judge_geometry import (
     flown_level,
     geometric_findings,

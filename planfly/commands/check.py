@@ -49,8 +49,8 @@ def check(args: argparse.Namespace) -> int:
 
 def _check_field_log(source: Path, args: argparse.Namespace, target: Path | None) -> int:
     # Imported here: no other check needs the libraries that read logs of the field.
-    from planfly.commands.field_options import field_options
-    from planfly.field_flights import import_flight
+    from planfly.commands.field_logs.field_options import field_options
+    from planfly.field.field_flights import import_flight
 
     flight = import_flight(source, field_options(args), scenario_change(args))
     if target:

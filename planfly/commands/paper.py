@@ -8,6 +8,7 @@ from planfly.paper.seeded_plans import PROBLEMS, plan_section, table
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
+from world.atomic_files import hold
 
 
 def paper(args: argparse.Namespace) -> int:
@@ -18,10 +19,12 @@ def paper(args: argparse.Namespace) -> int:
     with progress("planning") as advance:
         plans = plan_section(args.problems, args.runs, args.algorithm, args.jobs, advance)
     rows = table(plans)
-    prepare_folder(folder, tuple(file_names(PROBLEMS)))
-    write_tables(folder, rows, plans)
-    with progress("drawing"):
-        write_figures(folder, plans)
+    folder.mkdir(parents=True, exist_ok=True)
+    with hold(folder):
+        prepare_folder(folder, tuple(file_names(PROBLEMS)))
+        write_tables(folder, rows, plans)
+        with progress("drawing"):
+            write_figures(folder, plans)
     print(table_text(rows))
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
     return FLYABLE

@@ -25,8 +25,8 @@ COMMAND_NAMES = (
     "refly",
     "scenarios",
 )
-# Where a command's name is a word of Python's own.
-_MODULES = {"import": "import_log"}
+# Commands in rooms of their own, or whose name is a word of Python's: their modules, and functions of their last name.
+_MODULES = {"import": "field_logs.import_log", "refly": "field_logs.refly"}
 
 
 def find_command(name: str) -> CommandFunction:
@@ -41,5 +41,5 @@ def find_command(name: str) -> CommandFunction:
     if name not in COMMAND_NAMES:
         raise KeyError(name)
     module = _MODULES.get(name, name)
-    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), module)
+    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), module.rpartition(".")[2])
     return command

@@ -1,6 +1,7 @@
 """``planfly run``: the whole chain into one folder, once or in rounds."""
 
 import argparse
+import contextlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,7 +21,7 @@ from planfly.terminal.results import print_verdict, write_missions, write_pictur
 from planfly.terminal.scenario_options import flight_limits, scenario_change
 from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, refuse_folder
 from planner.plan import Plan, plan_json
-from world.atomic_files import write_whole
+from world.atomic_files import hold, write_whole
 from world.scenario import Scenario, load_scenario
 
 
@@ -55,6 +56,13 @@ def run(args: argparse.Namespace) -> int:
     if args.out:
         refuse_folder(folder, args.overwrite)
     task = _Task(scenario, airframe, seed, _command_line(args, seed), folder, program, flight_limits(args))
+    with contextlib.ExitStack() as held:
+        return _rounds(args, task, held)
+
+
+def _rounds(args: argparse.Namespace, task: _Task, held: contextlib.ExitStack) -> int:
+    """Plan and fly until it flies; held: keeps the folder from the first plan on."""
+    scenario, airframe, folder, seed = task.scenario, task.airframe, task.folder, task.seed
     cleared = False
 
     def one_round(planned_in: Scenario) -> tuple[Verdict, bool]:
@@ -63,6 +71,8 @@ def run(args: argparse.Namespace) -> int:
         with progress(f"planning {scenario.name}") as advance:
             plan = make_plan(planned_in, planned_with, seed, advance=advance)
         if not cleared:
+            folder.mkdir(parents=True, exist_ok=True)
+            held.enter_context(hold(folder))
             prepare_folder(folder)
             cleared = True
         return _fly_round(task, plan)

@@ -5,6 +5,7 @@ import contextlib
 import math
 import multiprocessing
 import time
+from dataclasses import asdict
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -60,6 +61,9 @@ def serve(args: argparse.Namespace) -> int:
             vehicle.load_fence(fences.items)
         opened.callback(vehicle.close)
         vehicle.run(stopped)
+    dropped = ", ".join(f"{count:,} {reason}" for reason, count in asdict(link.dropped).items() if count)
+    if dropped:
+        print(f"frames dropped: {dropped}", flush=True)
     return 0
 
 

@@ -1,7 +1,6 @@
 """SIGINT and SIGTERM end a command in time: in order where it comes to it, at once where it does not."""
 
 import contextlib
-import multiprocessing
 import os
 import signal
 import sys
@@ -86,7 +85,9 @@ def end_process(code: int) -> NoReturn:
 
 
 def _leave(code: int) -> NoReturn:
-    for child in multiprocessing.active_children():
+    # Not imported here: there are no children where nobody has, and an import could wait for one under way.
+    multiprocessing = sys.modules.get("multiprocessing")
+    for child in multiprocessing.active_children() if multiprocessing is not None else ():
         child.kill()
     remove_unfinished()
     os._exit(code)

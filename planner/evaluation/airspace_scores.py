@@ -1,4 +1,4 @@
-"""What the airspace adds to scores: depths in zones and above the greatest height, and the paper's kind of counts.
+"""What the airspace adds to the scores: depths in zones, and above the greatest height over the ground; or counts.
 
 A leg is looked at with the widest that a flight may be beside it, its corners' included; only where that is not enough,
 in parts.

@@ -9,9 +9,10 @@ import math
 
 from planner.airspace.airspace_arrays import is_limited
 from planner.evaluation.encoding import rotated_frame
-from planner.search.search_state import Search, path_length
+from planner.search.search_state import Search
 from planner.seeding.path_shortening import evenly
 from planner.seeding.side_routes import optimistic_grid, side_routes
+from world.geometry import path_length
 
 # Stages of the grids; shares of a step by which they look at the ground, have places across, and see spheres smaller.
 STAGES, SPREAD, RATIO, SHRINKS = 50, 0.2, 1.0 / 3.0, (0.2, 0.5)

@@ -17,10 +17,11 @@ from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
 from planner.plan import Certificate, Violation
 from planner.search.algorithms import Algorithm
 from planner.search.score_table import KILL, LENGTH, best_first, no_scores, safe, score_table, violated
-from planner.seeding.path_shortening import MOST_MODELS, shorten
+from planner.seeding.path_shortening import MOST_MODELS, shorten_path
 from planner.seeding.pattern_search import search_patterns
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
+from world.geometry import path_length
 
 Floats = NDArray[np.float64]
 SearchProgress = Callable[[int, int, str], None]
@@ -31,13 +32,10 @@ Improved = Callable[[Floats], None]
 ARCHIVE_SIZE = 24
 # Room beside spheres and above ground that a path is shortened with until it is certified, m.
 SPARES = (0.1, 2.0)
+# Evaluations that moving all waypoints may take: with less left of a budget they are not moved.
+MOST_TIGHTENING = 600
 # Waypoints of paths that are evaluated before the search may end: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
-
-
-def path_length(path: Floats) -> float:
-    """Length of a path (w, 3), m."""
-    return float(np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum())
 
 
 class SearchEnded(Exception):
@@ -94,6 +92,7 @@ class Search:
     history: after each generation length ratio, kill exposure and violations of the best path yet.
     certificates: by the path's vector.
     shortest: the shortest finished path (w, 3) that shortening came to, and its certificate; no interval holds it.
+    spent: whether the budget leaves too little for another shortening.
     """
 
     problem: Problem
@@ -112,6 +111,7 @@ class Search:
     history: list[tuple[float, float, float]] = field(default_factory=list)
     certificates: dict[bytes, Certificate] = field(default_factory=dict)
     shortest: tuple[Floats, Certificate] | None = None
+    spent: bool = False
 
     def __post_init__(self) -> None:
         """Begin with nothing."""
@@ -175,6 +175,8 @@ class Search:
 
     def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it.  Gives the best scores (8,)."""
+        if self._budget() - self.evaluations < MOST_TIGHTENING:
+            return self.improve(vector, most)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += made
         return self.improve(moved, most)
@@ -188,8 +190,9 @@ class Search:
         """Shorten a path (w, 3) and keep what comes of it if it is the shortest finished one; whether it is."""
         for spare in SPARES:
             if self._budget() - self.evaluations < MOST_MODELS:
+                self.spent = True
                 return False
-            path, made = shorten(self.problem.search, path, spare=spare, pause=self.pause)
+            path, made = shorten_path(self.problem.search, path, spare=spare, pause=self.pause)
             self.evaluations += made
             if self.has_safe() and path_length(path) >= self.length_ratio() * self._straight():
                 return False
@@ -203,7 +206,7 @@ class Search:
 
     def over(self) -> bool:
         """Whether the search is to end now."""
-        if self.evaluations >= self._budget():
+        if self.spent or self.evaluations >= self._budget():
             self.ended = "budget"
         elif self.stop is not None:
             self.ended = self.stop() or "completed"
@@ -231,7 +234,7 @@ class Search:
         ratio = float(self.archive.scores[0][LENGTH])
         if self.shortest is None:
             return ratio
-        shortest = path_length(self.shortest[0]) / self._straight()
+        shortest = float(path_length(self.shortest[0])) / self._straight()
         return min(ratio, shortest) if self.best_is_safe() else shortest
 
     def finished(self, certificate: Certificate) -> bool:

@@ -13,10 +13,11 @@ from planner.evaluation.encoding import Encoding, along_route, frames_of, rotate
 from planner.frames.waypoint_frames import spread_over
 from planner.plan import Certificate
 from planner.search.other_sides import shorten_best
-from planner.search.search_state import Search, SearchEnded, path_length
+from planner.search.search_state import Search, SearchEnded
 from planner.seeding.lattice_routes import lattice_route, turning_step
 from planner.seeding.path_shortening import evenly
 from planner.seeding.waypoint_fitting import CLOSE, fit_points
+from world.geometry import path_length
 
 Floats = NDArray[np.float64]
 

@@ -179,7 +179,7 @@ def begin_lattice_search(
 
 
 @compiled
-def go_on(
+def search_lattice_on(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, most: int
 ) -> LatticeSearch:  # pragma: no cover - compiled
     """The search after a look at up to so many more states; where none is open any more it is over.

@@ -11,7 +11,14 @@ from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
 from planner.evaluation.leg_geometry import settling_length
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.lattice_kernels import LATTICE_CELL, Lattice, begin_lattice_search, go_on, pulled_taut, traced
+from planner.seeding.lattice_kernels import (
+    LATTICE_CELL,
+    Lattice,
+    begin_lattice_search,
+    pulled_taut,
+    search_lattice_on,
+    traced,
+)
 from world.kernels import Records
 
 Floats = NDArray[np.float64]
@@ -78,7 +85,9 @@ def cheapest_lattice_route(
     """
     search = begin_lattice_search(data, frame, lattice)
     while search.found < 0 and len(search.states) and search.seen < most_states:
-        search = go_on(data, frame, lattice, courses, search, min(STATES_AT_ONCE, most_states - search.seen))
+        search = search_lattice_on(
+            data, frame, lattice, courses, search, min(STATES_AT_ONCE, most_states - search.seen)
+        )
         pause()
     if search.found < 0:
         return np.zeros(0, dtype=LATTICE_CELL)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.shortening_kernels import HALVINGS, ROUNDS, STEPS, Shortening, begin, go_on
+from planner.seeding.shortening_kernels import HALVINGS, ROUNDS, STEPS, Shortening, begin_shortening, shorten_on
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +26,7 @@ MOST_MODELS = ROUNDS * (2 + STEPS * HALVINGS)
 PAIRS_AT_ONCE = 400_000
 
 
-def shorten(
+def shorten_path(
     data: ProblemArrays, path: Floats, *, spare: float = SPARE, pause: Callable[[], None] = lambda: None
 ) -> tuple[Floats, int]:
     """A path (w, 3) world m that is shorter or breaks less than this one, and the models made: each is an evaluation.
@@ -39,17 +39,20 @@ def shorten(
     >>> from world.scenario import load_scenario
     >>> scenario = load_scenario("hard-07")
     >>> data = make_problem(scenario, load_airframe(scenario).limits).search
-    >>> straight = np.linspace(scenario.start, scenario.destination, 10)
-    >>> path, _ = shorten(data, straight + np.array([0.0, 0.0, 300.0]) * np.sin(np.linspace(0.0, 3.14, 10))[:, None])
-    >>> round(float(np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum() / np.linalg.norm(path[-1] - path[0])), 3)
-    1.011
+    >>> high = np.array([scenario.start, [5000.0, 5000.0, 590.0], scenario.destination])
+    >>> path, _ = shorten_path(data, evenly(high, 10))
+    >>> path.shape, bool(np.array_equal(path[-1], scenario.destination))
+    ((10, 3), True)
     """
     mean = math.dist(path[0], path[-1]) / (len(path) - 1)
     samples = int(min(MOST_SAMPLES, max(FEWEST_SAMPLES, math.ceil(mean / SAMPLE_PITCH))))
     rounds = max(1, PAIRS_AT_ONCE // (len(path) * max(1, len(data.missiles.missiles))))
-    under_way: Shortening = begin(data, np.ascontiguousarray(path), samples, spare)
+    start = np.array(path, dtype=np.float64)
+    # A grid's route ends at a grid's height.
+    start[0], start[-1] = data.start, data.destination
+    under_way: Shortening = begin_shortening(data, start, samples, spare)
     while under_way.rounds < ROUNDS:
-        under_way = go_on(data, under_way, spare, min(ROUNDS, rounds))
+        under_way = shorten_on(data, under_way, spare, min(ROUNDS, rounds))
         pause()
     return under_way.path, int(under_way.models)
 

@@ -137,8 +137,9 @@ def _near_missiles(
 @compiled
 def constraints_of(bound: Bindings) -> int:  # pragma: no cover - compiled
     """How many constraints `lagrangian` has."""
-    count: int = bound.low.size
-    return bound.pairs.shape[0] + count * (bound.samples + 4) + count + 1
+    legs = bound.low.size
+    count: int = bound.pairs.shape[0] + legs * (bound.samples + 4) + legs + 1
+    return count
 
 
 @compiled

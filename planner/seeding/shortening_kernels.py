@@ -12,7 +12,7 @@ from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_lim
 from planner.evaluation.problem_arrays import ProblemArrays
 from planner.optimisers.linear_algebra import band_cholesky, solve_band
 from planner.seeding.shortening_bindings import Bindings, bindings, carried, constraints_of
-from planner.seeding.shortening_model import BAND, Model, lagrangian
+from planner.seeding.shortening_model import BAND, LagrangianModel, lagrangian
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ STILL = 0.05
 
 @compiled
 def _newton_step(
-    path: Floats, low: Floats, high: Floats, model: Model, factor: Floats, step: Floats
+    path: Floats, low: Floats, high: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:  # pragma: no cover - compiled
     """Fill the step (n,) down from a path, within its box; the furthest that it moves along an axis, m."""
     size = step.size
@@ -67,7 +67,9 @@ class Shortening(NamedTuple):
 
 
 @compiled
-def begin(data: ProblemArrays, path: Floats, samples: int, spare: float) -> Shortening:  # pragma: no cover - compiled
+def begin_shortening(
+    data: ProblemArrays, path: Floats, samples: int, spare: float
+) -> Shortening:  # pragma: no cover - compiled
     """The shortening of a path (w, 3) m before its first round.
 
     samples: of the ground on each leg.  spare: m by which it keeps further from spheres and ground than is asked.
@@ -81,14 +83,14 @@ class _Descent(NamedTuple):
 
     low: Floats
     high: Floats
-    model: Model
+    model: LagrangianModel
     factor: Floats
     step: Floats
     trial: Floats
 
 
 @compiled
-def go_on(
+def shorten_on(
     data: ProblemArrays, under_way: Shortening, spare: float, most: int
 ) -> Shortening:  # pragma: no cover - compiled
     """The shortening after as many rounds as are left, or after so many."""
@@ -97,7 +99,7 @@ def go_on(
     descent = _Descent(
         np.array([data.west, data.south, data.floor]),
         np.array([data.east, data.north, data.ceiling]),
-        Model(np.zeros(size), np.zeros((size, BAND)), np.zeros(BAND)),
+        LagrangianModel(np.zeros(size), np.zeros((size, BAND)), np.zeros((4, 3))),
         np.zeros((size, BAND)),
         np.zeros(size),
         here.copy(),

@@ -37,8 +37,8 @@ LEVEL_SPARE, TURN_SPARE = 0.2, 1.0
 GROUND_STEP = 8.0
 
 
-class Model(NamedTuple):
-    """Gradient (n,) and band (n, BAND) of the Hessian of a path's inner waypoints; a constraint's slopes (BAND,)."""
+class LagrangianModel(NamedTuple):
+    """Gradient (n,) and band (n, BAND) of the Hessian of a path's inner waypoints; a constraint's slopes (4, 3)."""
 
     gradient: Floats
     band: Floats
@@ -47,7 +47,7 @@ class Model(NamedTuple):
 
 @compiled
 def _add(
-    value: float, first: int, points: int, multiplier: float, penalty: float, model: Model
+    value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:  # pragma: no cover - compiled
     """Add a constraint on so many waypoints from the `first` to the model; what it adds to the merit.
 
@@ -60,15 +60,15 @@ def _add(
     for a in range(3 * points):
         row = begin + a
         if 0 <= row < size:
-            model.gradient[row] -= push * model.slopes[a]
+            model.gradient[row] -= push * model.slopes[a // 3, a % 3]
             for b in range(a + 1):
                 if begin + b >= 0:
-                    model.band[row, a - b] += penalty * model.slopes[a] * model.slopes[b]
+                    model.band[row, a - b] += penalty * model.slopes[a // 3, a % 3] * model.slopes[b // 3, b % 3]
     return (push * push - multiplier * multiplier) / (2.0 * penalty)
 
 
 @compiled
-def _add_length(path: Floats, model: Model) -> float:  # pragma: no cover - compiled
+def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
     """Add the path's length to the model; the length, m."""
     total, size, unit = 0.0, model.gradient.size, np.empty(3)
     for i in range(path.shape[0] - 1):
@@ -105,7 +105,7 @@ def _add_missiles(
     multipliers: Floats,
     values: Floats,
     penalty: float,
-    model: Model,
+    model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
     """Add the distances of legs to missiles; what they add to the merit.  They are the first of the constraints."""
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
@@ -117,10 +117,11 @@ def _add_missiles(
         share = min(1.0, max(0.0, -(ax * dx + ay * dy + az * dz) / length2))
         ax, ay, az = ax + share * dx, ay + share * dy, az + share * dz
         away = max(1e-3, math.sqrt(ax * ax + ay * ay + az * az))
-        slopes[0], slopes[1], slopes[2] = ax / away, ay / away, az / away
+        first = slopes[0]
+        first[0], first[1], first[2] = ax / away, ay / away, az / away
         for axis in range(3):
-            slopes[3 + axis] = share * slopes[axis]
-            slopes[axis] *= 1.0 - share
+            slopes[1, axis] = share * slopes[0, axis]
+            slopes[0, axis] *= 1.0 - share
         values[p] = away - bound.wide[p]
         merit += _add(values[p], i, 2, multipliers[p], penalty, model)
     return merit
@@ -135,7 +136,7 @@ def _add_ground(
     multipliers: Floats,
     values: Floats,
     penalty: float,
-    model: Model,
+    model: LagrangianModel,
     at: int,
 ) -> float:  # pragma: no cover - compiled
     """Add the heights of samples of the legs above what is required, constraints from `at`; see `_add_missiles`."""
@@ -159,19 +160,20 @@ def _add_ground(
                 rise = pixel_height(heights, column, row)
                 column, row = polymap(to_pixel, x, y - GROUND_STEP)
                 by_north = (rise - pixel_height(heights, column, row)) / (2.0 * GROUND_STEP)
-                slopes[0], slopes[1], slopes[2] = -by_east, -by_north, 1.0
+                first = slopes[0]
+                first[0], first[1], first[2] = -by_east, -by_north, 1.0
                 if math.isnan(by_east + by_north):
-                    slopes[0], slopes[1] = 0.0, 0.0
+                    first[0], first[1] = 0.0, 0.0
                 for axis in range(3):
-                    slopes[3 + axis] = share * slopes[axis]
-                    slopes[axis] *= 1.0 - share
+                    slopes[1, axis] = share * slopes[0, axis]
+                    slopes[0, axis] *= 1.0 - share
             merit += _add(value, i, 2, multipliers[number], penalty, model)
     return merit
 
 
 @compiled
 def _add_slopes(
-    bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: Model, at: int
+    bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: LagrangianModel, at: int
 ) -> float:  # pragma: no cover - compiled
     """Add what legs are less steep than allowed, m of height, and longer than the shortest; see `_add_missiles`."""
     merit, slopes = 0.0, model.slopes
@@ -181,9 +183,10 @@ def _add_slopes(
         for kind in range(3):
             tangent = bound.climb[i] if kind == 0 else bound.dive[i] if kind == 1 else 1.0
             sign = -1.0 if kind == 0 else 1.0 if kind == 1 else 0.0
-            slopes[3], slopes[4], slopes[5] = tangent * dx / run, tangent * dy / run, sign
+            second = slopes[1]
+            second[0], second[1], second[2] = tangent * dx / run, tangent * dy / run, sign
             for axis in range(3):
-                slopes[axis] = -slopes[3 + axis]
+                slopes[0, axis] = -slopes[1, axis]
             number = at + 3 * i + kind
             values[number] = tangent * run + sign * rise - (SHORTEST_LEG if kind == 2 else LEVEL_SPARE)
             merit += _add(values[number], i, 2, multipliers[number], penalty, model)
@@ -198,7 +201,7 @@ def _add_turns(
     multipliers: Floats,
     values: Floats,
     penalty: float,
-    model: Model,
+    model: LagrangianModel,
     at: int,
 ) -> float:  # pragma: no cover - compiled
     """Add what turns are less than allowed, and what legs have left between theirs; see `_add_missiles`."""
@@ -218,8 +221,8 @@ def _add_turns(
         side, u2, v2 = 1.0 if cross >= 0.0 else -1.0, max(1.0, ux * ux + uy * uy), max(1.0, vx * vx + vy * vy)
         of_before[i, 0], of_before[i, 1] = side * uy / u2, -side * ux / u2
         of_after[i, 0], of_after[i, 1] = -side * vy / v2, side * vx / v2
-        slopes[:9] = 0.0
-        _turn_slopes(of_before[i], of_after[i], -TURN_LENGTH, 0, slopes)
+        slopes[:] = 0.0
+        _turn_slopes(of_before[i], of_after[i], -TURN_LENGTH, slopes[:3])
         values[at + i] = TURN_LENGTH * (data.max_turn - turn[i])
         merit += _add(values[at + i], i - 1, 3, multipliers[at + i], penalty, model)
     if not bound.turns_in_legs:
@@ -232,9 +235,9 @@ def _add_turns(
         need = bound.after[i] * one + bound.before[i + 1] * two + bound.roll[i]
         slopes[:] = 0.0
         for axis, part in ((0, dx / run), (1, dy / run)):
-            slopes[3 + axis], slopes[6 + axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
-        _turn_slopes(of_before[i], of_after[i], -0.5 * bound.after[i] * (1.0 + one * one), 0, slopes)
-        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * bound.before[i + 1] * (1.0 + two * two), 3, slopes)
+            slopes[1, axis], slopes[2, axis] = -(1.0 - SETTLING_SHARE) * part, (1.0 - SETTLING_SHARE) * part
+        _turn_slopes(of_before[i], of_after[i], -0.5 * bound.after[i] * (1.0 + one * one), slopes[:3])
+        _turn_slopes(of_before[i + 1], of_after[i + 1], -0.5 * bound.before[i + 1] * (1.0 + two * two), slopes[1:])
         values[number] = (1.0 - SETTLING_SHARE) * run - need - min(SETTLING_LENGTH, need) - TURN_SPARE
         merit += _add(values[number], i - 1, 4, multipliers[number], penalty, model)
     return merit
@@ -242,13 +245,13 @@ def _add_turns(
 
 @compiled
 def _turn_slopes(
-    of_before: Floats, of_after: Floats, factor: float, at: int, slopes: Floats
+    of_before: Floats, of_after: Floats, factor: float, slopes: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Add a factor times the slopes of a turn, by the legs before and after it, to those of its three waypoints."""
+    """Add a factor times the slopes of a turn, by the legs before and after it, to those of its waypoints (3, 3)."""
     for axis in range(2):
-        slopes[at + axis] -= factor * of_before[axis]
-        slopes[at + 3 + axis] += factor * (of_before[axis] - of_after[axis])
-        slopes[at + 6 + axis] += factor * of_after[axis]
+        slopes[0, axis] -= factor * of_before[axis]
+        slopes[1, axis] += factor * (of_before[axis] - of_after[axis])
+        slopes[2, axis] += factor * of_after[axis]
 
 
 @compiled
@@ -260,7 +263,7 @@ def lagrangian(
     multipliers: Floats,
     values: Floats,
     penalty: float,
-    model: Model,
+    model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
     """The augmented length of a path (w, 3), m; fills the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0

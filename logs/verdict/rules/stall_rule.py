@@ -100,9 +100,10 @@ def _flown(demands: RouteDemands, aligned: AlignedTrack) -> list[Finding]:
     envelope = demands.setup.envelope
     level = np.interp(up, envelope.amsl, envelope.level_speed_min)
     # What the wing carried, or what it had to carry for the height to be held in a turn within the bank limit.
-    carried = np.maximum(load, 1.0 / np.cos(np.minimum(bank, demands.limits.max_bank)))
+    # A log of the field may hold no load factor.
+    carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, demands.limits.max_bank)))
     stall = level * np.sqrt(np.maximum(carried, 0.0))
-    if not np.isfinite(stall).any():
+    if not np.isfinite(speed - stall).any():
         return []
     k = int(np.nanargmin(speed - stall))
     tolerance = STALL_TOLERANCE + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]

@@ -66,6 +66,60 @@ def test_a_key_lets_only_its_owner_in() -> None:
         made.close()
 
 
+def test_a_stranger_at_another_address_reaches_nothing() -> None:
+    """Every kind of message, unsigned, from another address: nothing comes back, and all of it is counted."""
+    stranger, station = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
+    stranger.bind(("127.0.0.2", 0))
+    station.bind(("127.0.0.1", 0))
+    stranger.settimeout(0.05)
+    made = Link(Access(("0.0.0.0", 0), (station.getsockname(),), key=KEY), Clock(), lambda: WALL)
+    to = ("127.0.0.1", made.address[1])
+    try:
+        kinds = [kind(*_zeros(kind)) for number, kind in sorted(mavlink.mavlink_map.items()) if number >= 0]
+        for number, message in enumerate((HEARTBEAT, *kinds)):
+            stranger.sendto(packed(message), to)
+            if number % 50 == 49:
+                assert made.receive() == []
+        assert made.receive() == []
+        made.send_heartbeat(HEARTBEAT)
+        assert made.peers == {}
+        with pytest.raises(TimeoutError):
+            stranger.recv(300)
+        assert made.dropped.unsigned == 1 + len(kinds)
+        good = Signing(KEY).sign(packed(HEARTBEAT), WALL)
+        station.sendto(good, to)
+        # The stranger plays what it has overheard.
+        stranger.sendto(good, to)
+        assert len(made.receive()) == 1
+        assert list(made.peers) == [station.getsockname()]
+        assert made.dropped.replayed == 1
+    finally:
+        for one in (made, stranger, station):
+            one.close()
+
+
+def _zeros(kind: type) -> list[object]:
+    """A value for each field of a message."""
+    return [
+        b"" if code == "char" else [0] * length if length else 0
+        for code, length in zip(kind.fieldtypes, _lengths(kind), strict=True)
+    ]
+
+
+def _lengths(kind: type) -> list[int]:
+    """Elements of each field in the order of the arguments, 0 for a number."""
+    return [kind.array_lengths[kind.ordered_fieldnames.index(name)] for name in kind.fieldnames]
+
+
+def test_strangers_and_others_are_counted(link: Link) -> None:
+    ask = mavlink.MAVLink_param_request_list_message(1, 1)
+    link.take(packed(ask), ("127.0.0.1", 5))
+    link.take(packed(HEARTBEAT, system=1), ("127.0.0.1", 5))
+    link.take(packed(HEARTBEAT), ("127.0.0.1", 5))
+    link.take(packed(mavlink.MAVLink_param_request_list_message(7, 1)), ("127.0.0.1", 5))
+    assert (link.dropped.stranger, link.dropped.others, link.dropped.unsigned) == (1, 2, 0)
+
+
 @pytest.mark.parametrize(
     ("access", "word"),
     [
@@ -85,6 +139,7 @@ def test_only_addresses_on_the_list_are_let_in() -> None:
     made = Link(Access(("127.0.0.1", 0), (), frozenset({"192.0.2.7"})))
     try:
         assert made.take(packed(HEARTBEAT), ("192.0.2.8", 5)) == []
+        assert made.dropped.address == 1
         assert len(made.take(packed(HEARTBEAT), ("192.0.2.7", 5))) == 1
     finally:
         made.close()

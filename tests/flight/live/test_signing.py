@@ -6,7 +6,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.mavlink_frames import split_frames
-from flight.live.signing import EPOCH, Signing, read_key
+from flight.live.signing import EPOCH, Refused, Signing, read_key
 from tests.flight.live.fake_vehicle import HEARTBEAT, KEY, WALL, packed
 from world.errors import FlightError
 
@@ -22,9 +22,9 @@ def test_pymavlink_accepts_our_signatures_and_we_its() -> None:
     assert message.get_type() == "HEARTBEAT"
     assert message.get_signed()
     (frame,) = split_frames(HEARTBEAT.pack(theirs))
-    assert ours.accepts(frame, WALL)
-    assert not ours.accepts(frame, WALL), "a replayed frame"
-    assert not ours.accepts(split_frames(packed(HEARTBEAT))[0], WALL), "an unsigned frame"
+    assert ours.refuses(frame, WALL) is None
+    assert ours.refuses(frame, WALL), "a replayed frame"
+    assert ours.refuses(split_frames(packed(HEARTBEAT))[0], WALL), "an unsigned frame"
 
 
 def test_a_forged_timestamp_locks_nobody_out() -> None:
@@ -33,14 +33,39 @@ def test_a_forged_timestamp_locks_nobody_out() -> None:
     for link_id in range(256):
         thief.link = link_id
         (forged,) = split_frames(thief.sign(packed(HEARTBEAT), future))
-        assert not vehicle.accepts(forged, WALL)
+        assert vehicle.refuses(forged, WALL)
     (good,) = split_frames(station.sign(packed(HEARTBEAT), WALL))
     flipped = bytearray(good.raw)
     flipped[-7] ^= 0x40  # a later time under a signature that was good
-    assert not vehicle.accepts(split_frames(bytes(flipped))[0], WALL)
-    assert vehicle.accepts(good, WALL)
+    assert vehicle.refuses(split_frames(bytes(flipped))[0], WALL)
+    assert vehicle.refuses(good, WALL) is None
     (old,) = split_frames(Signing(KEY, 9).sign(packed(HEARTBEAT), WALL - 120.0))
-    assert not vehicle.accepts(old, WALL), "a recording from two minutes ago, on a new link"
+    assert vehicle.refuses(old, WALL), "a recording from two minutes ago, on a new link"
+
+
+def test_each_frame_that_is_not_believed_says_why() -> None:
+    vehicle, station = Signing(KEY), Signing(KEY, 4)
+
+    def refused(raw: bytes, wall: float = WALL) -> Refused | None:
+        return vehicle.refuses(split_frames(raw)[0], wall)
+
+    first, second = (station.sign(packed(HEARTBEAT), WALL) for _ in range(2))
+    assert refused(packed(HEARTBEAT)) is Refused.UNSIGNED
+    assert refused(Signing(bytes(32), 4).sign(packed(HEARTBEAT), WALL)) is Refused.FORGED
+    # Its own frame under another link's id: the signature covers the id.
+    moved = bytearray(second)
+    moved[-13] = 5
+    assert refused(bytes(moved)) is Refused.FORGED
+    assert refused(second) is None
+    assert refused(second) is Refused.REPLAYED
+    assert refused(first) is Refused.REPLAYED, "a later frame has been there"
+    # A recording of another link, played when its minute is over, and just before.
+    other = Signing(KEY, 6).sign(packed(HEARTBEAT), WALL)
+    assert refused(other, WALL + 60.001) is Refused.OLD
+    assert refused(other, WALL + 59.999) is None
+    for link in range(10, 10 + 62):
+        assert refused(Signing(KEY, link).sign(packed(HEARTBEAT), WALL)) is None
+    assert refused(Signing(KEY, 100).sign(packed(HEARTBEAT), WALL)) is Refused.STREAMS
 
 
 def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Pose, fix and track messages show the recorded rows, at their own rates."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,8 @@ def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
 ) -> None:
     found = messages(log_file)
     assert sorted(found) == sorted(
-        ["/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/plan", "/scene/track"]
+        ["/state", "/tf", "/fix", "/log"]
+        + [f"/scene/{part}" for part in ("terrain", "threats", "plan", "zones", "track")]
     )
     seconds = track.time[-1] - track.time[0]
     for topic, rate in (("/tf", 5), ("/fix", 1)):
@@ -52,8 +54,11 @@ def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
     assert [(item.level, item.message) for _, item in found["/log"]] == [(3, "half way up"), (2, "arrived")]
 
 
-def test_a_log_has_a_scene_of_zones_where_its_scenario_has_zones(tmp_path: Path, track: Track) -> None:
+def test_a_log_has_a_scene_of_the_scenarios_zones_and_the_missions_fence(tmp_path: Path, track: Track) -> None:
     zone = {"name": "town", "kind": "exclusion", "east_m": 0, "north_m": 0, "radius_m": 200}
     found = messages(record(tmp_path / "zones.mcap", make_setup(zones=[zone]), track))
     ((_, update),) = found["/scene/zones"]
-    assert [text.text for text in update.entities[0].texts] == ["town"]
+    assert [text.text for text in update.entities[0].texts] == ["town", "fence item 0"]
+    setup = make_setup()
+    free = replace(setup, mission=replace(setup.mission, fences=()))
+    assert "/scene/zones" not in messages(record(tmp_path / "none.mcap", free, track))

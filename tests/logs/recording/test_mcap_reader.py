@@ -15,26 +15,39 @@ import zstandard
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from tests.logs.log_copies import prefix_of, same
+from tests.logs.recording.containers.framing import framed
+from tests.soak import note, scaled
 from world.errors import LogError
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
 
 
-def _cuts(size: int) -> Iterator[int]:
-    if SOAK:
-        yield from range(0, size, 3)
-        return
+def _cuts(size: int, last: int) -> Iterator[int]:
     rng = np.random.default_rng(2)
+    if SOAK:
+        # Every byte of what stands from its last chunk on, and so many others.
+        yield from sorted(rng.integers(0, last, size=scaled(10_000, 60)).tolist())
+        yield from range(last, size)
+        return
     yield from range(40)
     yield from sorted(rng.integers(40, size, size=60).tolist())
     yield from range(size - 40, size)
+
+
+def _last_chunk(data: bytes) -> int:
+    """Where the last chunk begins."""
+    at, last = len(MAGIC), 0
+    for opcode, content in framed(data):
+        last = at if opcode == 6 else last
+        at += 9 + len(content)
+    return last
 
 
 def test_a_truncated_file_gives_its_whole_chunks(tmp_path: Path, log_file: Path, track: Track, setup: Any) -> None:
     data = log_file.read_bytes()
     path = tmp_path / "cut.mcap"
     lengths = []
-    for cut in _cuts(len(data)):
+    for cut in _cuts(len(data), _last_chunk(data)):
         path.write_bytes(data[:cut])
         try:
             log = read_log(path)
@@ -49,6 +62,7 @@ def test_a_truncated_file_gives_its_whole_chunks(tmp_path: Path, log_file: Path,
     assert lengths == sorted(lengths)
     assert lengths[0] == 0
     assert lengths[-1] == len(track)
+    note("log cut", cuts=len(lengths), silent=0)
 
 
 @pytest.mark.parametrize("finished", [True, False])
@@ -61,7 +75,8 @@ def test_no_flipped_bit_is_taken_for_data(
     rng = np.random.default_rng(3)
     path = tmp_path / "bit.mcap"
     # All over the file, and densely in its last part, where the chunks with the rows are.
-    flips = 2500 if SOAK else 60
+    # Twice so many, of a finished log and of an unfinished one.
+    flips = scaled(25_000, 60)
     positions = [*rng.integers(0, len(whole), size=flips), *rng.integers(len(whole) - 90_000, len(whole), size=flips)]
     for position in [*positions, *range(0, 60)]:
         data = bytearray(whole)
@@ -74,6 +89,7 @@ def test_no_flipped_bit_is_taken_for_data(
         assert not log.complete, f"byte {position}"
         prefix_of(track, log.track)
         same(log.setup, setup)
+    note(f"log with a flipped bit, finished: {finished}", flips=len(positions) + 60, silent=0)
 
 
 MAGIC = b"\x89MCAP0\r\n"

@@ -81,6 +81,10 @@ def test_gpx_has_named_points_as_a_route_and_others_as_a_track() -> None:
     assert named == ["0", "1 (item 2)", "2 (item 3)", "3 (item 4)"]
 
 
+# The scenario's, and the mission's own fence.
+ZONES = ["a & b (keep out)", "fence (stay in)", "fence item 0 (keep out)"]
+
+
 def zoned_setup() -> FlightSetup:
     outer, hole = [[-300, -300], [300, -300], [300, 300], [-300, 300]], [[-90, -90], [90, -90], [90, 90], [-90, 90]]
     zones = [
@@ -94,7 +98,7 @@ def test_zones_are_polygons_of_kml_with_their_holes_and_ceilings() -> None:
     setup = zoned_setup()
     root = ElementTree.fromstring(kml_text("zones", [], map_zones(setup)))
     marks = root.findall(f"{KML}Document/{KML}Folder/{KML}Placemark")
-    assert [mark.findtext(f"{KML}name") for mark in marks] == ["a & b (keep out)", "fence (stay in)"]
+    assert [mark.findtext(f"{KML}name") for mark in marks] == ZONES
     polygon = marks[0].find(f"{KML}MultiGeometry/{KML}Polygon")
     assert polygon is not None
     assert polygon.findtext(f"{KML}altitudeMode") == "relativeToGround"
@@ -113,5 +117,5 @@ def test_zones_are_polygons_of_kml_with_their_holes_and_ceilings() -> None:
 def test_zones_are_tracks_of_gpx_a_segment_a_ring() -> None:
     root = ElementTree.fromstring(gpx_text("zones", [], map_zones(zoned_setup())))
     tracks = root.findall(f"{GPX}trk")
-    assert [track.findtext(f"{GPX}name") for track in tracks] == ["a & b (keep out)", "fence (stay in)"]
-    assert [len(track.findall(f"{GPX}trkseg")) for track in tracks] == [2, 1]
+    assert [track.findtext(f"{GPX}name") for track in tracks] == ZONES
+    assert [len(track.findall(f"{GPX}trkseg")) for track in tracks] == [2, 1, 1]

@@ -18,6 +18,7 @@ from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
 from planfly.cli import main
 from tests.planfly.conftest import Served
+from tests.soak import note, scaled
 from tests.stations import UdpStation, item
 
 SOAK = bool(os.environ.get("PLANFLY_SOAK"))
@@ -111,7 +112,7 @@ def test_of_two_stations_over_sockets_one_wins(serve: Callable[..., Served]) -> 
     assert vehicle.stop() == 0
 
 
-@pytest.mark.parametrize("seed", range(20 if SOAK else 2))
+@pytest.mark.parametrize("seed", range(scaled(200, 2)))
 def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], seed: int) -> None:
     """Kill -9 of all of it, in flight, at any moment: what is logged is exact, and no more than a second is lost."""
     vehicle = serve("--scenario", "field.toml")
@@ -130,6 +131,7 @@ def test_a_power_cut_loses_at_most_a_second(serve: Callable[..., Served], seed: 
     assert count > 30
     assert np.array_equal(whole.position[:count], log.track.position)
     assert np.array_equal(whole.controls[:count], log.track.controls)
+    note(f"kill -9 at {seed}", lost_s=round(flown / 1000.0 - log.end_time, 3))
 
 
 def test_the_vehicle_outlives_the_process_that_flies(serve: Callable[..., Served]) -> None:

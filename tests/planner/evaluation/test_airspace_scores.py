@@ -103,7 +103,7 @@ def test_an_inclusion_near_the_start_leaves_room_to_leave(made: Made) -> None:
 
 
 # One leg of 6 km, whose pieces are 1 km.
-STRAIGHT = np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
+ONE_LEG = np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
 GROUND: dict[str, Any] = {"terrain": {"kind": "flat", "amsl_m": 0}, "threats": []}
 
 
@@ -123,7 +123,7 @@ def test_pieces_that_touch_a_zone_are_counted(
 ) -> None:
     scenario = small(**GROUND, zones=mast(east, 300.0 + SEARCH_ZONE_MARGIN + more))
     data = make_problem(scenario, make_limits(scenario)).search
-    assert airspace_counts(data, STRAIGHT[None]).tolist() == [inside * pieces]
+    assert airspace_counts(data, ONE_LEG[None]).tolist() == [inside * pieces]
 
 
 @pytest.mark.parametrize(("more", "pieces"), [(-1.0, 0), (1.0, 6)])
@@ -132,8 +132,8 @@ def test_pieces_above_the_greatest_height_are_counted(
 ) -> None:
     scenario = small(**GROUND, limits={"max_height_m": 200.0})
     data = make_problem(scenario, make_limits(scenario)).search
-    path = STRAIGHT + np.array([0.0, 0.0, 50.0 - SEARCH_BUFFER + more])
-    assert airspace_counts(data, np.stack([STRAIGHT, path])).tolist() == [0, pieces]
+    path = ONE_LEG + np.array([0.0, 0.0, 50.0 - SEARCH_BUFFER + more])
+    assert airspace_counts(data, np.stack([ONE_LEG, path])).tolist() == [0, pieces]
 
 
 @pytest.mark.parametrize("algorithm", ["umda", "umda-polar-45", "umda-bearing", "umda-graded"])

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from aircraft.path_limits import Limits
 from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path
-from planner.search.search_state import path_length
 from planner.seeding import path_shortening
-from planner.seeding.path_shortening import MOST_MODELS, evenly, shorten
+from planner.seeding.path_shortening import MOST_MODELS, evenly, shorten_path
 from tests.bench.planning.smooth_search import Programme
 from tests.bench.task import is_safe, make_task
+from world.geometry import path_length
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
@@ -29,7 +29,7 @@ def first_path(name: str) -> Floats:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")
 def test_it_is_as_short_as_slsqp_makes_it(name: str) -> None:
     task, start = make_task(name), first_path(name)
-    path, models = shorten(task.problem.search, start)
+    path, models = shorten_path(task.problem.search, start)
     theirs = Programme(task).shortened(start)
     assert is_safe(task.certificate(path))
     assert task.length_ratio(path) < task.length_ratio(start) - 0.001
@@ -50,29 +50,29 @@ def test_a_string_about_a_sphere(make_limits: Callable[[Scenario], Limits], smal
     )
     data = make_problem(scenario, make_limits(scenario)).search
     start = np.column_stack([np.linspace(0.0, 6000.0, 14), 1500.0 * np.sin(np.linspace(0.0, math.pi, 14))])
-    path, _ = shorten(data, np.column_stack([start, np.full(14, 150.0)]))
+    path, _ = shorten_path(data, np.column_stack([start, np.full(14, 150.0)]))
     radius = math.sqrt((1000.0 + data.kill_margin) ** 2 - 150.0**2)
     string = 2.0 * math.sqrt(3000.0**2 - radius**2) + 2.0 * radius * math.asin(radius / 3000.0)
     # Twelve waypoints on the tangents' ends and between: an arc of a rad is longer by 1/12 of a leg's square.
     assert string * 0.9999 < path_length(path) < string * 1.002
-    assert np.abs(path[[0, -1]] - np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])).max() == 0.0
+    np.testing.assert_allclose(path[[0, -1]], [[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]], atol=1e-9)
 
 
 def test_in_the_open_it_is_straight(make_limits: Callable[[Scenario], Limits], small: Callable[..., Scenario]) -> None:
     scenario = small(terrain={"kind": "flat", "amsl_m": 0}, threats=[])
     data = make_problem(scenario, make_limits(scenario)).search
     start = np.column_stack([np.linspace(0.0, 6000.0, 8), [0, 300, -200, 500, 100, -400, 200, 0], np.full(8, 150.0)])
-    path, _ = shorten(data, start)
+    path, _ = shorten_path(data, start)
     assert path_length(path) == pytest.approx(6000.0, rel=1e-4)
 
 
 def test_many_missiles_are_looked_at_in_slices_with_the_same_result(monkeypatch: pytest.MonkeyPatch) -> None:
     data, start = make_task("hard-60").problem.search, first_path("hard-60")
     asked: list[int] = []
-    whole, models = shorten(data, start, pause=lambda: asked.append(0))
+    whole, models = shorten_path(data, start, pause=lambda: asked.append(0))
     assert len(asked) == 1
     monkeypatch.setattr(path_shortening, "PAIRS_AT_ONCE", 1)
-    sliced, again = shorten(data, start, pause=lambda: asked.append(0))
+    sliced, again = shorten_path(data, start, pause=lambda: asked.append(0))
     assert len(asked) == 1 + path_shortening.ROUNDS
     np.testing.assert_array_equal(whole, sliced)
     assert models == again

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from planfly.field_flights import FieldOptions
+from planfly.field.field_flights import FieldOptions
 from world.errors import ScenarioError
 
 

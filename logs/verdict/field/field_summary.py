@@ -6,8 +6,8 @@ from math import isfinite
 
 from flight.simulation.field_source import Damage, FieldSource, RowFaults, VerticalDatum
 from flight.simulation.flight_setup import FlightSetup
+from logs.verdict.field.flown_legs import FlownLegs
 from logs.verdict.findings import RULES, Finding
-from logs.verdict.flown_legs import FlownLegs
 from logs.verdict.levels import LevelAnswer
 
 _DATUMS: dict[VerticalDatum, str] = {

@@ -7,9 +7,9 @@ from pathlib import Path
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
 from logs.report.refly_lines import refly_lines
+from logs.verdict.field.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.model_comparison import Reflight
-from planfly.model_flight import fly_again
+from planfly.field.model_flight import fly_again
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.progress import progress
 from planfly.terminal.stored_logs import warn_of_loss

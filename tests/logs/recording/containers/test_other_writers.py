@@ -2,9 +2,7 @@
 
 import json
 import shutil
-import struct
 import subprocess
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +17,9 @@ from logs.recording.reader import read_log
 from logs.recording.recover import recover_log
 from tests.clients import NODE_MODULES, need
 from tests.logs.log_copies import rewrite, same
+from tests.logs.recording.containers.framing import FRAME, MAGIC, framed
 from world.errors import LogError
 
-MAGIC = b"\x89MCAP0\r\n"
-FRAME = struct.Struct("<BQ")
 # Options of mcap's writer for Python.
 PYTHON: dict[str, dict[str, Any]] = {
     "no-chunks": {"use_chunking": False},
@@ -91,16 +88,6 @@ def test_what_nodes_writer_makes(name: str, log_file: Path, track: Track, setup:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
     assert done.returncode == 0, done.stderr
     whole(target, track, setup)
-
-
-def framed(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Opcode and content of each record between the magics."""
-    at = len(MAGIC)
-    while at < len(data) - len(MAGIC):
-        opcode, length = FRAME.unpack_from(data, at)
-        at += FRAME.size
-        yield opcode, data[at : at + length]
-        at += length
 
 
 def padded(data: bytes, unknown: tuple[int, ...]) -> bytes:

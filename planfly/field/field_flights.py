@@ -26,9 +26,9 @@ from logs.field_logs.mean_wind import mean_wind
 from logs.field_logs.readers.open_log import open_log
 from logs.field_logs.rows_of_flight import rows_of_flight
 from logs.recording.reader import LogEvent
+from logs.verdict.field.wrong_plan import plan_mismatch
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
-from logs.verdict.wrong_plan import plan_mismatch
 from planfly.airframe import find_airframe
 from planfly.open_mission import ScenarioChange, open_plan
 from world.errors import LogError, MissionError

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.flown_legs import between
+from logs.verdict.field.flown_legs import between
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.measures.track_alignment import approaches, lay_track
 from logs.verdict.tolerances import ANOTHER_PLACE, IN_ORDER, NEAR_AT_LEAST, NEAR_AT_MOST

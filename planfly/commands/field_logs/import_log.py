@@ -5,8 +5,8 @@ import tempfile
 from pathlib import Path
 
 from logs.recording.recorder import Recorder
-from planfly.commands.field_options import field_options
-from planfly.field_flights import ImportedFlight, import_flight
+from planfly.commands.field_logs.field_options import field_options
+from planfly.field.field_flights import ImportedFlight, import_flight
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.results import print_verdict
 from planfly.terminal.scenario_options import scenario_change

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import ROLL, Track
-from logs.verdict.flown_legs import FlownLegs
+from logs.verdict.field.flown_legs import FlownLegs
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, lay_track
 from logs.verdict.measures.turns import measure_turn
@@ -111,7 +111,7 @@ def compare_with_model(
 
     >>> from flight.simulation.field_source import MissionStretch
     >>> from logs.recording.example_log import example_log
-    >>> from logs.verdict.flown_legs import flown_legs
+    >>> from logs.verdict.field.flown_legs import flown_legs
     >>> log = example_log()
     >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
     >>> again = compare_with_model(log.setup, flown, log.track, "completed")

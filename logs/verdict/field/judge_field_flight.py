@@ -9,13 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from flight.mission.items import Command
 from flight.simulation.field_source import Gap, MissionStretch, Quantity
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.field_summary import field_lines
+from logs.verdict.field.field_summary import field_lines
+from logs.verdict.field.flown_legs import FlownLegs, flown_legs
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
 from logs.verdict.flown_findings import flown_findings
-from logs.verdict.flown_legs import FlownLegs, flown_legs
 from logs.verdict.levels import LevelAnswer
 from logs.verdict.places import FLIGHT, Place
 from logs.verdict.summary import headline
@@ -49,6 +50,8 @@ _DATUMS = {
     "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
     "unstated": "the log does not say what its heights are above (--datum says it)",
 }
+# What the mode is called that flies a return to launch.
+_RETURN = "RTL"
 # Rules that ask for the heights of the plan.
 _OF_PLANNED_HEIGHTS = frozenset({"slope", "height"})
 # Rules that ask what the aircraft can do.
@@ -96,6 +99,12 @@ def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
         if legs.partial:
             judged = _in_part(judged, legs)
         out.append(_shifted(judged, legs.first, setup))
+    if "stall" not in {item.rule for item in out} and setup.source is not None:
+        lacking = [quantity for quantity in NEEDS["stall"] if quantity not in setup.source.holds]
+        if lacking:
+            # The rule itself says nothing of a flight without numbers.
+            why = f"the log holds no {_CALLED[lacking[0]]}"
+            out.append(make_finding("stall", FLIGHT, ok=None, reason=why, source="aircraft", unit="m/s"))
     return out
 
 
@@ -223,7 +232,9 @@ def _completion(setup: FlightSetup, flown: Sequence[FlownLegs], *, whole: bool) 
     else:
         last = flown[-1]
         what = f"{len(done)} of {legs} legs flown"
-        if last.stretch.ended == "log":
+        if _returns(setup, last):
+            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
+        elif last.stretch.ended == "log":
             unknown.append(f"{_left(last.stretch)}, on the way to {_named(setup, last)}: {what}")
         else:
             faults.append(message(f"{_left(last.stretch)}, on the way to {_named(setup, last)}", f": {what}"))
@@ -251,8 +262,20 @@ def _completion(setup: FlightSetup, flown: Sequence[FlownLegs], *, whole: bool) 
     )
 
 
+def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:
+    """Whether a stretch ended with the return to launch that the mission has next: autopilots have a mode for that."""
+    item = int(setup.route.items[_ahead(setup, legs)])
+    commands = {one.seq: one.command for one in setup.mission.items}
+    return legs.stretch.next_mode == _RETURN and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
+
+
+def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
+    """The waypoint that a stretch was on the way to when it ended."""
+    return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
+
+
 def _named(setup: FlightSetup, legs: FlownLegs) -> str:
-    ahead = min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
+    ahead = _ahead(setup, legs)
     item = int(setup.route.items[ahead])
     return f"waypoint {ahead}" + (f" (item {item})" if item >= 0 else "")
 

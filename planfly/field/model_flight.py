@@ -6,8 +6,8 @@ from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
-from logs.verdict.flown_legs import FlownLegs, flown_legs
-from logs.verdict.model_comparison import Reflight, compare_with_model
+from logs.verdict.field.flown_legs import FlownLegs, flown_legs
+from logs.verdict.field.model_comparison import Reflight, compare_with_model
 from planfly.airframe import find_airframe
 from planfly.pipeline import Advance
 from world.errors import LogError

@@ -1,0 +1,1 @@
+"""Flights of the field: which legs they flew, how far their logs can be judged, and against what."""

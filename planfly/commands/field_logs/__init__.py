@@ -1,0 +1,1 @@
+"""Commands on logs of the field."""

@@ -1,0 +1,1 @@
+"""Flights of the field set into their world, and flown again by the model."""

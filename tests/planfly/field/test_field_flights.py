@@ -1,0 +1,190 @@
+"""The verdict on a real autopilot's flights against sums of our own on pymavlink's rows, and the simulator's truth."""
+
+import json
+import math
+import os
+import time
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from pyproj import Geod
+
+from logs.field_logs.example_raw_log import example_raw_log
+from logs.field_logs.field_flight import make_flight
+from logs.field_logs.readers.open_log import open_log
+from planfly.field.field_flights import FieldOptions, ImportedFlight, import_flight
+from tests.logs.field_logs.judged_flights import judged
+from tests.logs.field_logs.pymavlink_rows import FLIGHTS, mission_lines, read_rows
+from world.scenario import load_scenario
+
+Floats = NDArray[np.float64]
+
+TRUTH: dict[str, Any] = json.loads((FLIGHTS / "truth.json").read_text())
+SCENARIOS = {"tight": "tight", "steep": "steep", "ridge-10mps": str(FLIGHTS / "ridge-10mps.toml")}
+# A folder of whole logs, where there is one beside the thinned ones.
+WHOLE = os.environ.get("PLANFLY_FLIGHTS")
+# The axes of WGS 84.
+A, E2 = 6_378_137.0, 6.69437999014e-3
+
+
+@pytest.fixture(scope="module")
+def flights() -> dict[str, ImportedFlight]:
+    return {name: imported(FLIGHTS / f"{name}.BIN", name) for name in TRUTH}
+
+
+def imported(path: Path, name: str) -> ImportedFlight:
+    return import_flight(path, FieldOptions(scenario=SCENARIOS[name]), lambda scenario: scenario)
+
+
+def flat(lat: Any, lon: Any, lat0: float, lon0: float) -> Floats:
+    """East and north of a near place, m, by the radii of the ellipsoid there."""
+    w = 1.0 - E2 * math.sin(math.radians(lat0)) ** 2
+    north = A * (1.0 - E2) / w**1.5 * np.radians(np.asarray(lat) - lat0)
+    east = A / math.sqrt(w) * math.cos(math.radians(lat0)) * np.radians(np.asarray(lon) - lon0)
+    return np.stack([east, north], axis=-1)
+
+
+def off_the_legs(name: str) -> tuple[float, float]:
+    """Greatest distance of the flight from the nearest leg, and least height above the ground below it, m."""
+    rows = read_rows(FLIGHTS / f"{name}.BIN", "POS")["POS"]
+    way = [line for line in mission_lines(FLIGHTS / f"{name}.waypoints")[1:] if line[3] == 16]
+    start = TRUTH[name]["free_flight_starts_log_s"]
+    rows = [row for row in rows if row.TimeUS * 1e-6 >= start]
+    farthest = 0.0
+    # From the first waypoint on: what was flown to get there is no leg.
+    first = np.argmin([np.hypot(*flat(row.Lat, row.Lng, way[0][8], way[0][9])) for row in rows])
+    for row in rows[int(first) :]:
+        nearest = math.inf
+        for one, two in pairwise(way):
+            end, place = (flat(lat, lon, one[8], one[9]) for lat, lon in ((two[8], two[9]), (row.Lat, row.Lng)))
+            along = min(1.0, max(0.0, float(place @ end) / float(end @ end)))
+            nearest = min(nearest, float(np.hypot(*(place - along * end))))
+        farthest = max(farthest, nearest)
+    ground = load_scenario(SCENARIOS[name]).terrain
+    assert ground is not None
+    origin = load_scenario(SCENARIOS[name]).origin
+    heights = []
+    for row in rows[int(first) :]:
+        east, north = flat(row.Lat, row.Lng, origin.lat_deg, origin.lon_deg)
+        heights.append(row.Alt - float(ground.height(east, north)))
+    return farthest, min(heights)
+
+
+@pytest.mark.parametrize("name", ["tight", "steep"])
+def test_the_verdict_is_within_a_metre_of_sums_of_our_own(flights: dict[str, ImportedFlight], name: str) -> None:
+    farthest, lowest = off_the_legs(name)
+    found = flights[name].verdict.findings
+    corridor = max(item.flown for item in found if item.rule == "corridor" and item.flown is not None)
+    clearance = min(item.flown for item in found if item.rule == "clearance" and item.flown is not None)
+    assert clearance == pytest.approx(lowest, abs=1.0)
+    # Each leg's distance is from it and its neighbours; nearer legs beyond them do not count.
+    assert farthest <= corridor + 1.0
+    assert corridor == pytest.approx(TRUTH[name]["cross_track_to_legs_max_m"], abs=1.0)
+
+
+@pytest.mark.parametrize("name", TRUTH)
+def test_the_verdict_agrees_with_the_simulators_truth(flights: dict[str, ImportedFlight], name: str) -> None:
+    truth, found = TRUTH[name], flights[name].verdict.findings
+    clearance = min(item.flown for item in found if item.rule == "clearance" and item.flown is not None)
+    assert clearance == pytest.approx(truth["least_clearance_m"], abs=1.0)
+    entered = [item for item in found if item.rule == "threat" and item.place.kind == "missile" and item.ok is False]
+    assert len(entered) == truth["kill_spheres_entered"]
+    nearest = [fact.value for item in found if item.rule == "threat" for fact in item.facts if fact.what == "nearest"]
+    if nearest:
+        assert min(nearest) == pytest.approx(truth["least_distance_to_a_kill_sphere_m"], abs=1.0)
+    overshoot = {
+        item.place.index: fact.value
+        for item in found
+        if item.rule == "turn"
+        for fact in item.facts
+        if fact.what == "overshoot"
+    }
+    # Where `tight` lost its legs nothing says which waypoint an excursion belongs to.
+    corners = [corner for corner in truth["corners"] if name != "tight" or corner["waypoint"] in (1, 2, 3, 10, 18, 19)]
+    for corner in corners:
+        assert overshoot[corner["waypoint"]] == pytest.approx(corner["overshoot_m"], abs=1.0), corner
+
+
+def test_what_failed_is_what_the_truth_has(flights: dict[str, ImportedFlight]) -> None:
+    assert flights["ridge-10mps"].verdict.flyable
+    failed = {
+        name: {item.rule for item in flight.verdict.findings if item.ok is False} for name, flight in flights.items()
+    }
+    assert failed["steep"] == {"slope", "clearance"}
+    assert {"turn", "threat", "corridor", "waypoint"} <= failed["tight"]
+    for flight in flights.values():
+        completion = next(item for item in flight.verdict.findings if item.rule == "completion")
+        assert completion.ok is None, "the last waypoint stands a kilometre past the log's end"
+
+
+def test_the_wind_is_the_one_that_blew(flights: dict[str, ImportedFlight]) -> None:
+    """10 m/s over the ridges, none in the others."""
+    assert flights["ridge-10mps"].setup.scenario.wind.speed == pytest.approx(10.0, abs=0.6)
+    for name in ("tight", "steep"):
+        assert flights[name].setup.scenario.wind.speed < 0.3
+
+
+def test_track_rows_are_those_of_the_log(flights: dict[str, ImportedFlight]) -> None:
+    flight = flights["tight"]
+    rows = read_rows(FLIGHTS / "tight.BIN", "POS", "ATT", "XKF2")
+    origin = flight.setup.scenario.origin
+    for k in np.linspace(0, len(flight.track) - 1, 10).astype(int):
+        place = min(rows["POS"], key=lambda row: abs(row.TimeUS * 1e-6 - flight.track.time[k]))
+        assert flight.track.time[k] == pytest.approx(place.TimeUS * 1e-6, abs=1e-6)
+        # Direction and distance from the origin, on the ellipsoid.
+        azimuth, _, distance = Geod(ellps="WGS84").inv(origin.lon_deg, origin.lat_deg, place.Lng, place.Lat)
+        east, north = distance * math.sin(math.radians(azimuth)), distance * math.cos(math.radians(azimuth))
+        assert flight.track.position[k] == pytest.approx([east, north, place.Alt], abs=0.1)
+        angle = min(rows["ATT"], key=lambda row: abs(row.TimeUS - place.TimeUS))
+        assert flight.track.attitude[k] == pytest.approx(np.radians([angle.Roll, angle.Pitch, angle.Yaw]), abs=0.01)
+        wind = min(rows["XKF2"], key=lambda row: abs(row.TimeUS - place.TimeUS))
+        assert flight.track.wind[k, :2] == pytest.approx([wind.VWE, wind.VWN], abs=0.01)
+
+
+def test_a_log_is_read_in_five_seconds_an_hour() -> None:
+    hours = TRUTH["steep"]["flight_s"] / 3600.0
+    spent = []
+    for _ in range(3):
+        began = time.process_time()
+        make_flight(open_log(FLIGHTS / "steep.BIN"))
+        spent.append(time.process_time() - began)
+    assert min(spent) < 5.0 * hours
+
+
+@pytest.mark.parametrize("name", ["demo", "ridge-5mps", "ridge-10mps", "steep", "tight"] if WHOLE else [])
+def test_whole_logs_agree_with_their_truth(name: str) -> None:
+    folder = Path(str(WHOLE))
+    truth = json.loads((folder / "truth.json").read_text())[name]
+    scenario = str(folder / f"{name}.toml") if (folder / f"{name}.toml").exists() else name
+    options = FieldOptions(scenario=scenario) if name != "demo" else FieldOptions(terrain=str(folder / "terrain.tif"))
+    found = import_flight(folder / f"{name}.BIN", options, lambda world: world).verdict.findings
+    corridor = max(item.flown for item in found if item.rule == "corridor" and item.flown is not None)
+    clearance = min(item.flown for item in found if item.rule == "clearance" and item.flown is not None)
+    if truth["cross_track_to_legs_max_m"] > 5.0:
+        assert corridor == pytest.approx(truth["cross_track_to_legs_max_m"], abs=1.0)
+    assert clearance == pytest.approx(truth["least_clearance_m"], abs=1.0)
+
+
+def test_a_task_without_heights_gets_those_that_were_flown(tmp_path: Path) -> None:
+    raw = example_raw_log()
+    task = replace(raw.missions[0], with_heights=False)
+    flight = judged(tmp_path, replace(raw, missions=(task,)), FieldOptions(aircraft="aerosonde"))
+    assert [item.ok for item in flight.verdict.findings if item.rule == "slope"] == [None, None]
+    assert flight.setup.source is not None
+    assert not flight.setup.source.plan_heights
+
+
+def test_notes_tell_what_a_person_should_know(tmp_path: Path) -> None:
+    raw = replace(example_raw_log(), parameters={})
+    flight = judged(tmp_path, raw)
+    assert "Note: the log holds no parameters: ArduPlane's defaults are taken" in flight.verdict.lines
+    assert "Wind: 3.0 m/s on average, from 000°, by XKF2 of the log" in flight.verdict.lines
+    assert (
+        "Heights: POS, above mean sea level, as the log has it; at the start GPS.Alt +0.5 m of it"
+        in flight.verdict.lines
+    )
