@@ -23,7 +23,7 @@ def test_flights_are_counted_by_wind() -> None:
 
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
-    boundary = WindBoundary(7.0, 6.6, 7.4, False)
+    boundary = WindBoundary(7.0, 6.7, 7.4, False)
     settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(30)))
     assert not any("not settled" in line for line in wind_lines(settled))
     fewer = WindsFound(FOUND.goal, (boundary,), settled.flights[1:])
