@@ -2,13 +2,15 @@
 
 import json
 import math
+from collections import Counter
 from pathlib import Path
 
 from logs.figures.elements.style import png_bytes
-from planfly.campaigns.find_winds import WindsFound
+from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.pictures.go_no_go import Spoke, draw_go_no_go
 from planfly.campaigns.report.page import winds_page
+from planfly.campaigns.statistics.wind_boundary import needs_more
 from world.atomic_files import write_whole
 
 SCHEMA = "planfly.winds/1"
@@ -72,6 +74,18 @@ def _speed_text(speed: float, most: float) -> str:
     return f"over {most:g} m/s" if speed >= most - 1e-9 else f"{speed:.1f} m/s"
 
 
+def _open_lines(found: WindsFound) -> list[str]:
+    """That the flights did not last for all directions, where they did not."""
+    counts = Counter(direction for direction, _, _ in found.flights)
+    wanting = [k for k, one in enumerate(found.boundaries) if needs_more(one, counts[k], ACCURACY, FEWEST)]
+    if not wanting:
+        return []
+    return [
+        f"not settled: {len(wanting)} of {len(found.boundaries)} directions, for want of flights: each takes"
+        f" {FEWEST} at least, and an interval of {2.0 * ACCURACY:g} m/s; with fewer the interval is mostly assumption"
+    ]
+
+
 def wind_lines(found: WindsFound) -> list[str]:
     """What was found, in a few lines."""
     chart = spokes(found)
@@ -80,6 +94,7 @@ def wind_lines(found: WindsFound) -> list[str]:
     return [
         f"flies with P >= {found.goal.target:g} in wind up to {_speed_text(least.boundary, most)}"
         f" from {least.from_deg:g}° (the least), {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        *_open_lines(found),
         f"{len(found.flights)} flights; intervals at {100 * found.goal.confidence:g} %, by probit regression"
         " of each direction",
     ]

@@ -21,6 +21,15 @@ def test_flights_are_counted_by_wind() -> None:
     assert wind_lines(FOUND)[0].startswith("flies with P >= 0.9 in wind up to 7.0 m/s from 0° (the least), over 20 m/s")
 
 
+def test_directions_for_which_flights_did_not_last_are_said() -> None:
+    assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
+    boundary = WindBoundary(7.0, 6.6, 7.4, False)
+    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(30)))
+    assert not any("not settled" in line for line in wind_lines(settled))
+    fewer = WindsFound(FOUND.goal, (boundary,), settled.flights[1:])
+    assert any("not settled: 1 of 1" in line for line in wind_lines(fewer))
+
+
 def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     write_winds(tmp_path, base, FOUND, "planfly winds x")
     data = json.loads((tmp_path / "winds.json").read_text())
