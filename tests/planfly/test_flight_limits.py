@@ -12,7 +12,7 @@ from planfly.flight_limits import FlightLimits, flight_text, predicted_seconds
 from planfly.open_mission import OpenedMission, open_mission
 from planfly.pipeline import fly_and_judge
 from tests.planfly.conftest import FIELD
-from tests.planfly.test_interruptions import LONG
+from tests.planfly.misuse.test_interruptions import LONG
 from world.scenario import Scenario
 from world.scenario_variants import with_flight, with_wind
 

@@ -115,7 +115,10 @@ def index_dataflash(data: Bytes, names: Collection[str]) -> Dataflash:
     second = _find_messages(data, wanted)
     order = np.argsort(second.kinds, kind="stable")
     numbers, firsts = np.unique(second.kinds[order], return_index=True)
-    starts = {int(number): found for number, found in zip(numbers, np.split(second.at[order], firsts[1:]), strict=True)}
+    # Of no messages numpy makes one empty part.
+    starts = {
+        int(number): found for number, found in zip(numbers, np.split(second.at[order], firsts[1:]), strict=False)
+    }
     held = tuple(known.name for number, known in formats.items() if second.counts[number])
     damage = Damage(int(second.places), int(second.size), bool(second.cut), unreadable)
     return Dataflash(data, starts, formats, held, damage)

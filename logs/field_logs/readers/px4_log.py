@@ -231,6 +231,9 @@ class _Topics:
         items: dict[int, MissionItem] = {}
         for k in range(count):
             number, command, lat, lon, up = (float(data[name][k]) for name in wanted)
+            # Before anything is made of them: garbage may be too large for any degrees.
+            if not (abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)):
+                continue
             frame = _OVER_HOME if relative[k] else _AMSL
             params = (0.0, float(radius[k]), 0.0, 0.0)
             place = (on_grid(lat), on_grid(lon), round(up, 6))

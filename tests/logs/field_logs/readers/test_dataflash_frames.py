@@ -52,3 +52,8 @@ def test_a_format_that_is_none_is_left_out_and_counted(tmp_path: Path) -> None:
     assert found.damage.unreadable == 1
     assert len(found.messages("ATT")) == 0
     assert len(found.messages("POS")) == 460
+
+
+def test_a_log_without_a_wanted_message_is_empty(tmp_path: Path) -> None:
+    data = np.fromfile(dataflash(tmp_path / "a.BIN"), np.uint8)
+    assert index_dataflash(data, ("IMU",)).starts == {}

@@ -14,7 +14,7 @@ from tests.logs.field_logs.written_logs import dataflash, gpx, igc, kml, px4, te
 from tests.planfly.commands.field_logs.field_log_files import FLIGHTS, example_plan
 
 SOAK = os.environ.get("PLANFLY_SOAK") == "1"
-COPIES = 1000 if SOAK else 12
+COPIES = 1000 if SOAK else 8
 WRITERS: dict[str, Callable[[Path], Path]] = {
     "a.BIN": dataflash,
     "a.tlog": telemetry,

@@ -21,7 +21,7 @@ from tests.soak.test_hostile_files import WPL
 from world.atomic_files import hold, write_whole
 from world.errors import PlanflyError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 Done: TypeAlias = subprocess.CompletedProcess
 CHECK = ("check", "m.waypoints", "--scenario", "field.toml", "--guidance", "path")
 

@@ -17,7 +17,7 @@ from rasterio.transform import Affine
 
 from tests.logs.made_flight import make_setup, make_track, record
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MAGIC = b"\x89MCAP0\r\n"
 # Runs one command under the limits; imports stand before them, since it is the file that is limited, not Python.
 CHILD = """
