@@ -47,7 +47,7 @@ def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
         for flight, look in zip(flights, looks, strict=True):
             rows = flight.track.position[:: max(1, len(flight.track) // 6000)]
             axes.plot(rows[:, 0], rows[:, 1], zorder=6, label=style.shorten(flight.name, 40), **look)
-        handles = axes.lines[-2:]
+        handles = axes.get_lines()[-2:]
         axes.legend(handles=handles, loc="best", frameon=True, framealpha=0.9)
         axes.set_title(f"{style.shorten(setup.scenario.name, 40)}: two flights from above", fontweight="bold")
     return figure

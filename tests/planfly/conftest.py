@@ -102,6 +102,9 @@ class Served:
             os.killpg(self.process.pid, number)
         begun = time.monotonic()
         code = self.process.wait(30.0)
+        # What multiprocessing starts to clean up after it ends once it sees that its parent has.
+        while self.children() and time.monotonic() - begun < 2.0:
+            time.sleep(0.02)
         assert time.monotonic() - begun < 2.0
         assert self.children() == []
         self._reader.join(5.0)

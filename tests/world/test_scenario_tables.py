@@ -36,6 +36,7 @@ def test_every_default() -> None:
             "population": 200,
             "generations": 100,
             "across_m": None,
+            "zone_margin_m": None,
             "goals": {"length_ratio": None, "kill_exposure": None},
             "budget": None,
             "seed": None,

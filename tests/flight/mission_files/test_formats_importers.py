@@ -39,7 +39,10 @@ def test_mavsdk_importers_get_the_same_integers(tmp_path: Path) -> None:
 def test_pymavlink_loads_fences_as_they_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A fence file has no home line: pymavlink, and MAVProxy with it, would send that to the fence."""
     monkeypatch.setenv("MAVLINK20", "1")
-    from pymavlink import mavwp
+    from pymavlink import mavutil, mavwp
+
+    # Another test may have loaded the first version's messages.
+    mavutil.set_dialect("ardupilotmega")
 
     mission = some_mission(30)
     text = fence_text(mission)

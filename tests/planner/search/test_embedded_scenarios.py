@@ -58,7 +58,10 @@ def test_tight_has_corners_that_the_aircraft_cannot_turn(make_limits: Callable[[
     limits = make_limits(scenario)
     plan = plan_path(scenario, limits, seed=3)
     turns = np.degrees(turning_angles(plan.waypoints))
-    assert (turns > 80).sum() in (2, 3, 4)
+    # A corner may be two waypoints close to each other: with 40 m between them an Aerosonde turns by 21 degrees.
+    legs = np.linalg.norm(np.diff(plan.waypoints[:, :2], axis=0), axis=1)[1:-1]
+    corners = np.append(turns[:-1] + np.where(legs < 40.0, turns[1:], 0.0), turns[-1])
+    assert (corners > 80).sum() in (2, 3, 4)
     assert turns.max() <= 134.5
     as_flown = certify(
         make_problem(scenario, Limits(None, None, None, 60, limits.envelope, 25.0, limits.max_bank, limits.wind)),

@@ -97,10 +97,11 @@ def test_a_viewer_is_given_the_log(log_path: Path, track: Track) -> None:
 
     with served(str(log_path), "--speed", "3") as (process, viewer):
         deadline = time.monotonic() + 20.0
-        while len(viewer.channels) < 8 and time.monotonic() < deadline:
+        while len(viewer.channels) < 9 and time.monotonic() < deadline:
             viewer.take(1.0)
         assert set(viewer.channels) == {
-            "/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/plan", "/scene/track",
+            "/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/zones", "/scene/plan",
+            "/scene/track",
         }  # fmt: skip
         state = viewer.channels["/state"]
         assert (state["encoding"], state["schemaName"], state["schemaEncoding"]) == (
