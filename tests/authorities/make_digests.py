@@ -4,9 +4,9 @@ FOLDER holds what these commands left there, each with ``--out FOLDER/NAME``: ``
 (jacksboro-1 to -3), ``planfly run steep --seed 1`` (steep), ``planfly run tight --seed 1`` (tight) and ``planfly paper
 --problems 7,60 --runs 3`` (paper).
 
-What `tests.test_same_results` holds every later version to: the tables of the paper, and missions and tracks of steep
-and tight, are still those of b610875, the last commit before modules were moved into their rooms.  The plans of both
-say since who flies; jacksboro was moved to its place and is flown by ArduPlane's laws; verdicts tell of harm.
+What `tests.test_same_results` holds every later version to.  The tables of the paper are still those of b610875, the
+last commit before modules were moved into their rooms; plans, and with them missions and tracks, are the default
+planner's since it shortens paths, and verdicts tell of harm.
 """
 
 import hashlib
