@@ -85,7 +85,7 @@ def test_what_cannot_fly_is_shown_not_to(tmp_path: Path, capsys: pytest.CaptureF
     assert str(rounds[-1]["next"]).startswith("ended: ")
     # Run again, the old rounds are cleared away, whatever else lies there stays.
     (out / "mine.txt").write_text("keep", encoding="utf-8")
-    assert main(["run", "jacksboro", "--out", str(out), "--overwrite"]) == 0
+    assert main(["run", "tight", "--out", str(out), "--overwrite"]) == 4
     assert (out / "mine.txt").exists()
     assert not list(out.glob("round*"))
     capsys.readouterr()

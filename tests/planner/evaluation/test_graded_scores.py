@@ -103,7 +103,11 @@ def test_ground_under_a_climb_is_kept_by_the_lag(strayed: Callable[..., ProblemA
     columns = np.arange(heights.shape[1])
     east = data_east(data, columns)
     heights += np.clip(0.1 * (east - 2000.0), -40.0, 140.0).astype(np.float32) + np.float32(40.0)
-    slopes = data.slope_bounds._replace(steepest=0.0, tiles=np.full_like(data.slope_bounds.tiles, 0.11))
+    tiles = np.full_like(data.slope_bounds.tiles, 0.11)
+    # As a problem's own are: numba compiles what reads an array that can be written anew.
+    heights.setflags(write=False)
+    tiles.setflags(write=False)
+    slopes = data.slope_bounds._replace(steepest=0.0, tiles=tiles)
     data = data._replace(heights=heights, slope_bounds=slopes)
     depth = float(graded_scores(data, path[None])[0][0, Violation.TERRAIN])
     assert (depth > 0.0) == low
