@@ -36,7 +36,7 @@ ALGORITHMS: dict[str, Algorithm] = {
     for item in (
         Algorithm(
             "fda-seeded",
-            "the default: seeds from grid routes and past obstacles' other sides; generations where none is safe",
+            "the default: grid routes, past obstacles on other sides too, shortened; generations where none is safe",
             graded=True,
             seeded=True,
             tightened=True,
