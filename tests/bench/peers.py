@@ -30,6 +30,8 @@ from tests.bench.task import (
 
 Floats = NDArray[np.float64]
 
+# Where a straight frame holds no path; of these no best length is known.
+TRAPS = ("trap-u", "trap-valley", "trap-wall", "trap-spiral")
 # A race ends this close to the best known length; seeds of each.
 WITHIN, RACES = 0.02, 5
 
@@ -155,11 +157,13 @@ def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -
 
 def measure(seconds: float) -> dict[str, Any]:
     """Every peer once on each problem, seed 1, the paper's budget; OMPL so many seconds of CPU.  Prints a table."""
-    print("\nPeers on the hard set, seed 1: same problem, evaluation function and certificate; one core, CPU s, warm")
-    print(f"  {'problem':<9}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
+    print(
+        "\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm"
+    )
+    print(f"  {'problem':<13}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
     record: dict[str, Any] = {}
-    for number in PROBLEMS:
-        task = make_task(f"hard-{number:02d}")
+    for problem in (*(f"hard-{number:02d}" for number in PROBLEMS), *TRAPS):
+        task = make_task(problem)
         known = best_known(task.scenario.name)
         task.scores(task.encoding.lower[None])
         rows: dict[str, Callable[[], Found]] = {
@@ -172,7 +176,7 @@ def measure(seconds: float) -> dict[str, Any]:
         for name, work in rows.items():
             package = name.split()[0].rstrip(",")
             if package != "planfly" and find_spec(package) is None:
-                print(f"  {task.scenario.name:<9}{name:<28}  not measured: package {package} is missing (make bench)")
+                print(f"  {task.scenario.name:<13}{name:<28}  not measured: package {package} is missing (make bench)")
                 record[f"{task.scenario.name} {name}"] = "missing package"
                 continue
             if package != "ompl":
@@ -226,11 +230,11 @@ def _time_to(item: Found, ratio: float, never: float) -> float:
 
 def _print_row(problem: str, name: str, item: Found, known: float) -> None:
     print(
-        f"  {problem:<9}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
+        f"  {problem:<13}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
         f"{item.length_ratio / known:>8.4f}{item.seconds:>8.2f}{item.checks:>9}{100 * item.callback_share:>8.0f}%"
     )
     if not item.safe:
-        print(f"  {'':<9}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
+        print(f"  {'':<13}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
 
 
 def solve_with_planfly(task: Task, seed: int) -> Found:
