@@ -157,9 +157,7 @@ def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -
 
 def measure(seconds: float) -> dict[str, Any]:
     """Every peer once on each problem, seed 1, the paper's budget; OMPL so many seconds of CPU.  Prints a table."""
-    print(
-        "\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm"
-    )
+    print("\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm")
     print(f"  {'problem':<13}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
     record: dict[str, Any] = {}
     for problem in (*(f"hard-{number:02d}" for number in PROBLEMS), *TRAPS):
@@ -173,6 +171,9 @@ def measure(seconds: float) -> dict[str, Any]:
             "pymoo NSGA-II": partial(solve_with_nsga2, task, 1, task.evaluations),
             "ompl InformedRRTstar": partial(solve_with_ompl, task, 1, seconds),
         }
+        if problem in TRAPS:
+            # A straight frame's grids hold no route out of a trap, so that there are no seeds to begin from.
+            del rows["cmaes, our seeds and basis"]
         for name, work in rows.items():
             package = name.split()[0].rstrip(",")
             if package != "planfly" and find_spec(package) is None:

@@ -103,9 +103,10 @@ def _flown(demands: RouteDemands, aligned: AlignedTrack) -> list[Finding]:
     # A log of the field may hold no load factor.
     carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, demands.limits.max_bank)))
     stall = level * np.sqrt(np.maximum(carried, 0.0))
-    if not np.isfinite(speed - stall).any():
+    margin = speed - stall
+    if not np.isfinite(margin).any():
         return []
-    k = int(np.nanargmin(speed - stall))
+    k = int(np.nanargmin(margin))
     tolerance = STALL_TOLERANCE + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
     found = _Margin(float(speed[k]), float(stall[k]), float(level[k]), float(bank[k]))
     return [_finding(found, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]

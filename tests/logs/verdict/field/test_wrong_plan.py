@@ -39,6 +39,22 @@ def test_the_same_places_the_other_way_round() -> None:
     assert plan_mismatch(along(way[::-1]), LOG.track) is None
 
 
+@pytest.mark.parametrize(("beside", "kind"), [(-1.0, "order"), (1.0, None)])
+@pytest.mark.parametrize(
+    ("corridor", "near"), [(10.0, 50.0), (49.0, 50.0), (100.0, 100.0), (151.0, 150.0), (400.0, 150.0)]
+)
+def test_a_waypoint_is_passed_within_the_corridor_but_50_to_150_m(
+    corridor: float, near: float, beside: float, kind: str | None
+) -> None:
+    # South of the flight's first leg, from east to west, where the flight went from west to east.
+    way = [[east, -(near + beside), 200.0] for east in (-50.0, -200.0, -350.0, -450.0)]
+    scenario = SETUP.scenario
+    limits = scenario.limits.model_copy(update={"corridor_m": corridor})
+    spec = scenario.spec.model_copy(update={"limits": limits})
+    found = plan_mismatch(along(way).in_scenario(replace(scenario, spec=spec, limits=limits)), LOG.track)
+    assert (None if found is None else found.kind) == kind
+
+
 def test_a_flight_that_went_home_half_way_is_not_another_plan() -> None:
     way = [[-500.0, 0.0, 200.0], [-200.0, 0.0, 200.0], [0.0, 0.0, 200.0], [3000.0, 0.0, 200.0], [6000.0, 0.0, 200.0]]
     assert plan_mismatch(along(way), LOG.track) is None
