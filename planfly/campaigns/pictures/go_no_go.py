@@ -37,8 +37,8 @@ def draw_go_no_go(
     with clean_style():
         figure = new_figure(7.6)
         axes = figure.add_axes((0.06, 0.07, 0.64, 0.80), projection="polar")
-        axes.set_theta_zero_location("N")  # type: ignore[attr-defined]
-        axes.set_theta_direction(-1)  # type: ignore[attr-defined]
+        axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
+        axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
         angle = np.radians([one.from_deg for one in spokes] + [spokes[0].from_deg + 360.0])
         ring = [*spokes, spokes[0]]
         fine = np.linspace(angle[0], angle[-1], 720)
@@ -63,7 +63,7 @@ def draw_go_no_go(
             axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor="white")
         axes.set_ylim(0.0, most)
         axes.set_xticks(np.radians(np.arange(0, 360, 45)), ["N", "NE", "E", "SE", "S", "SW", "W", "NW"])
-        axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]
+        axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes
         axes.tick_params(axis="y", labelsize=8)
         axes.grid(color="#cccccc", linewidth=0.6)
         figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK)
