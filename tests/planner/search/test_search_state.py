@@ -8,7 +8,10 @@ import pytest
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from planner.plan import parse_plan, plan_json
+from planner.evaluation.certify import certify
+from planner.evaluation.problem import Problem
+from planner.plan import Certificate, parse_plan, plan_json
+from planner.search import search_state
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from world.errors import ScenarioError
@@ -65,7 +68,7 @@ def test_budget_ends_a_search(make_limits: Callable[[Scenario], Limits], small: 
 
 @pytest.mark.parametrize(
     ("name", "problem"),
-    [(DEFAULT, "hard-60"), (DEFAULT, "trap-u")]
+    [(DEFAULT, problem) for problem in ("hard-60", "trap-u", "trap-valley", "trap-wall", "trap-spiral")]
     + [(name, "hard-60") for name in ("fda", "umda-seeded", "umda-smooth", "umda")],
 )
 def test_a_search_ends_within_fifty_milliseconds(
@@ -93,6 +96,26 @@ def test_a_search_ends_within_fifty_milliseconds(
         plan = plan_path(scenario, limits, seed=1, algorithm=name, stop=end)
         assert plan.ended == "interrupted"
         assert time.process_time() - ends[max(0, questions - 1)] < AT_ONCE
+
+
+def test_few_paths_are_certified_once_a_search_is_to_end(
+    make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The generations of the paper's algorithm come to no safe path here: each path that is kept is certified."""
+    scenario = with_planner(load_scenario("trap-spiral"), "--generations", generations=1)
+    limits = make_limits(scenario)
+    made: list[int] = []
+
+    def counted(problem: Problem, path: Floats) -> Certificate:
+        made.append(1)
+        return certify(problem, path)
+
+    monkeypatch.setattr(search_state, "certify", counted)
+    for stop, certificates in ((None, search_state.ARCHIVE_SIZE), (lambda: "interrupted", 4)):
+        made.clear()
+        plan = plan_path(scenario, limits, seed=1, algorithm="umda", stop=stop)
+        assert not plan.certificate.ok
+        assert len(made) == certificates
 
 
 def test_being_asked_changes_no_result(make_limits: Callable[[Scenario], Limits]) -> None:
