@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from flight.mission.placing import PlacedMission
 from flight.mission.routing import lay_route, make_route
 from flight.mission_files.formats import mission_text
 from flight.simulation.airborne import Airborne
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
@@ -133,11 +134,12 @@ def make_setup(
     *,
     plan: Plan | None = None,
     placed: PlacedMission | None = None,
+    fdm_hz: Literal[60, 120] = FDM_HZ,
 ) -> FlightSetup:
     """Everything that decides the flight of a mission in a scenario.
 
-    placed: the mission's places on the scenario's map where they are known already.  Raises MissionError for a mission
-    that cannot be laid out, and for a fence whose shapes are none.
+    placed: the mission's places on the scenario's map where they are known already.  fdm_hz: JSBSim's steps a second.
+    Raises MissionError for a mission that cannot be laid out, and for a fence whose shapes are none.
     """
     # A fence that makes no zones is bad input, and the verdict could not judge it.
     fence_zones(mission.fences, scenario.origin, mission.source)
@@ -160,6 +162,7 @@ def make_setup(
         guidance=scenario.flight.steering.guidance,
         nav=scenario.flight.steering.nav,
         guidance_hz=scenario.flight.guidance_hz,
+        fdm_hz=fdm_hz,
         parameters=airframe.parameters,
     )
 

@@ -33,7 +33,6 @@ from world.wind import W20
 
 Floats = NDArray[np.float64]
 
-FDM_HZ = 120.0
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
 PATIENCE = 1.5
 PATIENCE_SECONDS = 60.0
@@ -87,8 +86,8 @@ class Airborne(ABC):
         self._start_offset = start_offset
         self._ground = Ground(setup.scenario.terrain)
         self.map = local_map or LocalMap.around(setup)
-        self._steps = round(FDM_HZ / setup.guidance_hz)
-        self.dt = self._steps / FDM_HZ
+        self._steps = setup.fdm_hz // setup.guidance_hz
+        self.dt = self._steps / setup.fdm_hz
         waypoints = waypoint_records(setup.route)
         self._airspeeds = setup.route.airspeed
         if setup.parameters is not None:
@@ -99,7 +98,8 @@ class Airborne(ABC):
         self._work.position_map, self._work.north_map = self.map.position.record, self.map.angle.record
         self._work.pixel_map = self._ground.to_pixel.record
         self.memory = self._work.memory
-        self.fdm = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking, variation=variation)
+        braking = setup.scenario.flight.motor_braking
+        self.fdm = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=braking, variation=variation)
         self._work.timing.dt = self.dt
         self._work.settings.slowest = 0.94 * aircraft.stall_speed
         self._work.settings.middle = self.map.middle

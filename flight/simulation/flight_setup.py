@@ -18,6 +18,9 @@ from planner.plan import Plan
 from world.scenario import Scenario
 from world.scenario_types import Guidance, Navigation
 
+# Steps of JSBSim a second, but for campaigns.
+FDM_HZ: Literal[120] = 120
+
 
 @dataclass(frozen=True, slots=True)
 class FlightSetup:
@@ -35,6 +38,7 @@ class FlightSetup:
     guidance: the law that steers where ``parameters`` is None.
     nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
     guidance_hz: how often it steers, and how many rows the track has a second.
+    fdm_hz: steps of JSBSim a second.
     parameters: of the ArduPlane that flies; None where planfly's guidance does.
     program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
     source: the log of the field that the flight is from; None for a flight of planfly's own.
@@ -53,6 +57,7 @@ class FlightSetup:
     guidance: Guidance = "path"
     nav: Navigation = "perfect"
     guidance_hz: Literal[30, 60] = 60
+    fdm_hz: Literal[60, 120] = FDM_HZ
     parameters: ArduPilotParameters | None = None
     program: AutopilotProgram | None = None
     source: FieldSource | None = None

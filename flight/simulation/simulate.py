@@ -12,7 +12,7 @@ from flight.dynamics.trim import straight
 from flight.guidance.fly_by_path import FlyByPath
 from flight.guidance.gains import load_gains
 from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
-from flight.simulation.airborne import FDM_HZ, Airborne
+from flight.simulation.airborne import Airborne
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.local_map import LocalMap
 from flight.simulation.loop import make_loop
@@ -134,7 +134,7 @@ class Flight(Airborne):
         gains = load_gains(aircraft)
         super().__init__(setup, aircraft, gains, variation, local_map, start_offset)
         # Guidance knows the model, not how the aircraft differs from it.
-        model = Fdm(aircraft, rate_hz=FDM_HZ, motor_braking=setup.scenario.flight.motor_braking)
+        model = Fdm(aircraft, rate_hz=setup.fdm_hz, motor_braking=setup.scenario.flight.motor_braking)
         self._begin(setup, model, gains.reference_airspeed)
         self.memory.max_bank = setup.limits.max_bank + BANK_RESERVE
         self.memory.law = LAWS[setup.guidance]

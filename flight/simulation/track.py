@@ -70,9 +70,11 @@ class Track:
     def __post_init__(self) -> None:
         """Give each array its type, and lock it."""
         for item, kind in zip(fields(self), _KINDS, strict=True):
-            array = np.ascontiguousarray(getattr(self, item.name), dtype=kind)
+            given = getattr(self, item.name)
+            array = np.ascontiguousarray(given, dtype=kind)
             if array.flags.writeable:
-                array = array.copy()
+                if np.may_share_memory(array, given):
+                    array = array.copy()
                 array.setflags(write=False)
             object.__setattr__(self, item.name, array)
 

@@ -75,6 +75,7 @@ class _Setup(SetupModel):
     guidance: Guidance
     nav: Navigation
     guidance_hz: Literal[30, 60]
+    fdm_hz: Literal[60, 120] = 120  # a log of before it could be chosen
     parameters: ParametersFile | None = None  # a log of before there were any was flown by planfly's guidance
     program: ProgramFile | None = None
     source: FieldSource | None = None
@@ -141,6 +142,7 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         guidance=setup.guidance,
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
+        fdm_hz=setup.fdm_hz,
         parameters=None if setup.parameters is None else parameters_file(setup.parameters),
         program=None if setup.program is None else program_file(setup.program),
         source=setup.source,
@@ -187,6 +189,7 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         guidance=file.guidance,
         nav=file.nav,
         guidance_hz=file.guidance_hz,
+        fdm_hz=file.fdm_hz,
         parameters=None if file.parameters is None else read_parameters(file.parameters, f"{source}: {SETUP_FILE}"),
         program=None if file.program is None else read_program(file.program),
         source=file.source,

@@ -18,8 +18,7 @@ import numpy as np
 
 from flight.dynamics.fdm import Fdm
 from flight.mission.from_plan import plan_mission
-from flight.simulation.airborne import FDM_HZ
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder

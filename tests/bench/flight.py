@@ -20,8 +20,7 @@ from flight.ardupilot.parameters import load_parameters
 from flight.dynamics.fdm import Fdm, Variation
 from flight.guidance.gains import Gains, load_gains
 from flight.simulation import simulate as simulation
-from flight.simulation.airborne import FDM_HZ
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.flight_setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import Flight, SimulatedFlight, simulate
 from tests.bench.angles import angles
 from tests.setups import MakeSetup, setup_maker, standard

@@ -132,7 +132,7 @@ def _saturation(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple
     track = aligned.track
     if rows.stop - rows.start < 2:
         return 0.0, 0.0, 0.0, 0.0
-    tick = aligned.tick()
+    tick = aligned.tick
     full, idle = _at_limits(demands, aligned, rows)
     commanded = float(demands.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
@@ -173,9 +173,9 @@ def measure_ability(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> A
     full &= track.controls[rows, THROTTLE] >= WHOLE_THROTTLE
     along, _ = along_across(demands, leg, track.position[rows])
     low, high = straight_span(demands, leg, 0.0)
-    use = _held_for(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick()))
+    use = _held_for(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick))
     use &= (along >= low) & (along <= high)
-    seconds = float(use.sum() * aligned.tick())
+    seconds = float(use.sum() * aligned.tick)
     if seconds < SHOWN_OVER:
         return None
     velocity = track.velocity[rows].astype(np.float64)

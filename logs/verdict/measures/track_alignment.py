@@ -40,6 +40,7 @@ class AlignedTrack:
     distance_run: (t,) m along the ground track.
     low, low_at: (t - 1,) least height above ground between a row and the next, m, and the fraction of the way where
     it is; NaN off the known terrain, and without any.
+    tick: usual time between rows, s.
     """
 
     track: Track
@@ -52,6 +53,7 @@ class AlignedTrack:
     distance_run: Floats
     low: Floats
     low_at: Floats
+    tick: float
 
     def leg_rows(self, leg: int) -> slice:
         """Rows between a leg's two waypoints, both included."""
@@ -65,10 +67,6 @@ class AlignedTrack:
     def flew(self, leg: int) -> bool:
         """Whether any of a leg was flown."""
         return bool(self.passed[leg]) and self.rows[leg + 1] > self.rows[leg]
-
-    def tick(self) -> float:
-        """Usual time between rows, s."""
-        return float(np.median(np.diff(self.track.time)))
 
     def around(self, first: int, last: int, seconds: float) -> slice:
         """Rows first..last and those within ``seconds`` of them."""
@@ -111,6 +109,7 @@ def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
         distance_run=np.concatenate([[0.0], np.cumsum(np.hypot(step[:, 0], step[:, 1]))]),
         low=low,
         low_at=low_at,
+        tick=float(np.median(np.diff(clean.time))),
     )
 
 

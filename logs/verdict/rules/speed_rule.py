@@ -117,7 +117,7 @@ def _reached(aligned: AlignedTrack, leg: int, commanded: float) -> float:
 def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
     """Mean airspeeds over each second of some rows, or over all of fewer, m/s."""
     speed = aligned.track.airspeed[rows].astype(np.float64)
-    width = max(1, min(speed.size, round(1.0 / aligned.tick())))
+    width = max(1, min(speed.size, round(1.0 / aligned.tick)))
     total = np.concatenate([[0.0], np.cumsum(speed)])
     return np.asarray((total[width:] - total[:-width]) / width)
 

@@ -93,7 +93,7 @@ def level_stall(demands: RouteDemands, up: float) -> float:
 
 def _flown(demands: RouteDemands, aligned: AlignedTrack) -> list[Finding]:
     track = aligned.track
-    width = max(1, min(len(track), round(STALL_MEAN / aligned.tick())))
+    width = max(1, min(len(track), round(STALL_MEAN / aligned.tick)))
     speed, load = _means(track.airspeed, width), _means(track.load_factor, width)
     bank = _means(np.abs(track.attitude[:, ROLL]), width)
     up = _means(track.position[:, 2], width)
