@@ -12,7 +12,8 @@ import numpy as np
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.campaign_files import clear_campaign, write_files
+from planfly.campaigns.report.campaign_files import clear_campaign
+from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import CampaignSummary, summarise
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
 from planfly.campaigns.statistics.decision import Answer, Goal
@@ -106,9 +107,10 @@ def run_campaign(
         base = open_campaign(str(target), chosen, planned=folder / "plan.json", seed=seed)
         with open_store(base, goal, folder, resume=resume) as store:
             estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
-            summary = summarise(base, goal, estimate, store)
-            if out is not None:
-                write_files(folder, base, summary, store, f"planfly campaign {target} --seed {base.seed}")
+            summary = summarise(base, goal, estimate, store) if out is None else None
+        if summary is None:
+            command = f"planfly campaign {target} --seed {base.seed}"
+            summary = finish_campaign(base, goal, estimate, folder, command)
         return CampaignResult(summary, read_table(folder / DATABASE))
 
 

@@ -15,8 +15,9 @@ from planfly.campaigns.asked_campaign import (
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_row_again, write_files
-from planfly.campaigns.report.summary import campaign_lines, summarise
+from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign, fly_row_again
+from planfly.campaigns.report.finish_campaign import finish_campaign
+from planfly.campaigns.report.summary import campaign_lines
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.storage.store import DATABASE
 from planfly.terminal.exit_codes import FLYABLE, INTERRUPTED, LOSS, NOT_FLYABLE
@@ -56,9 +57,8 @@ def _fly(args: argparse.Namespace, base: CampaignBase, goal: Goal, folder: Path)
             known = store.tally().flown
             print(f"planfly: interrupted; {known} flights are kept in {folder}, --resume goes on", file=sys.stderr)
             return INTERRUPTED
-        summary = summarise(base, goal, estimate, store)
-        with progress("reporting") as advance:
-            write_files(folder, base, summary, store, command_line(args), advance)
+    with progress("reporting") as advance:
+        summary = finish_campaign(base, goal, estimate, folder, command_line(args), advance)
     print("\n".join(campaign_lines(summary)))
     print(f"results   {folder}/ (report.html, summary.json, {DATABASE}, worst/)")
     return _EXITS[estimate.answer]

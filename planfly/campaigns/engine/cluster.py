@@ -63,17 +63,22 @@ def connected(workers: Workers) -> Iterator[Any]:
             with client:
                 yield client
             return
-        cluster = cluster_types.LocalCluster(
-            n_workers=workers.count or os.cpu_count() or 1,
-            threads_per_worker=1,
-            processes=True,
-            host="127.0.0.1",
-            dashboard_address="127.0.0.1:0",
-            scheduler_kwargs={"dashboard": False},
-            worker_dashboard_address=None,
-            memory_limit=0,
-            silence_logs=logging.CRITICAL,
-        )
+        try:
+            cluster = cluster_types.LocalCluster(
+                n_workers=workers.count or os.cpu_count() or 1,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                dashboard_address="127.0.0.1:0",
+                scheduler_kwargs={"dashboard": False},
+                worker_dashboard_address=None,
+                memory_limit=0,
+                silence_logs=logging.CRITICAL,
+            )
+        except (RuntimeError, OSError) as error:
+            raise SchedulerError(
+                f"--workers {workers.count or os.cpu_count()}: could not be started: {error}"
+            ) from error
         with cluster, cluster_types.Client(cluster, set_as_default=False) as client:
             yield client
 

@@ -1,13 +1,17 @@
 """The table does not depend on who flew, in which order, or how often it was interrupted."""
 
+import contextlib
 import os
 import random
 import signal
 import subprocess
 import sys
+import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import psutil
 import pytest
 
 from planfly.campaigns.engine.cluster import Workers
@@ -15,8 +19,8 @@ from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import _Book, fly_campaign, open_store
 from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
-from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, read_table
-from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, short_base
+from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, StoreError, read_table
+from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, short_base, slow_flight
 
 SOAK = "PLANFLY_SOAK" in os.environ
 pytestmark = pytest.mark.filterwarnings("default")
@@ -106,17 +110,20 @@ if __name__ == "__main__":
 """
 
 
-@pytest.mark.skipif(not SOAK, reason="twenty kills of the client: in make soak")
 def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
-    folder, count = tmp_path / "killed", 300
+    kills, count = (20, 300) if SOAK else (1, 60)
+    folder = tmp_path / "killed"
     folder.mkdir()
     script = tmp_path / "client.py"
     script.write_text(_CLIENT)
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     moments, known = random.Random(3), 0
-    for _ in range(20):
+    for _ in range(kills):
         client = subprocess.Popen([sys.executable, str(script), str(folder), str(count)], env=environment)
-        time.sleep(moments.uniform(1.0, 8.0))
+        if SOAK:
+            time.sleep(moments.uniform(1.0, 8.0))
+        else:
+            _wait_until(lambda: (folder / DATABASE).exists() and len(table(folder).get("flight", [])) > 3)
         client.send_signal(signal.SIGKILL)
         client.wait()
         if (folder / DATABASE).exists():
@@ -127,8 +134,46 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
     assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
 
 
-@pytest.mark.skipif(not SOAK, reason="a scheduler and two workers of their own: in make soak")
+def _wait_until(there: Callable[[], bool], seconds: float = 60.0) -> None:
+    until = time.monotonic() + seconds
+    while time.monotonic() < until:
+        # The client that writes it holds the table.
+        with contextlib.suppress(StoreError):
+            if there():
+                return
+        time.sleep(0.1)
+    raise AssertionError("it did not come")
+
+
+def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> None:
+    kills, count = (20, 1200) if SOAK else (2, 100)
+    moments, begun, over, killed = random.Random(5), threading.Event(), threading.Event(), []
+
+    def kill() -> None:
+        begun.wait()
+        while len(killed) < kills and not over.wait(moments.uniform(0.3, 1.2)):
+            children = psutil.Process().children(recursive=True)
+            workers = [one.pid for one in children if "spawn_main" in " ".join(one.cmdline())]
+            if workers:
+                killed.append(moments.choice(workers))
+                os.kill(killed[-1], signal.SIGKILL)
+
+    killer = threading.Thread(target=kill)
+    goal = Goal(None, False, count)
+    with open_store(base, goal, tmp_path, resume=False) as store:
+        killer.start()
+        try:
+            fly_campaign(base, goal, Workers(2), store, lambda *_: begun.set(), fly=slow_flight)
+        finally:
+            begun.set()
+            over.set()
+            killer.join()
+    assert len(killed) == kills
+    assert table(tmp_path) == expected(base, tmp_path / "one", count)
+
+
 def test_a_real_scheduler_gives_the_same_table(base: CampaignBase, tmp_path: Path) -> None:
+    count = 400 if SOAK else 12
     environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path.cwd()), *sys.path])}
     dask = [sys.executable, "-m", "dask"]
     scheduler = subprocess.Popen(
@@ -137,9 +182,9 @@ def test_a_real_scheduler_gives_the_same_table(base: CampaignBase, tmp_path: Pat
     line = [*dask, "worker", "tcp://127.0.0.1:18786", "--nthreads", "1", "--host", "127.0.0.1", "--no-dashboard"]
     workers = [subprocess.Popen(line, env=environment) for _ in range(2)]
     try:
-        flown(base, Goal(None, False, 40), tmp_path / "far", Workers(None, "tcp://127.0.0.1:18786"))
+        flown(base, Goal(None, False, count), tmp_path / "far", Workers(None, "tcp://127.0.0.1:18786"))
     finally:
         for process in (*workers, scheduler):
             process.terminate()
             process.wait()
-    assert table(tmp_path / "far") == expected(base, tmp_path / "one", 40)
+    assert table(tmp_path / "far") == expected(base, tmp_path / "one", count)

@@ -17,8 +17,9 @@ def test_every_number_of_the_default_has_a_source() -> None:
     assert {one.quantity.name for one in spread.varying} >= {"wind_speed", "wind_from", "mass", "drag", "battery"}
     for one in spread.varying:
         assert len(one.source) > 20
-        # What no publication says is called assumed.
+        # Who says it, and what.
         assert ":" in one.source
+        assert "assumed" not in one.source
 
 
 def test_values_are_the_distributions_own() -> None:

@@ -1,0 +1,1 @@
+"""What campaigns cost, and whether what makes them quick changes what they say."""

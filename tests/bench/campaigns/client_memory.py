@@ -1,0 +1,59 @@
+"""Memory of the process that leads a campaign.
+
+``python -m tests.bench.campaigns.client_memory FLIGHTS`` leads a campaign of made-up flights, each row as large as a
+real one's, to its report, and prints its largest resident size in MB.
+"""
+
+import resource
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import FlightRow
+from planfly.campaigns.flights.track_shape import STATIONS
+from planfly.campaigns.flights.varied_flight import GivenWind
+from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.report.finish_campaign import finish_campaign
+from planfly.campaigns.statistics.decision import Goal
+from tests.planfly.campaigns.made_campaigns import made_flight, short_base
+
+# Waypoints whose crossings a row of the demo holds.
+_WAYPOINTS = 14
+
+
+def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """A made flight with a shape of a real one's size; of no duration, so that none is flown again for its log."""
+    row = made_flight(base, index, wind)
+    random = np.random.default_rng(index)
+    clearance = random.uniform(50.0, 300.0, STATIONS).astype(np.float32)
+    crossings = random.normal(0.0, 3.0, (_WAYPOINTS, 2)).astype(np.float32)
+    return FlightRow(
+        row.draw, row.outcome, row.ended, row.failed, row.margins, row.energy_left, 0.0,
+        clearance.tobytes(), crossings.tobytes(), row.seconds,
+    )  # fmt: skip
+
+
+def lead(flights: int, folder: Path) -> None:
+    """Lead a campaign of so many flights, from its first to its report."""
+    base = short_base(folder)
+    goal = Goal(None, False, flights, 0.95)
+    with open_store(base, goal, folder, resume=False) as store:
+        estimate = fly_campaign(base, goal, Workers(1), store, fly=large_flight)
+    finish_campaign(base, goal, estimate, folder, "planfly campaign")
+
+
+def client_memory(flights: int) -> float:
+    """Largest resident size of a client of so many flights, MB."""
+    command = [sys.executable, "-m", "tests.bench.campaigns.client_memory", str(flights)]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1])
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as name:
+        lead(int(sys.argv[1]), Path(name))
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0)
