@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, read_table
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
 
@@ -61,3 +62,21 @@ def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys
     assert main([*line[:-1], str(tmp_path / "none"), "--resume"]) == 2
     assert "no campaign there" in capsys.readouterr().err
     assert not (tmp_path / "none").exists()
+
+
+def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path) -> None:
+    _, scenario = write_short(tmp_path)
+    line = ["campaign", str(scenario), "--workers", "1", "--at-least", "0.5"]
+    part, whole = tmp_path / "part", tmp_path / "whole"
+    main([*line, "--flights", "1", "--out", str(part)])
+    plan = (part / "plan.json").read_bytes()
+    main([*line, "--flights", "3", "--out", str(part), "--resume"])
+    main([*line, "--flights", "3", "--out", str(whole)])
+    assert (part / "plan.json").read_bytes() == plan
+    one, other = (
+        {name: values for name, values in read_table(folder / DATABASE).items() if name not in NOT_THE_SAME}
+        for folder in (part, whole)
+    )
+    assert one == other
+    assert one["flight"] == [0, 1, 2]
+    assert (part / "summary.json").read_bytes() == (whole / "summary.json").read_bytes()
