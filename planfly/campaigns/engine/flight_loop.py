@@ -1,5 +1,6 @@
 """Flights sent to workers and taken back, as many at a time as there are workers."""
 
+import itertools
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -34,6 +35,7 @@ class Pilots:
     def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._client, self._base = client, base
         self._name = f"planfly-{uuid.uuid4().hex[:12]}"
+        self._numbers = itertools.count()
         mine = fingerprint(base.scenario.flight.aircraft)
         client.register_plugin(CampaignPlugin(self._name, base, mine, fly))
 
@@ -54,7 +56,7 @@ class Pilots:
         """
         from distributed import as_completed
 
-        flying: dict[str, Order] = {}
+        flying: dict[tuple[str, int], Order] = {}
         done: Any = cast("Any", as_completed)(loop=self._client.loop)
 
         def send() -> None:
@@ -62,7 +64,8 @@ class Pilots:
                 order = following()
                 if order is None:
                     return
-                key = f"{self._name}-{order.index}-{uuid.uuid4().hex[:8]}"
+                # A tuple: dask takes its first word for the kind of task, and keeps something of each kind for good.
+                key = (self._name, next(self._numbers))
                 flying[key] = order
                 done.add(self._client.submit(fly_task, self._name, order.index, order.wind, key=key, pure=False))
 
@@ -72,9 +75,10 @@ class Pilots:
                 future = next(done)
                 order = flying.pop(future.key)
                 row = self._result(future, order)
-                future.release()
                 yield Flown(order, row)
                 send()
+                # After the next was sent: of a kind without any task dask makes a new record with the next one.
+                future.release()
         finally:
             self._client.cancel(list(done.futures), force=True)
 
