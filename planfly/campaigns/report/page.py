@@ -98,7 +98,9 @@ def _pictures(base: CampaignBase, summary: CampaignSummary, store: Store) -> lis
     if summary.deciding:
         bars = [Bar(BY_NAME[one.quantity].title, one.index, one.slope) for one in summary.sensitivities]
         out.append((draw_tornado(bars, RULES[summary.deciding]), "What the deciding margin depends on"))
-    out.append((draw_failures(counts, summary.estimate.tally.flown), "In how many flights each rule failed, and where"))
+    if counts:
+        failures = draw_failures(counts, summary.estimate.tally.flown)
+        out.append((failures, "In how many flights each rule failed, and where"))
     return out + _ways(base, store)
 
 

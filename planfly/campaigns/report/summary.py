@@ -19,6 +19,8 @@ from planfly.campaigns.statistics.sensitivities import first_order, rank_slope
 from planfly.campaigns.storage.store import Store
 
 SCHEMA = "planfly.campaign-summary/1"
+# Of a margin's variance, the share from which on a quantity is named as explaining it.
+_NOTABLE = 0.05
 # Flights whose logs are kept.
 WORST = 10
 
@@ -234,7 +236,7 @@ def _answer_text(summary: CampaignSummary) -> str:
 
 
 def _drivers_text(summary: CampaignSummary) -> str:
-    drivers = [one for one in summary.sensitivities if one.index >= 0.01][:3]
+    drivers = [one for one in summary.sensitivities if one.index >= _NOTABLE][:3]
     if not drivers:
         return "no single quantity explains it"
     return "of its variance " + ", ".join(
