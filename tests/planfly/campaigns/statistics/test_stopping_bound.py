@@ -20,6 +20,20 @@ def test_without_a_failure_it_takes_no_more_flights_than_a_fixed_number(target: 
     assert bound.interval(flights, 0).low >= target > bound.interval(flights - 1, 0).low
 
 
+@pytest.mark.parametrize("target", [0.9, 0.99, 0.999])
+def test_what_the_fewest_flights_leave_is_kept_for_failures(target: float) -> None:
+    bound = StoppingBound(target)
+    assert 0.0 <= bound.evidence(bound.fewest, 0, target) - math.log(20.0) < 1e-3
+
+
+def test_a_probability_is_excluded_on_the_side_that_is_asked() -> None:
+    bound = StoppingBound(0.99)
+    assert not bound.excludes(0, 300, 0.99, above=True)
+    assert bound.excludes(0, 300, 0.99, above=False)
+    assert bound.excludes(300, 0, 0.5, above=True)
+    assert not bound.excludes(300, 0, 0.5, above=False)
+
+
 def test_the_mixture_is_a_martingale_that_begins_at_one() -> None:
     """From any s and f, the mean of E over the next flight is E itself: the sum that all of it rests on."""
     bound, p = StoppingBound(0.99), 0.93
