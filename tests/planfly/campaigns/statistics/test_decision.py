@@ -33,3 +33,12 @@ def test_a_lost_flight_keeps_a_target_from_being_reached_and_from_being_missed()
     assert estimator.estimate(Tally(59, 0, 1)).answer == "undecided"
     assert estimator.estimate(Tally(0, 1, 3)).answer == "undecided"
     assert estimator.estimate(Tally(0, 5, 0)).answer == "missed"
+
+
+def test_a_lost_flight_counts_against_either_answer() -> None:
+    prove = Estimator(Goal(0.99, True, 5000))
+    assert prove.decides(Tally(299, 0))
+    assert not prove.decides(Tally(299, 0, 1))
+    # Twenty failures of a hundred miss it; twenty that were lost may all have flown.
+    assert prove.decides(Tally(80, 20))
+    assert not prove.decides(Tally(80, 0, 20))
