@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.field.flown_legs import FlownLegs
+from logs.verdict.measures.flown_corners import CornerPass, corner_passes
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, lay_track
 from logs.verdict.measures.turns import measure_turn
@@ -132,7 +133,8 @@ def compare_with_model(
     legs = tuple(
         _leg(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles) for k in range(demands.legs)
     )
-    turns = tuple(_turn(flown.first, k, pairs) for k in range(1, demands.legs))
+    corners = [corner_passes(one, track) for one, track in pairs]
+    turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, demands.legs))
     flown_profile, model_profile = profiles
     return Reflight(
         setup=setup,
@@ -210,8 +212,14 @@ def _reduced(values: Floats, reduce: str) -> float:
     return float(known[np.argmax(np.abs(known))])
 
 
-def _turn(first: int, k: int, pairs: Sequence[tuple[RouteDemands, AlignedTrack]]) -> TurnPair:
+def _turn(
+    first: int,
+    k: int,
+    pairs: Sequence[tuple[RouteDemands, AlignedTrack]],
+    corners: Sequence[Sequence[CornerPass]],
+) -> TurnPair:
     one, other = (measure_turn(demands, aligned, k) for demands, aligned in pairs)
+    passed, again = (passes[k] for passes in corners)
 
     def both(left: float | None, right: float | None, factor: float = 1.0) -> tuple[float, float]:
         return (math.nan if left is None else left * factor, math.nan if right is None else right * factor)
@@ -219,9 +227,9 @@ def _turn(first: int, k: int, pairs: Sequence[tuple[RouteDemands, AlignedTrack]]
     return TurnPair(
         first + k,
         math.degrees(float(pairs[0][0].turns[k])),
-        overshoot=both(one.overshoot, other.overshoot),
+        overshoot=both(passed.overshoot, again.overshoot),
         bank=both(one.peak_bank, other.peak_bank, 180.0 / math.pi),
-        passed=both(one.passed, other.passed),
+        passed=both(passed.nearest, again.nearest),
     )
 
 
