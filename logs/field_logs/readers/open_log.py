@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from logs.field_logs.raw_log import RawLog
 from world.errors import LogError
 
@@ -39,7 +41,9 @@ def open_log(path: Path) -> RawLog:
             head = file.read(_HEAD)
         if not head:
             raise LogError(f"{path}: empty: a log is expected")
-        return _reader(path, head)(path)
+        # What is no number in a damaged log is left out later, and told.
+        with np.errstate(all="ignore"):
+            return _reader(path, head)(path)
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
     except MemoryError:

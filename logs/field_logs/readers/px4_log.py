@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,12 +44,38 @@ def read_px4(path: Path) -> RawLog:
     try:
         # It complains on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            found = ULog(file, _TOPICS, disable_str_exceptions=True)
+            found = ULog(_Steps(file), _TOPICS, disable_str_exceptions=True)
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory") from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}") from error
     return _Topics(found, str(path), find_damage(np.memmap(path, np.uint8, mode="r"))).log()
+
+
+class _Steps:
+    """A file in which a step back from a read that met the end is as long as what was read.
+
+    pyulog steps back by what a record claims to be, and would read the end of a damaged file again and again.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._missing = file, 0
+
+    def read(self, size: int) -> bytes:
+        data = self._file.read(size)
+        self._missing = size - len(data)
+        return data
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        missing = self._missing if whence == 1 else 0
+        self._missing = 0
+        return self._file.seek(offset + missing, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def close(self) -> None:
+        self._file.close()
 
 
 def find_damage(data: Bytes) -> Damage:

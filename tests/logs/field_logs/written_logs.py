@@ -226,16 +226,17 @@ def gpx(path: Path, log: RawLog | None = None, *, route: bool = True) -> Path:
     return path
 
 
-def kml(path: Path, log: RawLog | None = None, *, mode: str = "absolute") -> Path:
-    """Write a track as a `.kml` with `gx:Track`."""
+def kml(path: Path, log: RawLog | None = None, *, mode: str = "absolute", in_turn: bool = False) -> Path:
+    """Write a track as a `.kml` with `gx:Track`: all times before all places, or in turn."""
     raw = example_raw_log() if log is None else log
     whens, coords = [], []
     for (lat, lon, up), time in _each_second(raw):
         whens.append(f"<when>{(BEGAN + timedelta(seconds=time)).isoformat().replace('+00:00', 'Z')}</when>")
         coords.append(f"<gx:coord>{lon:.7f} {lat:.7f} {up:.2f}</gx:coord>")
+    both = [text for pair in zip(whens, coords, strict=True) for text in pair] if in_turn else whens + coords
     path.write_text(
         '<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">'
-        f"<Document><Placemark><gx:Track><altitudeMode>{mode}</altitudeMode>{''.join(whens + coords)}</gx:Track>"
+        f"<Document><Placemark><gx:Track><altitudeMode>{mode}</altitudeMode>{''.join(both)}</gx:Track>"
         "</Placemark></Document></kml>",
         encoding="utf-8",
     )
