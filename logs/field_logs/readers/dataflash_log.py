@@ -18,6 +18,7 @@ from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, Mode
 from logs.field_logs.readers.clocks import steady_clock
 from logs.field_logs.readers.dataflash_frames import Dataflash, Messages, index_dataflash
 from logs.field_logs.readers.logged_items import Item, gather_items, logged_mission
+from logs.field_logs.readers.mapped_file import MappedFile
 from logs.field_logs.readers.vehicle_modes import plane_mode
 from world.errors import LogError
 
@@ -46,7 +47,8 @@ _WEEK = 604_800.0
 
 def read_dataflash(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without a message that says where the vehicle was."""
-    index = index_dataflash(np.memmap(path, np.uint8, mode="r"), _READ)
+    file = MappedFile(path)
+    index = index_dataflash(file.data, _READ, file.let_go)
     return _Reader(index, str(path)).read()
 
 

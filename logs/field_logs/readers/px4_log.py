@@ -7,7 +7,7 @@ that stood there then.
 import contextlib
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -19,12 +19,14 @@ from pyulog import ULog
 from flight.mission.items import Mission, MissionItem, item_problem, on_grid, renumbered
 from flight.simulation.field_source import Damage
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from logs.field_logs.readers.mapped_file import MappedFile, pieces
 from logs.field_logs.readers.vehicle_modes import px4_state
 from world.errors import LogError
 from world.kernels import compiled
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 FORMAT = "PX4 log"
 # Bytes before the first record, and the letters of all records (PX4, "ULog File Format").
@@ -49,7 +51,7 @@ def read_px4(path: Path) -> RawLog:
         raise LogError(f"{path}: claims more than fits into memory") from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}") from error
-    return _Topics(found, str(path), find_damage(np.memmap(path, np.uint8, mode="r"))).log()
+    return _Topics(found, str(path), _damage_of(path)).log()
 
 
 class _Steps:
@@ -78,39 +80,51 @@ class _Steps:
         self._file.close()
 
 
-def find_damage(data: Bytes) -> Damage:
+def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damage:
     """What of a log (n,) of bytes cannot be read: its records follow each other, each with a length and a known letter.
 
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
     """
-    places, size, cut = _walk(data, _HEADER, np.frombuffer(_LETTERS, np.uint8))
-    return Damage(places, size, bool(cut))
+    state = np.array([_HEADER, 0, 0, 1, 0])
+    for until in pieces(data.size, let_go):
+        _walk(data, until, state, np.frombuffer(_LETTERS, np.uint8))
+    at, places, size, _, cut = state.tolist()
+    return Damage(places, size, bool(cut) or at < data.size)
+
+
+def _damage_of(path: Path) -> Damage:
+    file = MappedFile(path)
+    return find_damage(file.data, file.let_go)
 
 
 @compiled
-def _walk(data: Bytes, header: int, letters: Bytes) -> tuple[int, int, bool]:  # pragma: no cover - compiled
-    """Places where no record begins, their bytes, and whether the last record is cut."""
+def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # pragma: no cover - compiled
+    """Go on to a byte.
+
+    state: the next byte, places where no record begins, their bytes, whether the last was one, whether it is cut.
+    """
     known = np.zeros(256, np.bool_)
     for letter in letters:
         known[letter] = True
-    places, size, k, reading = 0, 0, header, True
-    while k + 3 <= data.size:
+    k, places, size, reading, cut = state[0], state[1], state[2], state[3], state[4]
+    while k + 3 <= data.size and k < until and not cut:
         length = data[k] + 256 * data[k + 1]
         after = k + 3 + length
         if known[data[k + 2]] and after > data.size:
             # Only what a cut record would be: nothing else can follow it.
-            return places, size, True
+            cut = 1
+            break
         follows = after + 3 > data.size or known[data[after + 2]]
         if known[data[k + 2]] and follows:
             k = after
-            reading = True
+            reading = 1
         else:
             places += reading
-            reading = False
+            reading = 0
             size += 1
             k += 1
-    return places, size, k < data.size
+    state[0], state[1], state[2], state[3], state[4] = k, places, size, reading, cut
 
 
 def _one_line(error: Exception) -> str:
