@@ -1,6 +1,6 @@
 """KML tracks: `gx:Track` with times (Google's extension of OGC 12-007); a line without times is no flight."""
 
-from datetime import datetime
+from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
@@ -83,7 +83,8 @@ def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
     """Time since 1970 (s), latitude, longitude, height; None for what is none."""
     parts = coord.replace(",", " ").split()
     try:
-        stamp = datetime.fromisoformat(when.strip().replace("Z", "+00:00")).timestamp()
+        time = datetime.fromisoformat(when.strip().replace("Z", "+00:00"))
+        stamp = (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
         numbers = [float(part) for part in parts]
     except ValueError:
         return None

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from flight.mission.items import Mission, MissionItem, item_problem, on_grid, renumbered
+from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid, renumbered
 from flight.simulation.field_source import Damage
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from logs.field_logs.readers.mapped_file import MappedFile, pieces
@@ -39,6 +39,8 @@ _TOPICS = [
 # vehicle_status.vehicle_type.
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
 _AMSL, _OVER_HOME = 0, 3
+# Degrees, and m, that no home has; each is checked again where the mission is placed.
+_PLACE = np.array([90.0, 180.0, 10_000.0])
 
 
 def read_px4(path: Path) -> RawLog:
@@ -86,11 +88,12 @@ def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damag
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
     """
-    state = np.array([_HEADER, 0, 0, 1, 0])
+    state = np.zeros(5, np.int64)
+    state[_AT], state[_READING] = _HEADER, 1
     for until in pieces(data.size, let_go):
         _walk(data, until, state, np.frombuffer(_LETTERS, np.uint8))
-    at, places, size, _, cut = state.tolist()
-    return Damage(places, size, bool(cut) or at < data.size)
+    cut = bool(state[_CUT]) or int(state[_AT]) < data.size
+    return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
 
 
 def _damage_of(path: Path) -> Damage:
@@ -98,16 +101,17 @@ def _damage_of(path: Path) -> Damage:
     return find_damage(file.data, file.let_go)
 
 
+# Of a walk: the next byte, places where no record begins, their bytes, whether the last was one, whether it is cut.
+_AT, _PLACES, _LOST, _READING, _CUT = range(5)
+
+
 @compiled
 def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # pragma: no cover - compiled
-    """Go on to a byte.
-
-    state: the next byte, places where no record begins, their bytes, whether the last was one, whether it is cut.
-    """
+    """Go on to a byte from a walk's state."""
     known = np.zeros(256, np.bool_)
     for letter in letters:
         known[letter] = True
-    k, places, size, reading, cut = state[0], state[1], state[2], state[3], state[4]
+    k, places, size, reading, cut = state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT]
     while k + 3 <= data.size and k < until and not cut:
         length = data[k] + 256 * data[k + 1]
         after = k + 3 + length
@@ -124,7 +128,7 @@ def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # prag
             reading = 0
             size += 1
             k += 1
-    state[0], state[1], state[2], state[3], state[4] = k, places, size, reading, cut
+    state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT] = k, places, size, reading, cut
 
 
 def _one_line(error: Exception) -> str:
@@ -281,8 +285,17 @@ class _Topics:
             if math.isfinite(number) and item_problem(item) is None:
                 items.setdefault(item.seq, item)
         if len(items) > 1:
-            made = Mission(None, tuple(items[seq] for seq in sorted(items)), source=f"{self._source}: mission items")
+            made = Mission(
+                self._home(), tuple(items[seq] for seq in sorted(items)), source=f"{self._source}: mission items"
+            )
             yield LoggedMission(float(data["timestamp"][0]) * 1e-6, renumbered(made), "navigator_mission_item")
+
+    def _home(self) -> Home | None:
+        found = self._table("home_position", ("lat", "lon", "alt"))
+        if found is None:
+            return None
+        placed = found.values[np.isfinite(found.values).all(axis=1) & (np.abs(found.values) < _PLACE).all(axis=1)]
+        return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
     def _parameters(self) -> dict[str, float]:
         return {str(name): float(value) for name, value in self._log.initial_parameters.items()}

@@ -203,9 +203,11 @@ class _Messages:
                 yield LoggedMission(start, self._with_home(made), "mission items")
 
     def _with_home(self, mission: Mission) -> Mission:
-        if mission.home is not None or not self._own.get("HOME_POSITION"):
+        """With home as the vehicle has it: that of an uploaded mission is only where a station supposed it."""
+        heard = [one for _, one in self._own["HOME_POSITION"] if one.latitude or one.longitude]
+        if not heard:
             return mission
-        _, home = self._own["HOME_POSITION"][0]
+        home = heard[-1]
         place = Home(home.latitude * 1e-7, home.longitude * 1e-7, home.altitude * 1e-3)
         return Mission(place, mission.items, warnings=mission.warnings, source=mission.source)
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from pyulog import ULog
 
+from flight.mission.items import Home
 from logs.field_logs.clean_places import clean_places
 from logs.field_logs.example_raw_log import example_raw_log
 from logs.field_logs.readers.open_log import open_log
@@ -115,3 +116,17 @@ def test_numbers_that_no_place_or_time_has_are_passed_over(tmp_path: Path) -> No
     assert len(raw.missions[0].mission.items) == 2
     places = clean_places(raw.series["position"])
     assert (len(places.time), places.faults.unusable) == (458, 2)
+
+
+def test_home_is_the_vehicles(tmp_path: Path) -> None:
+    """Items that count their heights from home need it."""
+    path = px4(tmp_path / "a.ulg")
+    data = path.read_bytes()
+    form = b"home_position:uint64_t timestamp;double lat;double lon;float alt;"
+    used = struct.pack("<HcBH", 3 + 13, b"A", 0, 77) + b"home_position"
+    row = struct.pack("<HcHQddf", 30, b"D", 77, 20_000_000, 46.25, 8.25, 431.5)
+    first = data.index(b"A\x00\x00\x00vehicle") - 2
+    path.write_bytes(data[:first] + struct.pack("<Hc", len(form), b"F") + form + used + data[first:] + row)
+    (logged,) = read_px4(path).missions
+    assert logged.mission.home == Home(46.25, 8.25, 431.5)
+    assert read_px4(px4(tmp_path / "b.ulg")).missions[0].mission.home is None
