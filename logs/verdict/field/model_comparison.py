@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.simulation.field_source import MissionStretch
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.field.flown_legs import FlownLegs
@@ -81,6 +82,7 @@ class Spread:
 class Reflight:
     """Both flights.
 
+    stretch: of the flight of the field that is compared.
     setup: of the simulated one.  simulated: its rows.  ended: how it ended.
     distance: (n,) m along the route's legs at which they are compared.
     ends: (legs,) m along the route at which each leg ends.
@@ -89,6 +91,7 @@ class Reflight:
     stands_in: the aircraft of the log is not known, and another's model flew.
     """
 
+    stretch: MissionStretch
     setup: FlightSetup
     simulated: Track
     ended: str
@@ -137,6 +140,7 @@ def compare_with_model(
     turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, demands.legs))
     flown_profile, model_profile = profiles
     return Reflight(
+        stretch=flown.stretch,
         setup=setup,
         simulated=simulated,
         ended=ended,

@@ -84,11 +84,13 @@ def dataflash(
         if with_frames:
             letters, columns, values = letters + "B", columns + ",Frame", [*values, frame]
         put("CMD", letters, columns, *values)
-    for time, number in modes:
-        put("MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn", us(time), number, number, 2)
+    ahead = [*modes]
     one, two = ("EKF1", "EKF2") if old else ("XKF1", "XKF2")
     series = {name: found.values for name, found in raw.series.items()}
     for k, time in enumerate(raw.series["position"].time.tolist()):
+        while ahead and ahead[0][0] <= time:
+            at, number = ahead.pop(0)
+            put("MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn", us(at), number, number, 2)
         lat, lon, up = series["position"][k]
         east, north, rise = series["velocity"][k]
         roll, pitch, yaw = np.degrees(series["attitude"][k])
