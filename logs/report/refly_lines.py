@@ -61,6 +61,9 @@ def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], 
     """Which stretches were not flown again, and why.
 
     stretches: of the flight of the field.  flown_again: the most that are.
+
+    >>> left_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
+    ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
     """
     compared = {again.stretch.start for again in agains}
     lines = []
