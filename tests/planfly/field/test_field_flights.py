@@ -184,7 +184,15 @@ def test_whole_logs_agree_with_their_truth(name: str) -> None:
     truth = json.loads((folder / "truth.json").read_text())[name]
     scenario = str(folder / f"{name}.toml") if (folder / f"{name}.toml").exists() else name
     options = FieldOptions(scenario=scenario) if name != "demo" else FieldOptions(terrain=str(folder / "terrain.tif"))
-    found = import_flight(folder / f"{name}.BIN", options, lambda world: world).verdict.findings
+    flight, spent = None, []
+    for _ in range(2):
+        # The first brings the kernels along.
+        began = time.process_time()
+        flight = import_flight(folder / f"{name}.BIN", options, lambda world: world)
+        spent.append(time.process_time() - began)
+    assert flight is not None
+    assert min(spent) < 5.0 * truth["flight_s"] / 3600.0
+    found = flight.verdict.findings
     corridor = max(item.flown for item in found if item.rule == "corridor" and item.flown is not None)
     clearance = min(item.flown for item in found if item.rule == "clearance" and item.flown is not None)
     if truth["cross_track_to_legs_max_m"] > 5.0:
