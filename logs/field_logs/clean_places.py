@@ -13,7 +13,7 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 # A pause between rows longer than this (s), or than so many usual steps where rows are rarer, is a gap.
-LONGEST_STEP, USUAL_STEPS = 1.0, 2.5
+LONGEST_STEP, USUAL_STEPS = 1.0, 1.5
 # A place that takes this much (m/s) more than so many times the usual speed to get to and back from is none: GPS
 # receivers jump by kilometres, and no aircraft gains as much between two rows.
 GLITCH_SPEED, GLITCH_TIMES = 60.0, 3.0

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.field_source import Gap, HeightOffset, Heights, MissionStretch, Quantity, RowFaults
 from logs.field_logs.clean_places import Places, clean_places, find_gaps
-from logs.field_logs.flight_parts import FlightPart, choose_part, flight_parts, flown_spans
+from logs.field_logs.flight_parts import IN_THE_AIR, FlightPart, choose_part, flight_parts, flown_spans
 from logs.field_logs.raw_log import COLUMNS, LoggedMission, LogSeries, RawLog, VehicleKind
 from world.errors import LogError
 
@@ -41,6 +41,7 @@ class FieldFlight:
     heights, gaps, faults: see `flight.simulation.field_source.FieldSource`.
     number, count: which of the log's flights, from 1, and how many there are.
     others: of the others, when they began and for how long they followed a mission, s.
+    begins, ends: whether the log's first row, and its last, is in the air: what came before and after it does not hold.
     """
 
     raw: RawLog
@@ -58,6 +59,8 @@ class FieldFlight:
     number: int
     count: int
     others: tuple[tuple[float, float], ...] = ()
+    begins: bool = False
+    ends: bool = False
     clock: Places | None = field(default=None, repr=False)
 
 
@@ -126,6 +129,8 @@ def _cut(
         number=number,
         count=count,
         others=others,
+        begins=part.start - float(places.time[0]) < IN_THE_AIR,
+        ends=float(places.time[-1]) - part.end < IN_THE_AIR,
         clock=places,
     )
 

@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 # many seconds.
 FLYING, SLOWER_FOR = 6.0, 60.0
 _OVER = 5.0
+# s.  A flight that is no further from the log's first row, or its last, is cut by it.
+IN_THE_AIR = _OVER
 # s.  A flight lasts this long at least.
 SHORTEST = 20.0
 
@@ -96,7 +98,7 @@ def flight_parts(
 
 def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
     # A flight that goes on to the log's last rows is cut off by it.
-    open_end = last - end < _OVER
+    open_end = last - end < IN_THE_AIR
     if not modes:
         return [MissionStretch(start, end, "", "log" if open_end else "landed")]
     found = []

@@ -66,8 +66,12 @@ def _route_captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
         "map": _Caption(
             "Map",
             f"Map, north up: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
-            "The broad line is the plan, the thin line on it the flight. Where they part, at corners, the aircraft "
-            "flies an arc inside the waypoint."
+            "The broad line is the plan, the thin line on it the flight."
+            + (
+                " Where they part, at corners, the aircraft flies an arc inside the waypoint."
+                if setup.source is None
+                else ""
+            )
             if flown
             else "Nothing was flown: the line is the plan.",
         ),

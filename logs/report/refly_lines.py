@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 
+from flight.simulation.field_source import MissionStretch
 from logs.report.text import number
 from logs.verdict.field.model_comparison import Reflight
 
@@ -21,7 +22,7 @@ def refly_lines(again: Reflight) -> list[str]:
     >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
     >>> again = compare_with_model(log.setup, flown, log.track, "completed")
     >>> refly_lines(again)[0]
-    'flown / simulated'
+    'AUTO from 0.0 s to 36.5 s, legs 0 to 1: flown / simulated'
     """
     legs: list[tuple[str, ...]] = [_HEAD]
     for one in again.legs:
@@ -31,7 +32,10 @@ def refly_lines(again: Reflight) -> list[str]:
     for turn in again.turns:
         name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
         turns.append((name, *map(_both, (turn.overshoot, turn.bank, turn.passed))))
-    lines = ["flown / simulated", *_in_columns(legs)]
+    stretch = again.stretch
+    named = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+    of = f", legs {again.first} to {again.first + len(again.legs) - 1}"
+    lines = [f"{named}{of}: flown / simulated", *_in_columns(legs)]
     if again.turns:
         lines += ["", *_in_columns(turns)]
     return [*lines, "", trust_line(again)]
@@ -47,7 +51,30 @@ def trust_line(again: Reflight) -> str:
         f"{_CALLED[one.name]} {number(one.median)} {one.unit} ({number(one.most)} {one.unit})" for one in again.spreads
     ]
     ended = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"
-    return f"Model {whose} against the flight, median (95 %): {', '.join(words)}{ended}"
+    wind = again.setup.scenario.wind
+    gusts = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
+    blown = f" in {wind.speed:.1f} m/s of wind, {gusts}"
+    return f"Model {whose}{blown}, against the flight, median (95 %): {', '.join(words)}{ended}"
+
+
+def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
+    """Which stretches were not flown again, and why.
+
+    stretches: of the flight of the field.  flown_again: the most that are.
+
+    >>> left_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
+    ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
+    """
+    compared = {again.stretch.start for again in agains}
+    lines = []
+    for stretch in stretches:
+        if stretch.start not in compared:
+            why = "it passed no two waypoints in order"
+            if len(agains) >= flown_again:
+                why += f", or {flown_again} longer ones were"
+            name = stretch.mode or "the flight"
+            lines.append(f"Not flown again: {name} from {stretch.start:.1f} s to {stretch.end:.1f} s: {why}")
+    return lines
 
 
 def _both(pair: tuple[float, float]) -> str:

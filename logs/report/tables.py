@@ -112,8 +112,10 @@ def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
     above = ground_clearance(setup, track)
     low = NOTHING if above is None else number(_least(above), digits=0)
     height = f", never less than {low} m above ground" if low != NOTHING else ""
-    used, held = number(float(track.energy[-1]), digits=0), number(setup.battery, digits=0)
-    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}, {used} of {held} Wh."
+    energy = float(track.energy[-1])
+    # A log of the field may hold no battery.
+    used = f", {number(energy, digits=0)} of {number(setup.battery, digits=0)} Wh" if math.isfinite(energy) else ""
+    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}{used}."
 
 
 def _peak(values: NDArray[np.float32]) -> float:
@@ -228,6 +230,8 @@ def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
     if track is None or len(track) == 0:
         return []
     used = float(track.energy[-1])
+    if not math.isfinite(used):
+        return []
     seconds = float(track.time[-1] - track.time[0])
     distance = float(path_length(track.position)) / 1000.0
     facts: Facts = [

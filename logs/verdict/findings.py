@@ -42,7 +42,7 @@ class Fact:
     """A number that a rule measured and does not judge.
 
     what: "overshoot", "settled", "bank", "radius", "height error", "slope error", "throttle at full", "throttle at
-    idle", "too slow", "too fast", "speed error", "nearest".
+    idle", "too slow", "too fast", "speed error", "nearest", "nearest pass".
     value: in ``unit``.
     """
 

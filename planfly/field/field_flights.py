@@ -19,6 +19,7 @@ from flight.mission_files.formats import mission_text, read_mission
 from flight.simulation.field_source import FieldSource, VerticalDatum
 from flight.simulation.flight_setup import FlightSetup, make_limits
 from flight.simulation.track import Track
+from logs.field_logs.clean_places import LONGEST_STEP
 from logs.field_logs.field_flight import FieldFlight, make_flight
 from logs.field_logs.flown_heights import with_flown_heights
 from logs.field_logs.logged_parameters import logged_parameters
@@ -101,7 +102,13 @@ def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> 
     heights = flight.heights
     if options.datum is not None and heights.datum == "unstated":
         heights = replace(heights, datum=options.datum)
-    notes = (*_other_flights(flight), *refused, *mission.warnings, *_differing(flight, mission, options))
+    notes = (
+        *_edges(flight),
+        *_other_flights(flight),
+        *refused,
+        *mission.warnings,
+        *_differing(flight, mission, options),
+    )
     source = FieldSource(
         file=path.name,
         sha256=_sha256(path),
@@ -218,6 +225,19 @@ def _sha256(path: Path) -> str:
         while block := file.read(_BLOCK):
             digest.update(block)
     return digest.hexdigest()
+
+
+def _edges(flight: FieldFlight) -> tuple[str, ...]:
+    """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
+    notes = []
+    if flight.begins:
+        notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
+    if flight.ends:
+        notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
+    usual = float(np.median(np.diff(flight.time)))
+    if usual > LONGEST_STEP:
+        notes.append(f"the log has a place every {usual:.1f} s: what was between them it does not show")
+    return tuple(notes)
 
 
 def _other_flights(flight: FieldFlight) -> tuple[str, ...]:

@@ -15,14 +15,21 @@ from world.scenario_variants import with_flight, with_wind
 
 
 def fly_again(
-    setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance
-) -> Reflight:
-    """Fly the legs of the longest stretch again, in the wind of the log, and hold the two flights side by side.
+    setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
+) -> tuple[Reflight, ...]:
+    """Fly the legs of every stretch again, in the wind of the log, and hold the flights side by side: longest first.
 
     setup: with its source.  aircraft: that flies it, in place of the setup's.  turbulence: in place of the scenario's.
+    most: of the stretches, the longest.
+
     Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
     """
-    legs = _longest(setup, track)
+    return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
+
+
+def _one_again(
+    setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
+) -> Reflight:
     scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
     model, battery = find_airframe(scenario)
     limits = setup.limits
@@ -49,11 +56,11 @@ def fly_again(
     return compare_with_model(own, legs, flown.track, flown.ended, stands_in=stands_in)
 
 
-def _longest(setup: FlightSetup, track: Track) -> FlownLegs:
+def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     source = setup.source
     stretches = () if source is None else source.stretches
     found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not found:
         name = "the log" if source is None else source.file
         raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again")
-    return max(found, key=lambda legs: legs.last - legs.first)
+    return sorted(found, key=lambda legs: legs.first - legs.last)

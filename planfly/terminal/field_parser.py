@@ -7,7 +7,7 @@ from planfly.terminal.parser_options import field_log_options, flown_by_options,
 
 CommandParser = Callable[[str, str, str], argparse.ArgumentParser]
 
-LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml"
+LOGS = "LOG.BIN|.tlog|.ulg|.gpx|.igc|.kml|.kmz"
 
 
 def add_field_commands(command: CommandParser) -> None:

@@ -24,9 +24,15 @@ RUN_FILES = (
 _FIGURES = ("map", "profile", "scene", "turns", "envelope")
 # What `report` and `compare` may write, figures as SVG included.
 LOG_FIGURES = ("report.html", *(f"{name}.{kind}" for name in _FIGURES for kind in ("png", "svg")))
-REFLY_FILES = (
-    "simulated.mcap",
-    *(f"refly-{name}.png" for name in ("cross-track", "height", "ground-speed", "bank", "energy")),
+# Stretches of a flight that are flown again, and what is written of each: of those after the first with its number.
+REFLOWN = 9
+REFLY_FILES = tuple(
+    name
+    for ending in ("", *(f"-{number}" for number in range(2, REFLOWN + 1)))
+    for name in (
+        f"simulated{ending}.mcap",
+        *(f"refly-{kind}{ending}.png" for kind in ("cross-track", "height", "ground-speed", "bank", "energy")),
+    )
 )
 COMPARE_FILES = (
     "compare.html",

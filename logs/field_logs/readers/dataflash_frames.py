@@ -8,7 +8,7 @@ file's end, begins right behind it.  pymavlink's `DFFormat` says what the letter
 import contextlib
 import io
 import struct
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pymavlink.DFReader import DFFormat, null_term
 
 from flight.simulation.field_source import Damage
+from logs.field_logs.readers.mapped_file import pieces
 from world.kernels import compiled
 
 Bytes = NDArray[np.uint8]
@@ -84,24 +85,27 @@ class Dataflash:
     formats: dict[int, DFFormat]
     names: tuple[str, ...]
     damage: Damage
+    let_go: Callable[[], None] = lambda: None
 
     def messages(self, name: str) -> Messages:
         """All messages of a name; none for one that the log does not hold."""
         for number, known in self.formats.items():
             if known.name == name and number in self.starts:
-                return _columns(self.data, self.starts[number], known)
+                return _columns(self.data, self.starts[number], known, self.let_go)
         return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
 
 
-def index_dataflash(data: Bytes, names: Collection[str]) -> Dataflash:
+def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], None] = lambda: None) -> Dataflash:
     """Find the messages of some names in a log (n,) of bytes.
+
+    let_go: called now and then, to give back the memory of what was looked at.
 
     Twice through the log: for the formats, and for the messages of those names, so that what is kept of a large log is
     small.
     """
     only_formats = np.zeros(256, np.bool_)
     only_formats[FMT] = True
-    first = _find_messages(data, only_formats)
+    first = _find_messages(data, only_formats, let_go)
     formats: dict[int, DFFormat] = {}
     unreadable = 0
     for start in first.at.tolist():
@@ -112,7 +116,7 @@ def index_dataflash(data: Bytes, names: Collection[str]) -> Dataflash:
             formats.setdefault(found.type, found)
     wanted = np.zeros(256, np.bool_)
     wanted[[number for number, known in formats.items() if known.name in names]] = True
-    second = _find_messages(data, wanted)
+    second = _find_messages(data, wanted, let_go)
     order = np.argsort(second.kinds, kind="stable")
     numbers, firsts = np.unique(second.kinds[order], return_index=True)
     # Of no messages numpy makes one empty part.
@@ -121,7 +125,7 @@ def index_dataflash(data: Bytes, names: Collection[str]) -> Dataflash:
     }
     held = tuple(known.name for number, known in formats.items() if second.counts[number])
     damage = Damage(int(second.places), int(second.size), bool(second.cut), unreadable)
-    return Dataflash(data, starts, formats, held, damage)
+    return Dataflash(data, starts, formats, held, damage, let_go)
 
 
 class _Found(NamedTuple):
@@ -135,8 +139,20 @@ class _Found(NamedTuple):
     cut: bool
 
 
-def _find_messages(data: Bytes, wanted: NDArray[np.bool_]) -> _Found:
-    return _Found(*_walk_messages(data, HEADER, FMT, _FMT_LENGTH, TRAILING, wanted))
+def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], None]) -> _Found:
+    state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
+    state[_READING], lengths[FMT] = 1, _FMT_LENGTH
+    at, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
+    for until in pieces(data.size, let_go):
+        found = _walk_messages(data, until, state, lengths, counts, HEADER, FMT, TRAILING, wanted)
+        at.append(found[0])
+        kinds.append(found[1])
+    places, size, behind = int(state[_PLACES]), int(state[_LOST]), int(state[_BEHIND])
+    if not state[_READING] and behind and data.size - behind < TRAILING:
+        # The rest of the last page.
+        places -= 1
+        size -= min(size, data.size - HEADER + 1 - behind)
+    return _Found(np.concatenate(at), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
 
 
 def _format(body: bytes) -> DFFormat | None:
@@ -154,7 +170,7 @@ def _format(body: bytes) -> DFFormat | None:
     return made if fits and len(set(made.columns)) == len(made.columns) else None
 
 
-def _columns(data: Bytes, starts: Ints, known: DFFormat) -> Messages:
+def _columns(data: Bytes, starts: Ints, known: DFFormat, let_go: Callable[[], None]) -> Messages:
     starts = starts[starts + known.len <= len(data)]
     kinds = []
     for letter, one in zip(known.msg_fmts, _struct_codes(known), strict=True):
@@ -162,8 +178,13 @@ def _columns(data: Bytes, starts: Ints, known: DFFormat) -> Messages:
     dtype = np.dtype([(name, f"<{kind}") for name, kind in zip(known.columns, kinds, strict=True)])
     rows = np.zeros(0, dtype)
     if len(starts) and dtype.itemsize:
-        bodies = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)[starts + HEADER]
-        rows = bodies.view(dtype)[:, 0]
+        windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
+        rows = np.empty(len(starts), dtype)
+        first = 0
+        for until in pieces(data.size, let_go):
+            last = int(np.searchsorted(starts, until))
+            rows[first:last] = windows[starts[first:last] + HEADER].view(dtype)[:, 0]
+            first = last
     scales = {name: one for name, one in zip(known.columns, known.msg_mults, strict=True) if one is not None}
     return Messages(starts, rows, scales)
 
@@ -184,17 +205,29 @@ def _struct_codes(known: DFFormat) -> list[str]:
     return codes
 
 
+# Of a walk: the next byte, places where no message begins, their bytes, the end of the last message, whether it was
+# one, and whether it is cut.
+_AT, _PLACES, _LOST, _BEHIND, _READING, _CUT = range(6)
+
+
 @compiled
 def _walk_messages(
-    data: Bytes, header: int, fmt: int, fmt_length: int, trailing: int, wanted: NDArray[np.bool_]
-) -> tuple[Ints, Bytes, Ints, int, int, bool]:  # pragma: no cover - compiled
-    """The fields of `_Found`."""
-    lengths, counts = np.zeros(256, np.int64), np.zeros(256, np.int64)
-    lengths[fmt] = fmt_length
+    data: Bytes,
+    until: int,
+    state: Ints,
+    lengths: Ints,
+    counts: Ints,
+    header: int,
+    fmt: int,
+    trailing: int,
+    wanted: NDArray[np.bool_],
+) -> tuple[Ints, Bytes]:  # pragma: no cover - compiled
+    """Wanted messages that begin before a byte, and their types; the walk goes on from its state."""
     at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
-    count, places, size, k, end, behind = 0, 0, 0, 0, data.size, 0
-    reading, cut = True, False
-    while k + header <= end:
+    count, end = 0, data.size
+    places, size, k, behind = state[_PLACES], state[_LOST], state[_AT], state[_BEHIND]
+    reading, cut = state[_READING] == 1, state[_CUT] == 1
+    while k + header <= end and k < until:
         length = 0
         if data[k] == 0xA3 and data[k + 1] == 0x95:
             length = lengths[data[k + 2]]
@@ -221,8 +254,6 @@ def _walk_messages(
         k = behind = after
         cut = after > end
         reading = True
-    if not reading and behind and end - behind < trailing:
-        # The rest of the last page.
-        places -= 1
-        size -= min(size, end - header + 1 - behind)
-    return at[:count], kinds[:count], counts, places, size, cut
+    state[_PLACES], state[_LOST], state[_AT], state[_BEHIND] = places, size, k, behind
+    state[_READING], state[_CUT] = reading, cut
+    return at[:count], kinds[:count]

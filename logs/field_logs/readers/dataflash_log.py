@@ -6,18 +6,17 @@ Names of messages and fields are those of ArduPilot's log documentation; of olde
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.ardupilot.pilot import true_by_equivalent
-from flight.mission.items import MissionItem, on_grid
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from logs.field_logs.readers.clocks import steady_clock
 from logs.field_logs.readers.dataflash_frames import Dataflash, Messages, index_dataflash
-from logs.field_logs.readers.logged_items import Item, gather_items, logged_mission
+from logs.field_logs.readers.dataflash_missions import dataflash_missions
+from logs.field_logs.readers.mapped_file import MappedFile
 from logs.field_logs.readers.vehicle_modes import plane_mode
 from world.errors import LogError
 
@@ -37,8 +36,12 @@ _PROGRAMS: dict[str, VehicleKind] = {
     "ArduSub": "submarine",
     "AntennaTracker": "tracker",
     "Blimp": "blimp",
+    # As they were named until 2018.
+    "APM:Plane": "plane",
+    "APM:Copter": "copter",
+    "APM:Rover": "rover",
 }
-_PROGRAM = re.compile(r"^(ArduPlane|ArduCopter|ArduRover|Rover|APMrover2|ArduSub|AntennaTracker|Blimp)\b")
+_PROGRAM = re.compile(rf"^({'|'.join(_PROGRAMS)})\b")
 # Days from 1970 to GPS's beginning, s, and leap seconds since, as they have stood since 2017.
 _GPS_EPOCH, _LEAP = 315_964_800.0, 18.0
 _WEEK = 604_800.0
@@ -46,7 +49,8 @@ _WEEK = 604_800.0
 
 def read_dataflash(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without a message that says where the vehicle was."""
-    index = index_dataflash(np.memmap(path, np.uint8, mode="r"), _READ)
+    file = MappedFile(path)
+    index = index_dataflash(file.data, _READ, file.let_go)
     return _Reader(index, str(path)).read()
 
 
@@ -87,7 +91,7 @@ class _Reader:
         """Messages of a name, of the first instance where there are several."""
         if name not in self._cache:
             found = self._index.messages(name)
-            for column in ("I", "C"):
+            for column in ("I", "C", "Inst", "Instance"):
                 # Earlier releases have a mode's number or a count under these names; those are no instances.
                 if name in _WITH_INSTANCES and found.has(column) and found.rows.dtype[column].kind in "ui":
                     number = found.rows[column]
@@ -242,26 +246,9 @@ class _Reader:
             yield ModeChange(time, name, automatic)
 
     def _missions(self) -> Iterable[LoggedMission]:
-        """Missions in the order in which they were logged: each whole, items that are flown again left out."""
         found = self._messages("CMD")
-        names = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
-        if not found.has(*names):
-            return
-        framed = found.has("Frame")
-        table = [found.column(name).tolist() for name in names]
-        frames = found.column("Frame").tolist() if framed else [3.0] * len(found)
-        totals = found.column("CTot").tolist() if found.has("CTot") else [0.0] * len(found)
-        rows = []
-        for row, (time, total, frame) in enumerate(zip(self._time(found).tolist(), totals, frames, strict=True)):
-            number, command, p1, p2, p3, p4, lat, lon, up = (column[row] for column in table)
-            rows.append(
-                Item(time, int(total), _item(int(number), int(command), int(frame), (p1, p2, p3, p4), lat, lon, up))
-            )
-        for start, items in gather_items(rows):
-            made = logged_mission(items, f"{self._source}: CMD")
-            if made is not None:
-                notes = () if framed else ("the log states no frames: heights are taken as above home",)
-                yield LoggedMission(start, replace(made, warnings=(*made.warnings, *notes)), "CMD")
+        time = self._time(found) if len(found) else np.zeros(0)
+        return dataflash_missions(found, time, self._messages("ORGN"), self._source)
 
     def _parameters(self) -> dict[str, float]:
         found = self._messages("PARM")
@@ -290,7 +277,8 @@ class _Reader:
         found = self._messages("GPS")
         for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
             if found.has(weeks, millis, "TimeUS"):
-                good = found.column(weeks) > 1000
+                # Before it has a fix a receiver makes a week up.
+                good = (found.column(weeks) > 1000) & (found.column("Status") >= 3 if found.has("Status") else True)
                 if good.any():
                     k = int(np.argmax(good))
                     seconds = found.column(weeks)[k] * _WEEK + found.column(millis)[k] * 1e-3
@@ -301,7 +289,7 @@ class _Reader:
 _DEGREE = math.pi / 180.0
 _READ = (
     "POS", "AHR2", "GPS", "ATT", "XKF1", "NKF1", "EKF1", "XKF2", "NKF2", "EKF2", "ARSP", "CTUN", "BAT", "CURR",
-    "BARO", "MODE", "CMD", "PARM", "MSG", "VER",
+    "BARO", "MODE", "CMD", "PARM", "MSG", "VER", "ORGN",
 )  # fmt: skip
 _WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2"})
 
@@ -311,10 +299,3 @@ def _raw_time(found: Messages) -> Floats:
     if found.has("TimeUS"):
         return found.column("TimeUS") * 1e-6
     return found.column("TimeMS") * 1e-3
-
-
-def _item(
-    number: int, command: int, frame: int, params: tuple[float, float, float, float], lat: float, lon: float, up: float
-) -> MissionItem:
-    # A float32 has seven digits; a mission file has six behind the point.
-    return MissionItem(number, command, frame, params, on_grid(lat), on_grid(lon), round(up, 6))

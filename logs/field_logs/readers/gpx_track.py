@@ -1,6 +1,7 @@
 """GPX tracks, by gpxpy: points with times; a route in the same file is what was planned."""
 
 import math
+from datetime import UTC
 from pathlib import Path
 
 import gpxpy
@@ -27,7 +28,9 @@ def read_gpx(path: Path) -> RawLog:
     timed = [point for point in points if point.time is not None]
     if len(timed) < 2:
         raise LogError(f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected")
-    stamps = np.array([point.time.timestamp() for point in timed if point.time is not None])
+    # Times without a zone are UTC, as the format has all of them.
+    times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
+    stamps = np.array([time.timestamp() for time in times])
     up = [math.nan if point.elevation is None else point.elevation for point in timed]
     values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
     return RawLog(

@@ -1,6 +1,7 @@
 """KML tracks: `gx:Track` with times (Google's extension of OGC 12-007); a line without times is no flight."""
 
-from datetime import datetime
+from datetime import UTC, datetime
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -24,11 +25,10 @@ def read_kml(path: Path) -> RawLog:
     for track in root.iter():
         if _name(track) != "Track":
             continue
-        whens = [child.text or "" for child in track if _name(child) == "when"]
-        coords = [child.text or "" for child in track if _name(child) == "coord"]
         mode = next((str(child.text).strip() for child in track if _name(child) == "altitudeMode"), mode)
-        unreadable += abs(len(whens) - len(coords))
-        for when, coord in zip(whens, coords, strict=False):
+        pairs, alone = _pairs(track, path)
+        unreadable += alone
+        for when, coord in pairs:
             row = _row(when, coord)
             if row is None:
                 unreadable += 1
@@ -59,11 +59,32 @@ def _name(element: ElementTree.Element) -> str:
     return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
 
 
+def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
+    """Times and places that belong together, and how many of either are alone.
+
+    All times stand before all places, or each before its own.  Raises LogError where it cannot be told which is whose.
+    """
+    marks = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
+    whens = [text for name, text in marks if name == "when"]
+    coords = [text for name, text in marks if name == "coord"]
+    last_when = max((k for k, (name, _) in enumerate(marks) if name == "when"), default=-1)
+    if all(name == "when" for name, _ in marks[: last_when + 1]):
+        if len(whens) != len(coords):
+            raise LogError(
+                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): as many of both"
+                " are expected"
+            )
+        return list(zip(whens, coords, strict=True)), 0
+    pairs = [(one, other) for (name, one), (kind, other) in pairwise(marks) if (name, kind) == ("when", "coord")]
+    return pairs, len(marks) - 2 * len(pairs)
+
+
 def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
     """Time since 1970 (s), latitude, longitude, height; None for what is none."""
     parts = coord.replace(",", " ").split()
     try:
-        stamp = datetime.fromisoformat(when.strip().replace("Z", "+00:00")).timestamp()
+        time = datetime.fromisoformat(when.strip().replace("Z", "+00:00"))
+        stamp = (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
         numbers = [float(part) for part in parts]
     except ValueError:
         return None

@@ -3,14 +3,18 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from logs.field_logs.raw_log import RawLog
 from world.errors import LogError
 
 # A day of a vehicle that logs all it can takes less.
 MOST_BYTES = 2 * 2**30
-SUFFIXES = (".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml")
+SUFFIXES = (".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
+# Refused by name.
+_NAMED = (".log",)
 _HEAD = 512
-_PX4_MAGIC = b"ULog\x01\x12\x35"
+_PX4_MAGIC, _ZIP_MAGIC = b"ULog\x01\x12\x35", b"PK\x03\x04"
 
 
 def is_field_log(path: Path) -> bool:
@@ -19,7 +23,7 @@ def is_field_log(path: Path) -> bool:
     >>> is_field_log(Path("00000042.BIN")), is_field_log(Path("flight.mcap"))
     (True, False)
     """
-    return path.suffix.lower() in SUFFIXES
+    return path.suffix.lower() in (*SUFFIXES, *_NAMED)
 
 
 def open_log(path: Path) -> RawLog:
@@ -27,7 +31,7 @@ def open_log(path: Path) -> RawLog:
 
     >>> open_log(Path("nothing.BIN"))
     Traceback (most recent call last):
-    world.errors.LogError: nothing.BIN: no such file: a log (.bin, .tlog, .ulg, .gpx, .igc, .kml) is expected
+    world.errors.LogError: nothing.BIN: no such file: a log (.bin, .tlog, .ulg, .gpx, .igc, .kml, .kmz) is expected
     """
     try:
         if not path.is_file():
@@ -39,7 +43,9 @@ def open_log(path: Path) -> RawLog:
             head = file.read(_HEAD)
         if not head:
             raise LogError(f"{path}: empty: a log is expected")
-        return _reader(path, head)(path)
+        # What is no number in a damaged log is left out later, and told.
+        with np.errstate(all="ignore"):
+            return _reader(path, head)(path)
     except OSError as error:
         raise LogError(f"{path}: cannot be read: {error.strerror}") from error
     except MemoryError:
@@ -56,6 +62,10 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
         from logs.field_logs.readers.dataflash_log import read_dataflash
 
         return read_dataflash
+    if head.startswith(_ZIP_MAGIC):
+        from logs.field_logs.readers.kml_track import read_kml
+
+        return read_kml
     text = head.decode("utf-8", errors="replace").lstrip("\ufeff \r\n\t").lower()
     if text.startswith("<") or "<gpx" in text or "<kml" in text:
         if "<kml" in text or path.suffix.lower() == ".kml":
@@ -65,6 +75,8 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
         from logs.field_logs.readers.gpx_track import read_gpx
 
         return read_gpx
+    if text.startswith("fmt, 128,") or text.startswith("fmt,128,"):
+        raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read")
     if path.suffix.lower() == ".igc":
         from logs.field_logs.readers.igc_track import read_igc
 
@@ -77,5 +89,5 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
         return read_telemetry
     raise LogError(
         f"{path}: not a log that is known (it starts with {head[:8]!r}): ArduPilot .BIN, MAVLink .tlog, PX4 .ulg,"
-        " .gpx, .igc or .kml is expected"
+        " .gpx, .igc, .kml or .kmz is expected"
     )

@@ -7,24 +7,26 @@ that stood there then.
 import contextlib
 import io
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 from pyulog import ULog
 
-from flight.mission.items import Mission, MissionItem, item_problem, on_grid, renumbered
+from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid, renumbered
 from flight.simulation.field_source import Damage
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from logs.field_logs.readers.mapped_file import MappedFile, pieces
 from logs.field_logs.readers.vehicle_modes import px4_state
 from world.errors import LogError
 from world.kernels import compiled
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 FORMAT = "PX4 log"
 # Bytes before the first record, and the letters of all records (PX4, "ULog File Format").
@@ -37,6 +39,8 @@ _TOPICS = [
 # vehicle_status.vehicle_type.
 _TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
 _AMSL, _OVER_HOME = 0, 3
+# Degrees, and m, that no home has; each is checked again where the mission is placed.
+_PLACE = np.array([90.0, 180.0, 10_000.0])
 
 
 def read_px4(path: Path) -> RawLog:
@@ -44,47 +48,87 @@ def read_px4(path: Path) -> RawLog:
     try:
         # It complains on the terminal.
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
-            found = ULog(file, _TOPICS, disable_str_exceptions=True)
+            found = ULog(_Steps(file), _TOPICS, disable_str_exceptions=True)
     except MemoryError:
         raise LogError(f"{path}: claims more than fits into memory") from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
         raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}") from error
-    return _Topics(found, str(path), find_damage(np.memmap(path, np.uint8, mode="r"))).log()
+    return _Topics(found, str(path), _damage_of(path)).log()
 
 
-def find_damage(data: Bytes) -> Damage:
+class _Steps:
+    """A file in which a step back from a read that met the end is as long as what was read.
+
+    pyulog steps back by what a record claims to be, and would read the end of a damaged file again and again.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._missing = file, 0
+
+    def read(self, size: int) -> bytes:
+        data = self._file.read(size)
+        self._missing = size - len(data)
+        return data
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        missing = self._missing if whence == 1 else 0
+        self._missing = 0
+        return self._file.seek(offset + missing, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damage:
     """What of a log (n,) of bytes cannot be read: its records follow each other, each with a length and a known letter.
 
     >>> find_damage(np.zeros(20, np.uint8)).places
     1
     """
-    places, size, cut = _walk(data, _HEADER, np.frombuffer(_LETTERS, np.uint8))
-    return Damage(places, size, bool(cut))
+    state = np.zeros(5, np.int64)
+    state[_AT], state[_READING] = _HEADER, 1
+    for until in pieces(data.size, let_go):
+        _walk(data, until, state, np.frombuffer(_LETTERS, np.uint8))
+    cut = bool(state[_CUT]) or int(state[_AT]) < data.size
+    return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
+
+
+def _damage_of(path: Path) -> Damage:
+    file = MappedFile(path)
+    return find_damage(file.data, file.let_go)
+
+
+# Of a walk: the next byte, places where no record begins, their bytes, whether the last was one, whether it is cut.
+_AT, _PLACES, _LOST, _READING, _CUT = range(5)
 
 
 @compiled
-def _walk(data: Bytes, header: int, letters: Bytes) -> tuple[int, int, bool]:  # pragma: no cover - compiled
-    """Places where no record begins, their bytes, and whether the last record is cut."""
+def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # pragma: no cover - compiled
+    """Go on to a byte from a walk's state."""
     known = np.zeros(256, np.bool_)
     for letter in letters:
         known[letter] = True
-    places, size, k, reading = 0, 0, header, True
-    while k + 3 <= data.size:
+    k, places, size, reading, cut = state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT]
+    while k + 3 <= data.size and k < until and not cut:
         length = data[k] + 256 * data[k + 1]
         after = k + 3 + length
         if known[data[k + 2]] and after > data.size:
             # Only what a cut record would be: nothing else can follow it.
-            return places, size, True
+            cut = 1
+            break
         follows = after + 3 > data.size or known[data[after + 2]]
         if known[data[k + 2]] and follows:
             k = after
-            reading = True
+            reading = 1
         else:
             places += reading
-            reading = False
+            reading = 0
             size += 1
             k += 1
-    return places, size, k < data.size
+    state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT] = k, places, size, reading, cut
 
 
 def _one_line(error: Exception) -> str:
@@ -241,8 +285,17 @@ class _Topics:
             if math.isfinite(number) and item_problem(item) is None:
                 items.setdefault(item.seq, item)
         if len(items) > 1:
-            made = Mission(None, tuple(items[seq] for seq in sorted(items)), source=f"{self._source}: mission items")
+            made = Mission(
+                self._home(), tuple(items[seq] for seq in sorted(items)), source=f"{self._source}: mission items"
+            )
             yield LoggedMission(float(data["timestamp"][0]) * 1e-6, renumbered(made), "navigator_mission_item")
+
+    def _home(self) -> Home | None:
+        found = self._table("home_position", ("lat", "lon", "alt"))
+        if found is None:
+            return None
+        placed = found.values[np.isfinite(found.values).all(axis=1) & (np.abs(found.values) < _PLACE).all(axis=1)]
+        return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
 
     def _parameters(self) -> dict[str, float]:
         return {str(name): float(value) for name, value in self._log.initial_parameters.items()}

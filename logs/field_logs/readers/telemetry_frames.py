@@ -5,13 +5,14 @@ them and checks their checksums.  The time is in microseconds since 1970, big-en
 """
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from flight.simulation.field_source import Damage
+from logs.field_logs.readers.mapped_file import PIECE
 
 _STAMP = struct.Struct(">Q")
 _V1, _V2 = 0xFE, 0xFD
@@ -27,10 +28,12 @@ class TelemetryReader:
     """Decodes the wanted messages of a log and counts what could not be read.
 
     wanted: their numbers.
+    let_go: called now and then, to give back the memory of what was read.
     """
 
     data: memoryview
     wanted: frozenset[int]
+    let_go: Callable[[], None] = lambda: None
     places: int = 0
     size: int = 0
     cut: bool = False
@@ -39,8 +42,11 @@ class TelemetryReader:
 
     def messages(self) -> Iterator[tuple[float, Any]]:
         """Time received (s since 1970) and message, in the order of the file."""
-        at, end, reading = 0, len(self.data), True
+        at, end, reading, piece = 0, len(self.data), True, PIECE
         while at + _STAMP.size + _V1_FRAME <= end:
+            if at >= piece:
+                self.let_go()
+                piece = at + PIECE
             length = self._length(at)
             if length == 0:
                 self.places += reading

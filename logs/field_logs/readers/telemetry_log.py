@@ -16,6 +16,7 @@ from flight.ardupilot.pilot import true_by_equivalent
 from flight.mission.items import Home, Mission, MissionItem, on_grid, renumbered
 from logs.field_logs.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
 from logs.field_logs.readers.logged_items import Item, gather_items, logged_mission
+from logs.field_logs.readers.mapped_file import MappedFile
 from logs.field_logs.readers.telemetry_frames import TelemetryReader
 from logs.field_logs.readers.telemetry_rows import NUMBERS, SystemMessages
 from logs.field_logs.readers.vehicle_modes import plane_mode, px4_mode
@@ -46,8 +47,8 @@ _MISSION_TYPE = 0
 
 def read_telemetry(path: Path) -> RawLog:
     """Read a log.  Raises LogError for one without GLOBAL_POSITION_INT or GPS_RAW_INT."""
-    data = np.memmap(path, np.uint8, mode="r")
-    reader = TelemetryReader(memoryview(data), _NUMBERS)  # type: ignore[arg-type]  # an array is a buffer
+    file = MappedFile(path)
+    reader = TelemetryReader(memoryview(file.data), _NUMBERS, file.let_go)  # type: ignore[arg-type]  # a buffer
     systems: dict[int, SystemMessages] = {}
     items: list[tuple[float, Any]] = []
     for stamp, message in reader.messages():
@@ -202,9 +203,11 @@ class _Messages:
                 yield LoggedMission(start, self._with_home(made), "mission items")
 
     def _with_home(self, mission: Mission) -> Mission:
-        if mission.home is not None or not self._own.get("HOME_POSITION"):
+        """With home as the vehicle has it: that of an uploaded mission is only where a station supposed it."""
+        heard = [one for _, one in self._own["HOME_POSITION"] if one.latitude or one.longitude]
+        if not heard:
             return mission
-        _, home = self._own["HOME_POSITION"][0]
+        home = heard[-1]
         place = Home(home.latitude * 1e-7, home.longitude * 1e-7, home.altitude * 1e-3)
         return Mission(place, mission.items, warnings=mission.warnings, source=mission.source)
 

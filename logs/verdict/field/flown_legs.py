@@ -55,6 +55,7 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     met = met_waypoints(whole, aligned)
     if not met.size:
         return None
+    aligned, met = _earliest_lap(setup, rows, aligned, met)
     first, last = int(met[0]), int(met[-1])
     ended = len(setup.route.waypoints) - 1
     behind = float(aligned.track.time[-1] - aligned.track.time[aligned.rows[last]])
@@ -71,6 +72,28 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
         return None
     # A log or a stretch that ends a few metres before the waypoint does not show that it was passed.
     return FlownLegs(stretch, first, until, partial or not bool(laid.passed[-1]), part, laid)
+
+
+def _earliest_lap(
+    setup: FlightSetup, rows: Track, aligned: AlignedTrack, met: NDArray[np.intp]
+) -> tuple[AlignedTrack, NDArray[np.intp]]:
+    """Rows laid beside the first laps of a route that comes by the same items again, if they do for the flight.
+
+    One that ended on the way was as near to the waypoints of any later lap.
+    """
+    items, last = setup.route.items, int(met[-1])
+    if len(met) == last - met[0] + 1:
+        return aligned, met
+    for end in np.flatnonzero(items[:last] == items[last]).tolist():
+        if end < 1:
+            continue
+        demands = route_demands(replace(setup, route=part_of_route(setup.route, 0, end)))
+        laid = lay_track(demands, rows)
+        found = met if laid is None else met_waypoints(demands, laid)
+        # Each item once: a place that was passed once is near to its waypoints of all laps.
+        if laid is not None and len(np.unique(items[found])) >= len(np.unique(items[met])):
+            return laid, found
+    return aligned, met
 
 
 def between(track: Track, start: float, end: float) -> Track:

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.simulation.field_source import MissionStretch
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import ROLL, Track
 from logs.verdict.field.flown_legs import FlownLegs
+from logs.verdict.measures.flown_corners import CornerPass, corner_passes
 from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, lay_track
 from logs.verdict.measures.turns import measure_turn
@@ -80,6 +82,7 @@ class Spread:
 class Reflight:
     """Both flights.
 
+    stretch: of the flight of the field that is compared.
     setup: of the simulated one.  simulated: its rows.  ended: how it ended.
     distance: (n,) m along the route's legs at which they are compared.
     ends: (legs,) m along the route at which each leg ends.
@@ -88,6 +91,7 @@ class Reflight:
     stands_in: the aircraft of the log is not known, and another's model flew.
     """
 
+    stretch: MissionStretch
     setup: FlightSetup
     simulated: Track
     ended: str
@@ -132,9 +136,11 @@ def compare_with_model(
     legs = tuple(
         _leg(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles) for k in range(demands.legs)
     )
-    turns = tuple(_turn(flown.first, k, pairs) for k in range(1, demands.legs))
+    corners = [corner_passes(one, track) for one, track in pairs]
+    turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, demands.legs))
     flown_profile, model_profile = profiles
     return Reflight(
+        stretch=flown.stretch,
         setup=setup,
         simulated=simulated,
         ended=ended,
@@ -210,8 +216,14 @@ def _reduced(values: Floats, reduce: str) -> float:
     return float(known[np.argmax(np.abs(known))])
 
 
-def _turn(first: int, k: int, pairs: Sequence[tuple[RouteDemands, AlignedTrack]]) -> TurnPair:
+def _turn(
+    first: int,
+    k: int,
+    pairs: Sequence[tuple[RouteDemands, AlignedTrack]],
+    corners: Sequence[Sequence[CornerPass]],
+) -> TurnPair:
     one, other = (measure_turn(demands, aligned, k) for demands, aligned in pairs)
+    passed, again = (passes[k] for passes in corners)
 
     def both(left: float | None, right: float | None, factor: float = 1.0) -> tuple[float, float]:
         return (math.nan if left is None else left * factor, math.nan if right is None else right * factor)
@@ -219,9 +231,9 @@ def _turn(first: int, k: int, pairs: Sequence[tuple[RouteDemands, AlignedTrack]]
     return TurnPair(
         first + k,
         math.degrees(float(pairs[0][0].turns[k])),
-        overshoot=both(one.overshoot, other.overshoot),
+        overshoot=both(passed.overshoot, again.overshoot),
         bank=both(one.peak_bank, other.peak_bank, 180.0 / math.pi),
-        passed=both(one.passed, other.passed),
+        passed=both(passed.nearest, again.nearest),
     )
 
 

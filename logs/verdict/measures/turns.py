@@ -1,12 +1,13 @@
 """How each turn was flown: angle, bank, radius, overshoot, and where the aircraft settled."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import ROLL
+from logs.verdict.measures.flown_corners import CornerPass, corner_passes
 from logs.verdict.measures.leg_fits import leg_course
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
@@ -29,6 +30,7 @@ class TurnMeasure:
     passed: m, least distance from the waypoint.
     full_circles: whole turns flown beyond the corner's own.
     over: the flight got past the turn.
+    corner: of a flight of the field, how its waypoint was passed; ``overshoot`` and ``passed`` are then its.
     """
 
     angle: float | None = None
@@ -42,6 +44,19 @@ class TurnMeasure:
     passed: float | None = None
     full_circles: int = 0
     over: bool = False
+    corner: CornerPass | None = None
+
+
+def measure_turns(demands: RouteDemands, aligned: AlignedTrack) -> list[TurnMeasure]:
+    """Measure the turn at every inner waypoint, in order."""
+    measures = [measure_turn(demands, aligned, i) for i in range(1, demands.legs)]
+    if demands.setup.source is None:
+        return measures
+    corners = corner_passes(demands, aligned)[1:-1]
+    return [
+        replace(measure, overshoot=corner.overshoot, passed=corner.nearest, corner=corner)
+        for measure, corner in zip(measures, corners, strict=True)
+    ]
 
 
 def measure_turn(demands: RouteDemands, aligned: AlignedTrack, i: int) -> TurnMeasure:

@@ -9,7 +9,7 @@ from logs.verdict.measures.jogs import jog
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.tighter_limits import turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.measures.turns import TurnMeasure, measure_turn
+from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.tolerances import (
     BANK_TOLERANCE,
     CLOSER,
@@ -27,13 +27,10 @@ from world.geometry import fly_by_offset
 
 def turn_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
     """Judge each inner waypoint; ``geometric`` judges the route alone, without a flight."""
-    out = []
-    for i in range(1, demands.legs):
-        measure = None if geometric else TurnMeasure()
-        if aligned is not None:
-            measure = measure_turn(demands, aligned, i)
-        out.append(_judge(demands, i, measure))
-    return out
+    measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (demands.legs - 1)
+    if aligned is not None:
+        measures = [*measure_turns(demands, aligned)]
+    return [_judge(demands, i, measure) for i, measure in enumerate(measures, 1)]
 
 
 def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Finding:
@@ -66,7 +63,7 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
             method = "not flown"
     ok: bool | None = not faults
     if measure is not None and not measure.over:
-        facts.append("the flight did not get past it")
+        facts.append("the flight did not get past it" if measure.corner is None else "its legs were not flown in turn")
         ok = None if ok else False
     return make_finding(
         "turn",
@@ -136,8 +133,12 @@ def _flown_facts(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[st
         facts.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
     if measure.radius is not None and measure.radius < STRAIGHT * demands.radius[i]:
         facts.append(f"radius {measure.radius:.0f} m")
+    if measure.corner is not None:
+        facts.append(f"nearest pass {measure.corner.nearest:.1f} m, at {measure.corner.time:.1f} s")
     if measure.overshoot is not None:
         facts.append(f"overshoot {measure.overshoot:.1f} m")
+    if measure.corner is not None and measure.corner.beyond:
+        facts.append(f"that is {measure.corner.beyond:.0f} m past the end of the next leg, which was not joined")
     if measure.settled is not None and measure.over:
         facts.append(f"settled to {measure.settled:.2f} m")
     return facts
@@ -153,6 +154,7 @@ def _measured(measure: TurnMeasure | None) -> list[Fact]:
         ("settled", measure.settled if measure.over else None, "m"),
         ("bank", bank, "deg"),
         ("radius", measure.radius, "m"),
+        ("nearest pass", None if measure.corner is None else measure.corner.nearest, "m"),
     )
     return [Fact(what, value, unit) for what, value, unit in numbers if value is not None]
 
@@ -170,7 +172,8 @@ def _shown(demands: RouteDemands, i: int, measure: TurnMeasure, limit: float) ->
         faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
     faults += _too_tight(demands, i, measure)
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT:
-        faults.append(message(f"overshoots its arc by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT:.0f} m)"))
+        past = "its arc" if measure.corner is None else "its next leg"
+        faults.append(message(f"overshoots {past} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT:.0f} m)"))
     most = SETTLED + GUST_OFFSET[demands.setup.scenario.wind.turbulence]
     if measure.settled is not None and measure.over and measure.settled > most:
         off = f"still {measure.settled:.1f} m off the next leg at its end"
@@ -190,7 +193,9 @@ def _too_tight(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[Mess
     tightest = float(demands.tightest[i])
     # Guidance's own limit: a corner sharper than it has no arc to be held to where its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST else math.inf
-    if measure.passed is None or not math.isfinite(least) or setup.route.fly_over[i] or setup.guidance != "path":
+    # Another's autopilot does not follow the arc, and passes the waypoint as closely as it likes.
+    followed = setup.guidance == "path" and setup.source is None and not setup.route.fly_over[i]
+    if measure.passed is None or not math.isfinite(least) or not followed:
         return []
     tolerance = CLOSER_SHARE * least + CLOSER[setup.scenario.wind.turbulence]
     tolerance += NAVIGATION_SIGMAS * ERRORS[setup.nav][0]

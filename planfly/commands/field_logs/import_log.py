@@ -12,6 +12,9 @@ from planfly.terminal.results import print_verdict
 from planfly.terminal.scenario_options import scenario_change
 from planfly.terminal.targets import refuse_existing
 
+# Rows that are recorded at once.
+_PIECE = 4096
+
 
 def import_log(args: argparse.Namespace) -> int:
     """Import a log; the exit code is the verdict's, or 3 for a log of which some could not be read."""
@@ -31,7 +34,9 @@ def _write(target: Path, flight: ImportedFlight) -> None:
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         path = Path(folder) / target.name
         with Recorder(path, flight.setup) as recorder:
-            recorder.write(flight.track)
+            # A piece at a time: a recorder takes many times the bytes of a row for it.
+            for start in range(0, len(flight.track), _PIECE):
+                recorder.write(flight.track.rows(start, start + _PIECE))
             for event in flight.events:
                 recorder.event(event.time, event.text, event.level)
             recorder.finish(flight.ended, flight.verdict)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
-from logs.report.refly_lines import refly_lines
+from logs.report.refly_lines import left_lines, refly_lines
 from logs.verdict.field.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from planfly.field.model_flight import fly_again
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.progress import progress
 from planfly.terminal.stored_logs import warn_of_loss
-from planfly.terminal.targets import REFLY_FILES, prepare_folder, refuse_folder
+from planfly.terminal.targets import REFLOWN, REFLY_FILES, prepare_folder, refuse_folder
 from world.atomic_files import write_whole
 from world.errors import LogError
 
@@ -28,12 +28,17 @@ def refly(args: argparse.Namespace) -> int:
     if args.out:
         refuse_folder(folder, args.overwrite)
     with progress("flying again") as advance:
-        again = fly_again(log.setup, log.track, args.aircraft, args.turbulence, advance)
+        agains = fly_again(log.setup, log.track, args.aircraft, args.turbulence, advance, REFLOWN)
     prepare_folder(folder, REFLY_FILES)
-    print("\n".join(refly_lines(again)))
+    for number, again in enumerate(agains, 1):
+        print(*([] if number == 1 else [""]), *refly_lines(again), sep="\n")
+    for line in left_lines(agains, log.setup.source.stretches, REFLOWN):
+        print(line)
+    files: list[Path] = []
     with progress("drawing"):
-        files = _draw(folder, again)
-    files.append(_record(folder, again, log))
+        for number, again in enumerate(agains, 1):
+            ending = "" if number == 1 else f"-{number}"
+            files += [*_draw(folder, again, ending), _record(folder, again, log, ending)]
     for file in files:
         print(f"refly     {file}")
     if not log.complete:
@@ -42,20 +47,21 @@ def refly(args: argparse.Namespace) -> int:
     return FLYABLE
 
 
-def _draw(folder: Path, again: Reflight) -> list[Path]:
+def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
     # matplotlib loads for pictures alone.
     from logs.figures.refly import refly_pictures
 
     files = []
     for name, data in refly_pictures(again).items():
-        write_whole(folder / name, data)
-        files.append(folder / name)
+        path = (folder / name).with_stem(f"{Path(name).stem}{ending}")
+        write_whole(path, data)
+        files.append(path)
     return files
 
 
-def _record(folder: Path, again: Reflight, log: FlightLog) -> Path:
+def _record(folder: Path, again: Reflight, log: FlightLog, ending: str) -> Path:
     """The simulated flight as a log of its own, for `compare` and `replay`."""
-    path = folder / "simulated.mcap"
+    path = folder / f"simulated{ending}.mcap"
     verdict = judge_flight(again.setup, again.simulated, again.ended)
     with Recorder(path, replace(again.setup, seed=log.setup.seed)) as recorder:
         recorder.write(again.simulated)

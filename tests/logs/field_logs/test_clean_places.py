@@ -89,3 +89,12 @@ def test_distances_across_the_180th_meridian_are_short() -> None:
     assert metres_between(np.zeros(2), np.array([179.9995, -179.9995]))[0] == pytest.approx(0.001 * DEGREE)
     lat = np.array([-33.0, -33.0])
     assert metres_between(lat, np.array([-70.0, -70.001]))[0] == pytest.approx(0.001 * DEGREE * np.cos(np.radians(33)))
+
+
+def test_a_single_row_that_is_missing_at_one_a_second_is_a_gap() -> None:
+    time = np.arange(0.0, 30.0)
+    assert find_gaps(time) == ()
+    assert find_gaps(np.delete(time, 10)) == (Gap(9.0, 11.0),)
+    # Rows that come now and then by four tenths late are none.
+    late = time + np.where(time % 5.0 == 0.0, 0.4, 0.0)
+    assert find_gaps(late) == ()

@@ -84,11 +84,13 @@ def dataflash(
         if with_frames:
             letters, columns, values = letters + "B", columns + ",Frame", [*values, frame]
         put("CMD", letters, columns, *values)
-    for time, number in modes:
-        put("MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn", us(time), number, number, 2)
+    ahead = [*modes]
     one, two = ("EKF1", "EKF2") if old else ("XKF1", "XKF2")
     series = {name: found.values for name, found in raw.series.items()}
     for k, time in enumerate(raw.series["position"].time.tolist()):
+        while ahead and ahead[0][0] <= time:
+            at, number = ahead.pop(0)
+            put("MODE", "QBBB", "TimeUS,Mode,ModeNum,Rsn", us(at), number, number, 2)
         lat, lon, up = series["position"][k]
         east, north, rise = series["velocity"][k]
         roll, pitch, yaw = np.degrees(series["attitude"][k])
@@ -226,16 +228,17 @@ def gpx(path: Path, log: RawLog | None = None, *, route: bool = True) -> Path:
     return path
 
 
-def kml(path: Path, log: RawLog | None = None, *, mode: str = "absolute") -> Path:
-    """Write a track as a `.kml` with `gx:Track`."""
+def kml(path: Path, log: RawLog | None = None, *, mode: str = "absolute", in_turn: bool = False) -> Path:
+    """Write a track as a `.kml` with `gx:Track`: all times before all places, or in turn."""
     raw = example_raw_log() if log is None else log
     whens, coords = [], []
     for (lat, lon, up), time in _each_second(raw):
         whens.append(f"<when>{(BEGAN + timedelta(seconds=time)).isoformat().replace('+00:00', 'Z')}</when>")
         coords.append(f"<gx:coord>{lon:.7f} {lat:.7f} {up:.2f}</gx:coord>")
+    both = [text for pair in zip(whens, coords, strict=True) for text in pair] if in_turn else whens + coords
     path.write_text(
         '<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">'
-        f"<Document><Placemark><gx:Track><altitudeMode>{mode}</altitudeMode>{''.join(whens + coords)}</gx:Track>"
+        f"<Document><Placemark><gx:Track><altitudeMode>{mode}</altitudeMode>{''.join(both)}</gx:Track>"
         "</Placemark></Document></kml>",
         encoding="utf-8",
     )

@@ -2,9 +2,18 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from logs.report.tables import LEG_COLUMNS, PASSAGE_COLUMNS, leg_rows, passage_rows, saturation_rows
+from logs.report.tables import (
+    LEG_COLUMNS,
+    PASSAGE_COLUMNS,
+    energy_facts,
+    flight_sentence,
+    leg_rows,
+    passage_rows,
+    saturation_rows,
+)
 from logs.report.text import number
 from tests.logs.report.report_data import make_setup, make_track
 
@@ -43,3 +52,12 @@ def test_stays_and_held_controls_are_those_of_the_track() -> None:
     # A closed throttle is at a limit, too: the track's is, all the time.
     assert held[3][3] == number(float(track.time[-1]), digits=1)
     assert held[0][2] == "114.6°"
+
+
+def test_nothing_is_said_of_a_battery_that_the_log_does_not_hold() -> None:
+    setup, track = make_setup(), make_track()
+    assert flight_sentence(setup, track).endswith(" Wh.")
+    assert energy_facts(setup, track)
+    silent = replace(track, energy=np.full(len(track), np.nan))
+    assert "Wh" not in flight_sentence(setup, silent)
+    assert energy_facts(setup, silent) == []

@@ -17,7 +17,7 @@ def silent(_done: float, _whole: float, _remark: str) -> None:
 
 def test_the_model_flies_the_legs_of_the_longest_stretch_in_the_wind_of_the_log(tmp_path: Path) -> None:
     flight = judged(tmp_path, options=FieldOptions(aircraft="aerosonde"))
-    again = fly_again(flight.setup, flight.track, None, None, silent)
+    (again,) = fly_again(flight.setup, flight.track, None, None, silent)
     assert (len(again.legs), again.ended, again.stands_in) == (2, "completed", False)
     # 3 m/s from the north: 25 m/s of equivalent airspeed are 25.6 at 500 m, less 3 against the wind.
     flown, model = again.legs[0].ground_speed
@@ -29,8 +29,8 @@ def test_the_model_flies_the_legs_of_the_longest_stretch_in_the_wind_of_the_log(
 
 def test_another_aircraft_stands_in_where_none_is_named(tmp_path: Path) -> None:
     flight = judged(tmp_path)
-    assert fly_again(flight.setup, flight.track, None, None, silent).stands_in
-    assert not fly_again(flight.setup, flight.track, "aerosonde", None, silent).stands_in
+    assert fly_again(flight.setup, flight.track, None, None, silent)[0].stands_in
+    assert not fly_again(flight.setup, flight.track, "aerosonde", None, silent)[0].stands_in
 
 
 def test_a_flight_that_followed_no_mission_is_not_flown_again(tmp_path: Path) -> None:
@@ -38,3 +38,15 @@ def test_a_flight_that_followed_no_mission_is_not_flown_again(tmp_path: Path) ->
     flight = judged(tmp_path, raw)
     with pytest.raises(LogError, match="none of its mission's legs was flown"):
         fly_again(flight.setup, flight.track, None, None, silent)
+
+
+def test_every_stretch_is_flown_again_the_longest_first(tmp_path: Path) -> None:
+    """AUTO from 20 s to 75 s, and from 76 s on: the turn is at 70 s, the end at 110 s."""
+    modes = (ModeChange(20.0, "AUTO", True), ModeChange(75.0, "FBWA", False), ModeChange(76.0, "AUTO", True))
+    flight = judged(tmp_path, replace(example_raw_log(), modes=modes), FieldOptions(aircraft="aerosonde"))
+    found = fly_again(flight.setup, flight.track, None, None, silent)
+    assert [(again.stretch.start, again.first, len(again.legs)) for again in found] == [(20.0, 0, 2)]
+    turned = (ModeChange(20.0, "AUTO", True), ModeChange(40.0, "FBWA", False), ModeChange(68.0, "AUTO", True))
+    flight = judged(tmp_path, replace(example_raw_log(), modes=turned), FieldOptions(aircraft="aerosonde"))
+    found = fly_again(flight.setup, flight.track, None, None, silent)
+    assert [(again.stretch.start, again.first, len(again.legs)) for again in found] == [(20.0, 0, 1), (68.0, 1, 1)]

@@ -1,3 +1,4 @@
+import time
 from pathlib import Path
 
 import gpxpy
@@ -41,3 +42,16 @@ def test_what_is_none_is_refused(tmp_path: Path) -> None:
     path.write_text("<gpx><trk>")
     with pytest.raises(LogError, match="not a GPX file that can be read"):
         read_gpx(path)
+
+
+def test_times_without_a_zone_are_utc_wherever_they_are_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = gpx(tmp_path / "a.gpx")
+    with_zone = read_gpx(path).utc_start
+    path.write_text(path.read_text().replace("Z</time>", "</time>"))
+    monkeypatch.setenv("TZ", "Pacific/Auckland")
+    time.tzset()
+    try:
+        assert read_gpx(path).utc_start == with_zone
+    finally:
+        monkeypatch.delenv("TZ")
+        time.tzset()

@@ -1,3 +1,4 @@
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -51,3 +52,20 @@ def test_what_is_no_log_is_refused_in_a_line(tmp_path: Path, data: bytes) -> Non
 def test_a_folder_is_no_log(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="no such file"):
         open_log(tmp_path)
+
+
+def test_a_zipped_track_is_read_as_the_track_in_it(tmp_path: Path) -> None:
+    track, path = kml(tmp_path / "doc.kml"), tmp_path / "a.kmz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.write(track, "doc.kml")
+    one, other = open_log(track), open_log(path)
+    assert one.series["position"].values.tolist() == other.series["position"].values.tolist()
+    assert is_field_log(path)
+
+
+def test_a_log_as_text_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_text("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nPARM, 1, RLL_P, 0.3\n")
+    with pytest.raises(LogError, match=r"a dataflash log as text: the \.BIN that it was made of is read"):
+        open_log(path)
+    assert is_field_log(path)

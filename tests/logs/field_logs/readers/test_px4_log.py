@@ -1,12 +1,19 @@
 import io
+import re
 import struct
+import subprocess
+import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pyulog import ULog
 
+from flight.mission.items import Home
+from logs.field_logs.clean_places import clean_places
 from logs.field_logs.example_raw_log import example_raw_log
+from logs.field_logs.readers.open_log import open_log
 from logs.field_logs.readers.px4_log import find_damage, read_px4
 from tests.logs.field_logs.written_logs import px4
 from world.errors import LogError
@@ -77,3 +84,49 @@ def test_nothing_is_printed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
     with io.StringIO():
         read_px4(path)
     assert capsys.readouterr() == ("", "")
+
+
+def test_a_record_that_claims_more_than_the_file_has_is_not_read_for_ever(tmp_path: Path) -> None:
+    """In its definitions pyulog steps back by what a record claims, and comes by the same place again."""
+    path = px4(tmp_path / "a.ulg")
+    data = path.read_bytes()
+    first = data.index(b"vehicle_global_position", data.index(b"sys_namePX4")) - 6
+    path.write_bytes(data[:first] + struct.pack("<HB", 200, 0) + b"\xff\xff\x01" * 20)
+    code = (
+        f"from pathlib import Path\nfrom logs.field_logs.readers.px4_log import read_px4\nread_px4(Path({str(path)!r}))"
+    )
+    ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+    assert "nothing says where it flew" in ran.stderr
+
+
+def test_numbers_that_no_place_or_time_has_are_passed_over(tmp_path: Path) -> None:
+    """An item at 1e300 degrees, a time of 2^64 us, a place at a signalling NaN."""
+    path = px4(tmp_path / "a.ulg")
+    data = bytearray(path.read_bytes())
+    item = example_raw_log().missions[0].mission.items[1]
+    at = data.index(struct.pack("<dd", item.lat_deg, item.lon_deg))
+    data[at : at + 8] = struct.pack("<d", 1e300)
+    rows = [found.start() for found in re.finditer(re.escape(struct.pack("<HcH", 28 + 2, b"D", 0)), data)]
+    data[rows[10] + 5 : rows[10] + 13] = b"\xff" * 8
+    data[rows[20] + 29 : rows[20] + 33] = struct.pack("<I", 0x7F80_0001)
+    path.write_bytes(bytes(data))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        raw = open_log(path)
+    assert len(raw.missions[0].mission.items) == 2
+    places = clean_places(raw.series["position"])
+    assert (len(places.time), places.faults.unusable) == (458, 2)
+
+
+def test_home_is_the_vehicles(tmp_path: Path) -> None:
+    """Items that count their heights from home need it."""
+    path = px4(tmp_path / "a.ulg")
+    data = path.read_bytes()
+    form = b"home_position:uint64_t timestamp;double lat;double lon;float alt;"
+    used = struct.pack("<HcBH", 3 + 13, b"A", 0, 77) + b"home_position"
+    row = struct.pack("<HcHQddf", 30, b"D", 77, 20_000_000, 46.25, 8.25, 431.5)
+    first = data.index(b"A\x00\x00\x00vehicle") - 2
+    path.write_bytes(data[:first] + struct.pack("<Hc", len(form), b"F") + form + used + data[first:] + row)
+    (logged,) = read_px4(path).missions
+    assert logged.mission.home == Home(46.25, 8.25, 431.5)
+    assert read_px4(px4(tmp_path / "b.ulg")).missions[0].mission.home is None

@@ -3,7 +3,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from pymavlink import mavutil
+from pymavlink.dialects.v20 import ardupilotmega as dialect
 
+from flight.mission.items import Home
 from logs.field_logs.example_raw_log import example_raw_log
 from logs.field_logs.readers.telemetry_log import read_telemetry
 from tests.logs.field_logs.written_logs import telemetry
@@ -66,3 +68,14 @@ def test_a_restart_in_flight_goes_on(tmp_path: Path) -> None:
     raw = read_telemetry(path)
     assert len(raw.clock_jumps) == 1
     assert (np.diff(raw.series["position"].time) >= 0.0).all()
+
+
+def test_home_is_where_the_vehicle_has_it_not_where_the_station_supposed_it(tmp_path: Path) -> None:
+    path, sink = telemetry(tmp_path / "a.tlog"), bytearray()
+    home = dialect.MAVLink_home_position_message(
+        461_000_000, 81_000_000, 431_500, 0.0, 0.0, 0.0, [1.0, 0, 0, 0], 0, 0, 0
+    )
+    packet = home.pack(dialect.MAVLink(None, 1, 1))
+    sink += path.read_bytes() + path.read_bytes()[:8] + packet
+    path.write_bytes(bytes(sink))
+    assert read_telemetry(path).missions[0].mission.home == Home(46.1, 8.1, 431.5)

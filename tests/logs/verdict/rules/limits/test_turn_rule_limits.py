@@ -9,10 +9,10 @@ import pytest
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
+from logs.verdict.measures import turns
 from logs.verdict.measures.route_demands import route_demands
 from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.measures.turns import TurnMeasure, measure_turn
-from logs.verdict.rules import turn_rule
 from logs.verdict.rules.turn_rule import turn_findings
 from tests.logs.verdict.judging import ROUTE, judge, of, waypoint
 from tests.synthetic import bank_radius, bump, edited, fly_path, make_setup, waypoint_stations
@@ -67,7 +67,7 @@ def judged(setup: FlightSetup, measure: TurnMeasure, monkeypatch: pytest.MonkeyP
     """The finding of waypoint 1, however it was flown, by flown evidence alone."""
     demands = route_demands(setup, envelope=False)
     aligned = lay_track(demands, fly_path(setup))
-    monkeypatch.setattr(turn_rule, "measure_turn", lambda *_: measure)
+    monkeypatch.setattr(turns, "measure_turn", lambda *_: measure)
     return turn_findings(demands, aligned)[0]
 
 
