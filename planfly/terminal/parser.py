@@ -295,9 +295,13 @@ def _add_paper(command: _Command) -> None:
 def _add_aircraft(command: _Command) -> None:
     aircraft = command(
         "aircraft", "show an aircraft: mass, trims, modes, envelope and step responses; without a name, list them",
-        "planfly aircraft aerosonde --out aerosonde",
+        "planfly aircraft aerosonde --out aerosonde\n         planfly aircraft --new ./mine --from aerosonde",
     )  # fmt: skip
     aircraft.add_argument("name", metavar="NAME", nargs="?", help="embedded name, or a folder (with a slash)")
     aircraft.add_argument("--out", metavar="DIR", help="where the pictures go (default: runs/aircraft-NAME, replaced)")
+    aircraft.add_argument("--new", metavar="FOLDER", help="make a folder for an aircraft of your own")
+    aircraft.add_argument(
+        "--from", dest="source", metavar="NAME", help="with --new: the aircraft to begin with (default: aerosonde)"
+    )
     aircraft.add_argument("--motor-braking", action="store_true", help="let the motor brake in descents")
     overwrite_option(aircraft)
