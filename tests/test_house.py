@@ -22,7 +22,7 @@ OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
 COMMANDS = (
     *("run", "plan", "export", "fly", "check", "aircraft", "serve", "replay", "recover", "report", "compare", "paper"),
     *("campaign", "winds"),
-    *("import", "refly", "scenarios"),
+    *("import", "refly", "scenarios", "help", "completion"),
 )
 MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60
 KERNELS = {"compiled", "inlined"}

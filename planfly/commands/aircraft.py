@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_warnings
@@ -14,9 +15,12 @@ from world.atomic_files import write_whole
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from aircraft.catalog import Aircraft
     from aircraft.envelope import Envelope
     from flight.dynamics.characteristics import Mode, TrimRow
+    from planfly.terminal.answers.aircraft_answer import AircraftNumbers
 
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
@@ -36,6 +40,7 @@ def aircraft(args: argparse.Namespace) -> int:
         for name in aircraft_names():
             known = load_aircraft(name)
             print(f"{name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
+        give_answer(args, lambda: aircraft_answer([load_aircraft(name) for name in aircraft_names()]))
         return FLYABLE
     chosen, identity = _find(args.name)
     lacking = _check_steering(chosen)
@@ -43,13 +48,31 @@ def aircraft(args: argparse.Namespace) -> int:
     if args.out:
         refuse_folder(folder, args.overwrite)
     # Everything is worked out before anything is written.
-    pictures = _print_and_draw(chosen, identity, motor_braking=args.motor_braking)
+    numbers = _work_out(chosen, motor_braking=args.motor_braking)
+    pictures = _print_and_draw(chosen, identity, numbers)
     print_warnings(lacking)
     prepare_folder(folder, tuple(pictures))
     for name, data in pictures.items():
         write_whole(folder / name, data)
         print(f"picture   {folder / name}")
+    files = [str(folder / name) for name in pictures]
+    give_answer(args, lambda: aircraft_answer([chosen], numbers, identity, lacking, files))
     return FLYABLE
+
+
+def aircraft_answer(
+    chosen: "Sequence[Aircraft]",
+    numbers: "AircraftNumbers | None" = None,
+    identity: str = "",
+    lacking: "Sequence[str]" = (),
+    files: "Sequence[str]" = (),
+) -> object:
+    """Return what --json writes: of one aircraft with its numbers, or of several without."""
+    # Imported here: schemas take pydantic.
+    from planfly.terminal.answers.aircraft_answer import AircraftAnswer, aircraft_detail, aircraft_entry
+
+    detail = None if numbers is None else aircraft_detail(numbers, identity, lacking, files)
+    return AircraftAnswer(exit_code=FLYABLE, aircraft=[aircraft_entry(one, detail) for one in chosen])
 
 
 def _find(name: str) -> "tuple[Aircraft, str]":
@@ -74,6 +97,7 @@ def _make_folder(args: argparse.Namespace) -> int:
     files = make_own_folder(folder, source)
     shown = folder if folder.is_absolute() else f"./{folder}"
     print(f"aircraft  {shown}/ ({', '.join(files)}), as {source.name}")
+    give_answer(args, lambda: aircraft_answer([_find(str(folder.absolute()))[0]]))
     print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
     return FLYABLE
 
@@ -97,18 +121,24 @@ def _check_steering(chosen: "Aircraft") -> list[str]:
     return lacking
 
 
-def _print_and_draw(chosen: "Aircraft", identity: str, *, motor_braking: bool) -> dict[str, bytes]:
-    from flight.dynamics.characteristics import TRIM_AMSL, modes_at, step_responses, trim_table
+def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":
+    from flight.dynamics.characteristics import modes_at, step_responses, trim_table
     from flight.dynamics.envelope_tables import load_envelope
-    from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
-    from logs.figures.elements.style import png_bytes
+    from planfly.terminal.answers.aircraft_answer import AircraftNumbers
 
     with progress(f"trimming {chosen.name}"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
         trims = trim_table(chosen)
         modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
-        cruise = modes_at(chosen, chosen.airspeed)
-        steps = step_responses(chosen)
+        return AircraftNumbers(envelope, trims, modes, modes_at(chosen, chosen.airspeed), step_responses(chosen))
+
+
+def _print_and_draw(chosen: "Aircraft", identity: str, numbers: "AircraftNumbers") -> dict[str, bytes]:
+    from flight.dynamics.characteristics import TRIM_AMSL
+    from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
+    from logs.figures.elements.style import png_bytes
+
+    envelope, trims, modes, cruise, steps = numbers
     print(f"{chosen.name}: {chosen.title}")
     print(f"  model    {identity[:16]}")
     _print_limits(chosen, envelope)

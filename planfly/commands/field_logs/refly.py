@@ -10,6 +10,7 @@ from logs.report.refly_lines import refly_lines
 from logs.verdict.field.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from planfly.field.model_flight import fly_again
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.progress import progress
 from planfly.terminal.stored_logs import warn_of_loss
@@ -30,7 +31,8 @@ def refly(args: argparse.Namespace) -> int:
     with progress("flying again") as advance:
         again = fly_again(log.setup, log.track, args.aircraft, args.turbulence, advance)
     prepare_folder(folder, REFLY_FILES)
-    print("\n".join(refly_lines(again)))
+    lines = refly_lines(again)
+    print("\n".join(lines))
     with progress("drawing"):
         files = _draw(folder, again)
     files.append(_record(folder, again, log))
@@ -38,8 +40,15 @@ def refly(args: argparse.Namespace) -> int:
         print(f"refly     {file}")
     if not log.complete:
         warn_of_loss(log)
-        return LOSS
-    return FLYABLE
+    code = FLYABLE if log.complete else LOSS
+    give_answer(args, lambda: _answer(lines, files, code))
+    return code
+
+
+def _answer(lines: list[str], files: list[Path], code: int) -> object:
+    from planfly.terminal.answers.answer_data import ReflyAnswer
+
+    return ReflyAnswer(exit_code=code, lines=lines, files=[str(file) for file in files])
 
 
 def _draw(folder: Path, again: Reflight) -> list[Path]:
