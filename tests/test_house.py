@@ -101,7 +101,8 @@ def test_help_imports_nothing_heavy() -> None:
     code = (
         "import sys, contextlib, io\nfrom planfly.cli import main\n"
         "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n    main(['--help'])\n"
-        "print([name for name in ('numpy', 'numba', 'jsbsim', 'matplotlib', 'pydantic') if name in sys.modules])"
+        "print([name for name in ('numpy', 'numba', 'jsbsim', 'matplotlib', 'pydantic', 'pymavlink', 'rich',"
+        " 'argcomplete') if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT)
     assert result.stdout.strip() == "[]"

@@ -80,6 +80,8 @@ def _find(name: str) -> "tuple[Aircraft, str]":
     from aircraft.catalog import find_aircraft, model_hash
     from world.scenario_tables import names_folder
 
+    if names_folder(name) and not Path(name).exists():
+        raise PlanflyError(f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it")
     try:
         chosen = find_aircraft(str(Path(name).resolve()) if names_folder(name) else name)
         return chosen, model_hash(chosen)

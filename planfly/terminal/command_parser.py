@@ -47,7 +47,7 @@ class LineParser(CommandParser):
         super().__init__(
             prog="planfly",
             description=description,
-            epilog=f"example: {example}\n         planfly help run\n\n{EXIT_CODES}",
+            epilog=f"{example}\n\n{EXIT_CODES}",
         )
         self.add_argument("--version", action="version", version=f"planfly {version}")
         self.commands: dict[str, CommandParser] = {}

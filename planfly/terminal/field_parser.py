@@ -36,7 +36,9 @@ def add_field_commands(line: LineParser) -> None:
     )
     completed(refly.add_argument("log", metavar="FLIGHT.mcap", help="a flight log that import wrote"), files("mcap"))
     completed(
-        refly.add_argument("--aircraft", metavar="A", help="the aircraft that flies it again (default: the log's)"),
+        refly.add_argument(
+            "--aircraft", metavar="AIRCRAFT", help="the aircraft that flies it again (default: the log's)"
+        ),
         aircraft_words,
     )
     turbulence_option(refly)

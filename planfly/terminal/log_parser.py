@@ -18,7 +18,7 @@ def add_log_commands(line: LineParser) -> None:
     """``check``, ``replay``, ``recover``, ``report`` and ``compare``."""
     check = line.command(
         "check",
-        "judge a flight from its log, of the field too, or a mission file by its geometry, without flying",
+        "judge a flight from its log (planfly's, or one of the field), or a mission file by its geometry alone",
         "planfly check flight.mcap --json verdict.json",
         "planfly check mission.waypoints --terrain jacksboro --json -",
     )

@@ -27,6 +27,11 @@ from planfly.terminal.parser_options import (
     world_options,
 )
 
+_FIRST_STEPS = """\
+first steps:
+  planfly run jacksboro                        plan, fly, judge and report the demo
+  planfly fly mission.waypoints --terrain DEM  fly a mission of your own over your elevation file
+  planfly help fly                             all that a command takes"""
 _COMPLETION = """\
 to complete in this shell, and in those to come:
   bash   eval "$(planfly completion bash)", in ~/.bashrc
@@ -40,7 +45,7 @@ def build_parser() -> LineParser:
         __version__,
         "Will this plan really fly?  Plans a fixed-wing path over terrain and threats,\n"
         "flies it (or any mission file) in JSBSim, and gives a verdict with numbers.",
-        "planfly run jacksboro",
+        _FIRST_STEPS,
     )
     _add_run(line)
     _add_plan(line)
@@ -68,7 +73,7 @@ def _add_run(line: LineParser) -> None:
     _scenario(run, nargs="?", default="jacksboro", help="TOML file or embedded name (default: jacksboro)")
     planning = run.group("planning")
     planning.add_argument(
-        "--seed", metavar="N", type=seed, help="of planner and turbulence (default: the scenario's, or 1)"
+        "--seed", metavar="N", type=seed, help="seed of planner and turbulence (default: the scenario's, or 1)"
     )
     planning.add_argument(
         "--refine",
@@ -107,7 +112,7 @@ def _add_plan(line: LineParser) -> None:
     )
     _scenario(plan, help="TOML file or embedded name")
     planning = plan.group("planning")
-    planning.add_argument("--seed", metavar="N", type=seed, help="of the planner (default: the scenario's, or 1)")
+    planning.add_argument("--seed", metavar="N", type=seed, help="seed of the planner (default: the scenario's, or 1)")
     planning.add_argument(
         "--algorithm",
         metavar="A",
@@ -168,7 +173,7 @@ def _add_fly(line: LineParser) -> None:
     world_options(fly)
     flight_options(fly)
     log = fly.group("the log")
-    log.add_argument("--seed", metavar="N", type=seed, help="of the turbulence (default: the plan's, or 1)")
+    log.add_argument("--seed", metavar="N", type=seed, help="seed of the turbulence (default: the plan's, or 1)")
     log.add_argument(
         "--log", metavar="FILE", help="the flight log (default: runs/<mission>-seed<N>/flight.mcap, replaced)"
     )
@@ -247,7 +252,7 @@ def _add_own(line: LineParser) -> None:
         "help", "tell all of a command, or which commands there are", "planfly help fly", "planfly help fly --schema"
     )
     completed(
-        helping.add_argument("topic", metavar="COMMAND", nargs="?", help="of which (default: all of them)"),
+        helping.add_argument("topic", metavar="COMMAND", nargs="?", help="a command (default: all of them)"),
         lambda prefix, **_: [name for name in line.commands if name.startswith(prefix)],
     )
     helping.add_argument("--schema", action="store_true", help="the JSON schema of what the command's --json writes")

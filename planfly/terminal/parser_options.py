@@ -36,7 +36,7 @@ def world_options(parser: CommandParser) -> None:
     group = parser.group("where it flies")
     completed(
         group.add_argument(
-            "--scenario", metavar="S", help="judge within this scenario: a TOML file or an embedded name"
+            "--scenario", metavar="SCENARIO", help="judge within this scenario: a TOML file or an embedded name"
         ),
         scenario_words,
     )
@@ -66,7 +66,9 @@ def flown_by_options(parser: CommandParser) -> None:
     group = parser.group("what flies it, in which air")
     completed(
         group.add_argument(
-            "--aircraft", metavar="A", help="a name that planfly aircraft lists, or a folder (default: aerosonde)"
+            "--aircraft",
+            metavar="AIRCRAFT",
+            help="a name that planfly aircraft lists, or a folder (default: aerosonde)",
         ),
         aircraft_words,
     )

@@ -69,7 +69,8 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
     ("argv", "printed"),
     [
         (["zeppelin"], "no aircraft called 'zeppelin'"),
-        (["./nowhere"], "nowhere.toml: No such file"),
+        (["./nowhere"], "./nowhere: no such folder; planfly aircraft --new ./nowhere makes it"),
+        (["./full"], "full.toml: No such file"),
         (["c172x", "--motor-braking"], "motor/braking is needed and not defined"),
         (["aerosonde", "--out", "full"], "exists and is not empty"),
         (["aerosond"], "did you mean 'aerosonde'?"),
