@@ -11,6 +11,7 @@ from typing import Any
 
 from aircraft.jsbsim_model import OURS, Model, read_model
 from world.scenario_tables import names_folder
+from world.text_files import did_you_mean
 
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
@@ -81,15 +82,16 @@ class Aircraft:
     @property
     def model_file(self) -> Path:
         """The JSBSim model."""
-        folder = jsbsim_folder() / "aircraft" / self.name if self.model.shipped else self.folder
-        return folder / f"{self.name}.xml"
+        if shipped := self.model.shipped:
+            return jsbsim_folder() / "aircraft" / shipped / f"{shipped}.xml"
+        return self.folder / f"{self.name}.xml"
 
     @property
     def model_folders(self) -> tuple[Path, ...]:
         """Where the files that the model brings in may stand."""
         if self.model.shipped:
             root = jsbsim_folder()
-            return (root / "aircraft" / self.name, root / "engine", root / "systems")
+            return (root / "aircraft" / self.model.shipped, root / "engine", root / "systems")
         inner = ("Engines", "engine", "Systems", "systems")
         return (self.folder, *(self.folder / name for name in inner))
 
@@ -125,7 +127,10 @@ def load_aircraft(name: str) -> Aircraft:
     """
     known = aircraft_names()
     if name not in known:
-        raise ValueError(f"no aircraft called {name!r}: known are {', '.join(known)}")
+        near = did_you_mean(name, known)
+        # A folder's name alone is not how it is named.
+        near = near or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
+        raise ValueError(f"no aircraft called {name!r}{near} (known are {', '.join(known)}, and folders, with a slash)")
     return read_aircraft(_ROOT / name)
 
 
@@ -156,7 +161,7 @@ def read_aircraft(folder: Path) -> Aircraft:
     if not isinstance(title, str):
         raise ValueError(f"{file}: title = {title!r} is not a text")
     try:
-        model = read_model(table.pop("model")) if "model" in table else OURS
+        model = read_model(table.pop("model"), folder.name) if "model" in table else OURS
         values = _numbers(table)
     except ValueError as error:
         raise ValueError(f"{file}: {error}") from None
@@ -171,10 +176,14 @@ def read_aircraft(folder: Path) -> Aircraft:
 def _numbers(table: dict[str, Any]) -> dict[str, float]:
     """The numeric fields of `Aircraft`; ValueError without the file's name."""
     store = _FUEL if set(_FUEL) & table.keys() else _BATTERY
-    if missing := sorted({*_KEYS, *store} - table.keys()):
+    allowed = {*_KEYS, *store}
+    missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
+    near = did_you_mean(unknown[0], missing) if unknown else ""
+    # A key that is mistaken is missing, too: the mistake tells more.
+    if missing and not near:
         raise ValueError(f"missing {', '.join(missing)}")
-    if unknown := sorted(table.keys() - {*_KEYS, *store}):
-        raise ValueError(f"unknown key {', '.join(unknown)}")
+    if unknown:
+        raise ValueError(f"unknown key {', '.join(unknown)}{near}")
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
             raise ValueError(f"{key} = {value!r} is not a positive number")

@@ -1,10 +1,14 @@
 """The JSBSim properties of a model: those behind the four commands, and those that are read back."""
 
 import math
+import re
 from dataclasses import dataclass
 from typing import Any
 
+from world.text_files import did_you_mean
+
 _COMMANDS = ("elevator", "aileron", "rudder", "throttle")
+_PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _READINGS = (*_COMMANDS, "current", "power")
 
 
@@ -32,20 +36,20 @@ class Reading:
 class Model:
     """The properties of a JSBSim model, and what kind of model it is.
 
-    shipped: its file stands in JSBSim's own aircraft folder.
+    shipped: the name of the model of JSBSim's own that it is; "" for one whose file stands in the aircraft's folder.
     settles: its engine has a speed of its own, runs from the start and settles before anything is measured.
     commands: elevator, aileron, rudder, throttle.
     readings: the same four, then battery current (A) and power (W).
     """
 
-    shipped: bool
+    shipped: str
     settles: bool
     commands: tuple[CommandProperty, ...]
     readings: tuple[Reading, ...]
 
 
 OURS = Model(
-    shipped=False,
+    shipped="",
     settles=False,
     commands=(
         *(CommandProperty(f"command/{name}-rad", 1.0, 1.0) for name in _COMMANDS[:3]),
@@ -60,8 +64,10 @@ OURS = Model(
 )
 
 
-def read_model(table: object) -> Model:
+def read_model(table: object, aircraft: str) -> Model:
     """Return the model of a metadata file's ``[model]`` table.
+
+    aircraft: its name, which is that of JSBSim's own model where the table does not name another.
 
     Raises ValueError, in one line that begins with the key, for an unknown, missing or bad entry.
     """
@@ -84,15 +90,25 @@ def read_model(table: object) -> Model:
         else:
             prop, factor = _entry(readings[name], f"model.reading.{name}", 1)
             read.append(Reading(prop, factor))
-    shipped, settles = (_truth(table, name) for name in ("shipped_by_jsbsim", "engine_settles"))
-    return Model(shipped, settles, tuple(made), tuple(read))
+    return Model(_shipped(table, aircraft), _truth(table, "engine_settles"), tuple(made), tuple(read))
 
 
 def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
     if not isinstance(value, dict):
         raise ValueError(f"{key} = {value!r} is not a table")
     if unknown := sorted(value.keys() - set(known)):
-        raise ValueError(f"{key}: unknown key {', '.join(unknown)}")
+        near = did_you_mean(unknown[0], sorted(set(known) - value.keys()))
+        raise ValueError(f"{key}: unknown key {', '.join(unknown)}{near}")
+    return value
+
+
+def _shipped(table: dict[str, Any], aircraft: str) -> str:
+    """The name of JSBSim's own model; it names a folder, and must not lead out of JSBSim's."""
+    value = table.get("shipped_by_jsbsim", False)
+    if isinstance(value, bool):
+        return aircraft if value else ""
+    if not isinstance(value, str) or _PLAIN.fullmatch(value) is None:
+        raise ValueError(f"model.shipped_by_jsbsim = {value!r} is not true, false or the name of a model of JSBSim's")
     return value
 
 

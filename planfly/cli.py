@@ -1,9 +1,12 @@
 """The command line: arguments in, one line for an error, an exit code out.  Heavy imports wait for the command."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 
+from planfly.terminal.colour import coloured
+from planfly.terminal.completion import ASKS_COMPLETION, answer_shell
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.output import open_standard_streams, printable, tolerate_closed_output
 from planfly.terminal.parser import build_parser
@@ -19,6 +22,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if argv is not None:
         return _outcome(argv)
     open_standard_streams()
+    if ASKS_COMPLETION in os.environ:
+        answer_shell(build_parser())
     with ended_by_signals() as heard:
         try:
             code = _outcome(argv)
@@ -47,17 +52,18 @@ def _outcome(argv: Sequence[str] | None) -> int:
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
     from planfly.commands.registry import find_command
+    from planfly.terminal.answers.giving import asked_output
     from world.errors import PlanflyError
 
     try:
-        with tolerate_closed_output():
+        with tolerate_closed_output(), asked_output(args):
             return find_command(args.command)(args)
     except PlanflyError as error:
         return _fail(BAD_INPUT, error)
 
 
 def _fail(code: int, message: object) -> int:
-    print(f"planfly: {printable(str(message))}", file=sys.stderr)
+    print(coloured(f"planfly: {printable(str(message))}", "bad", sys.stderr), file=sys.stderr)
     return code
 
 

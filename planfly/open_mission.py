@@ -16,6 +16,7 @@ from planfly.pipeline import make_setup
 from planner.plan import Plan, read_plan
 from world.errors import MissionError, PlanflyError
 from world.scenario import Scenario, load_scenario
+from world.text_files import did_you_mean
 
 MCAP_MAGIC = b"\x89MCAP"
 
@@ -85,7 +86,8 @@ def open_mission(
         return fences.on_scenario(change(scenario))
 
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected")
+        near = did_you_mean(path.name, _mission_names(path.parent))
+        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}")
     if path.suffix.lower() == ".json":
         return _open_planned(path, scenario_name, terrain, seed, changed, fences)
     mission = fences.on_mission(read_mission(path))
@@ -98,6 +100,14 @@ def open_mission(
     airframe = load_airframe(scenario)
     number = choose_seed(scenario, seed)
     return OpenedMission(make_setup(scenario, airframe, mission, number, placed=placed), airframe, path.stem)
+
+
+def _mission_names(folder: Path) -> list[str]:
+    """Names of the files in a folder that may hold missions."""
+    try:
+        return sorted(file.name for file in folder.iterdir() if file.suffix in (".json", ".waypoints", ".plan", ".txt"))
+    except OSError:
+        return []
 
 
 def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _unchanged) -> OpenedPlan:

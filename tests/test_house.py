@@ -22,7 +22,7 @@ OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
 COMMANDS = (
     *("run", "plan", "export", "fly", "check", "aircraft", "serve", "replay", "recover", "report", "compare", "paper"),
     *("campaign", "winds"),
-    *("import", "refly", "scenarios"),
+    *("import", "refly", "scenarios", "help", "completion"),
 )
 MOST_FILES, MOST_LINES, LONGEST = 20, 320, 60
 KERNELS = {"compiled", "inlined"}
@@ -101,7 +101,8 @@ def test_help_imports_nothing_heavy() -> None:
     code = (
         "import sys, contextlib, io\nfrom planfly.cli import main\n"
         "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n    main(['--help'])\n"
-        "print([name for name in ('numpy', 'numba', 'jsbsim', 'matplotlib', 'pydantic') if name in sys.modules])"
+        "print([name for name in ('numpy', 'numba', 'jsbsim', 'matplotlib', 'pydantic', 'pymavlink', 'rich',"
+        " 'argcomplete') if name in sys.modules])"
     )
     result = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT)
     assert result.stdout.strip() == "[]"

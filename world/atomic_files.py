@@ -4,7 +4,7 @@ import contextlib
 import fcntl
 import os
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from world.errors import PlanflyError
@@ -37,6 +37,29 @@ def write_whole(path: Path, data: str | bytes) -> None:
         if error.errno is None:
             raise
         # The user knows the target, not the temporary name.
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
+    """Make a folder that is not there yet, with files by their paths within it: whole, or not at all.
+
+    Raises OSError, which names the folder, and leaves nothing.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as home:
+    ...     write_folder(Path(home) / "made", {"a.txt": b"1", "b/c.txt": b"2"})
+    ...     print((Path(home) / "made" / "b" / "c.txt").read_text())
+    2
+    """
+    temporary = path.with_name(f".{path.name[:50]}.{os.getpid()}-{os.urandom(4).hex()}")
+    try:
+        with uninterrupted(), unfinished(temporary):
+            temporary.mkdir()
+            for name, content in files.items():
+                (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+                (temporary / name).write_bytes(content)
+            temporary.rename(path)
+    except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
 
 

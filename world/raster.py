@@ -26,6 +26,7 @@ from world.raster_file import (
     outline,
 )
 from world.terrain import Terrain
+from world.text_files import did_you_mean
 
 __all__ = ["EMBEDDED", "MOST_PIXELS", "RasterFile", "open_raster", "read_terrain", "tile_bounds"]
 
@@ -65,7 +66,10 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     file = Path(path) if base is None else base / path
     if not file.is_file():
         known = ", ".join(sorted(EMBEDDED))
-        raise TerrainError(f"{file}: terrain path: no such file (a .tif, .hgt or .npz file, or one of: {known})")
+        raise TerrainError(
+            f"{file}: terrain path: no such file (a .tif, .hgt or .npz file, or one of: {known})"
+            f"{did_you_mean(path, EMBEDDED)}"
+        )
     try:
         with file.open("rb") as handle:
             head = handle.read(4)

@@ -29,6 +29,7 @@ from world.scenario_tables import (
     names_folder,
 )
 from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
+from world.text_files import did_you_mean
 from world.threats import Threats
 from world.wind import Wind
 
@@ -121,9 +122,18 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
     except OSError:  # a name that is too long
         missing = True
     if missing:
-        raise ScenarioError(f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)})")
+        near = did_you_mean(name_or_path, [*known, *_files_beside(path)])
+        raise ScenarioError(f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)}){near}")
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
+
+
+def _files_beside(path: Path) -> list[str]:
+    """Scenario files where one was looked for, as it was named."""
+    try:
+        return [str(file) for file in sorted(path.parent.glob("*.toml"))]
+    except OSError:
+        return []
 
 
 def embedded_names() -> list[str]:

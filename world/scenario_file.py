@@ -3,15 +3,15 @@
 import json
 import math
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
 from world.errors import ScenarioError
 from world.scenario_tables import ScenarioFile
-from world.text_files import read_small_file
+from world.text_files import did_you_mean, read_small_file
 
 Table = TypeVar("Table", bound=BaseModel)
 
@@ -45,7 +45,7 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
     try:
         return ScenarioFile.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{source}: {first_error(error, data)}") from error
+        raise ScenarioError(f"{source}: {first_error(error, data, ScenarioFile)}") from error
 
 
 def checked_table(make: Callable[[], Table], source: str) -> Table:
@@ -65,10 +65,11 @@ def read_scenario_text(path: Path) -> str:
         raise ScenarioError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
 
 
-def first_error(error: ValidationError, data: Any = None) -> str:
+def first_error(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> str:
     """First of the faults that pydantic found, as ``key: value: what is allowed``.
 
     data: what was checked; needed where a field takes more than one type, to tell its keys from pydantic's branches.
+    model: what it was checked as; needed to name the key that an unknown one may stand for.
 
     >>> from pydantic import ValidationError
     >>> from world.scenario_tables import WindTable
@@ -79,14 +80,16 @@ def first_error(error: ValidationError, data: Any = None) -> str:
     speed_mps: 41.0: allowed 0..40
     """
     found = error.errors(include_url=False)
-    first = found[0]
+    # A key that is mistaken is missing, too: the mistake tells more.
+    mistaken = [item for item in found if item["type"] == "extra_forbidden" and _near(item["loc"], model)]
+    first = (mistaken or found)[0]
     keys = [str(part) for part in (first["loc"] if data is None else _keys_found(first["loc"], data))]
     # Of a check of ours the message is that of the error that it raised.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
     value = first.get("input")
     shown = "" if isinstance(value, dict | list) else f": {_shown(value)}"
     if first["type"] == "extra_forbidden":
-        message = "unknown key"
+        message = f"unknown key{_near(first['loc'], model)}"
         shown = ""
     if first["type"] == "missing":
         shown = ""
@@ -94,6 +97,28 @@ def first_error(error: ValidationError, data: Any = None) -> str:
     more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
     named = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
     return f"{named or 'file'}{shown}: {message}{more}"
+
+
+def _near(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:
+    """Which key an unknown one may stand for, in words."""
+    return "" if model is None else did_you_mean(str(parts[-1]), _keys_known(parts[:-1], model))
+
+
+def _keys_known(parts: Sequence[str | int], model: type[BaseModel]) -> list[str]:
+    """Keys that a model knows in the table at a place, or in any below its first key."""
+    table = model.model_fields.get(str(parts[0])) if parts else None
+    if table is None:
+        return list(model.model_fields)
+    tables = [table.annotation]
+    keys: list[str] = []
+    # Grows as it is walked: a table's fields may be tables, in lists and unions.
+    for kind in tables:
+        tables += [arg for arg in get_args(kind) if arg not in tables]
+        if isinstance(kind, type) and issubclass(kind, BaseModel):
+            keys += kind.model_fields
+            inner = (field.annotation for field in kind.model_fields.values())
+            tables += [annotation for annotation in inner if annotation not in tables]
+    return keys
 
 
 def _keys_found(parts: tuple[str | int, ...], data: Any) -> list[str | int]:

@@ -1,5 +1,6 @@
 """Small text files that a person names: missions, parameters, scenarios."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 from world.errors import PlanflyError
@@ -39,3 +40,17 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
     except UnicodeDecodeError as problem:
         line = data.count(b"\n", 0, problem.start) + 1
         raise error(f"{path}:{line}: not a text file in UTF-8 (byte {problem.start})") from problem
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """What a message says after a name or key that is not known: the nearest that is, "" where none is near.
+
+    >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
+    (": did you mean 'jacksboro'?", '')
+    """
+    # Imported here: most runs have no fault to tell.
+    from difflib import get_close_matches
+
+    by_folded = {one.casefold(): one for one in known}
+    near = get_close_matches(name.casefold(), by_folded, n=1)
+    return f": did you mean {by_folded[near[0]]!r}?" if near else ""

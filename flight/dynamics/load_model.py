@@ -1,13 +1,17 @@
 """Loads an aircraft's model into a JSBSim instance, from a checked copy."""
 
+import itertools
 from pathlib import Path
 from typing import Any
 
 from aircraft.catalog import Aircraft
-from flight.dynamics.jsbsim_properties import FLAT_PLANET
+from flight.dynamics.jsbsim_properties import FLAT_PLANET, POUND
 from flight.dynamics.model_check import check_model
 from flight.dynamics.model_trial import try_model
 from world.errors import FlightError
+
+# How far a stated mass may be from the model's, as a share of it.
+MASS_TOLERANCE = 0.01
 
 
 def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool) -> None:
@@ -23,14 +27,16 @@ def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat
         aircraft.model_file,
         instance.get_property_manager().hasNode,
         aircraft.model_folders,
-        shipped=aircraft.model.shipped,
+        shipped=bool(aircraft.model.shipped),
     )
     if not tried:
         try_model(aircraft)
     folder = copy / aircraft.name
     folder.mkdir()
     for name, data in files.items():
-        (folder / name).write_bytes(data)
+        # JSBSim looks for the folder's name.
+        own = f"{aircraft.name}.xml" if name == aircraft.model_file.name else name
+        (folder / own).write_bytes(data)
     instance.set_aircraft_path(str(copy))
     instance.set_engine_path(str(folder))
     instance.set_systems_path(str(folder))
@@ -47,3 +53,19 @@ def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat
         raise FlightError(f"{aircraft.model_file}: JSBSim: {message}") from None
     if not loaded:
         raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model")
+    _check_mass(instance, aircraft)
+
+
+def _check_mass(instance: Any, aircraft: Aircraft) -> None:
+    """Refuse a stated mass that is not the model's, fuel included.  Raises FlightError."""
+    known = instance.get_property_manager().hasNode
+    tanks = itertools.takewhile(known, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count()))
+    # JSBSim adds its fuel when it first runs.
+    pounds = sum(map(instance.get_property_value, tanks), instance.get_property_value("inertia/weight-lbs"))
+    mass = pounds * POUND
+    if not abs(aircraft.mass - mass) <= MASS_TOLERANCE * mass:
+        raise FlightError(
+            f"{aircraft.folder / aircraft.name}.toml: mass_kg = {aircraft.mass:g}: the model"
+            f" {aircraft.model_file.name} has {mass:.5g} kg with its fuel; the two may differ by"
+            f" {100.0 * MASS_TOLERANCE:g} %"
+        )

@@ -9,6 +9,9 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from world.errors import FlightError
 from world.kernels import Record, record_dtype
+from world.text_files import did_you_mean
+
+GAINS_FILE = "gains.toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,8 +139,13 @@ _UNITS = {
 
 
 def load_gains(aircraft: Aircraft) -> Gains:
-    """Read the gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry."""
-    file = aircraft.folder / "gains.toml"
+    """Read the gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> load_gains(load_aircraft("aerosonde")).reference_airspeed
+    25.0
+    """
+    file = aircraft.folder / GAINS_FILE
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
@@ -156,5 +164,6 @@ def load_gains(aircraft: Aircraft) -> Gains:
     if missing or unknown:
         raise FlightError(
             f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
+            f"{did_you_mean(unknown[0], sorted(known - set(values))) if unknown else ''}"
         )
     return Gains(**values)

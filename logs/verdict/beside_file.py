@@ -29,9 +29,10 @@ class _Place(_Table):
     index: int | None
     item: int | None
     name: str
+    to_item: int | None = None
 
     def place(self) -> Place:
-        return Place(self.kind, self.index, self.item, self.name)
+        return Place(self.kind, self.index, self.item, self.name, self.to_item)
 
 
 class _Airframe(_Table):

@@ -62,7 +62,7 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     >>> route = make_route(mission, scenario.origin, scenario.terrain, 25.0, False, limits)
     >>> verdict = judge_geometry(FlightSetup(scenario, mission, "", route, limits, "aerosonde", 888.0, seed=1))
     >>> verdict.headline
-    'not flyable: slope on leg 0 (14.5° > 14.2°)'
+    'not flyable: slope on leg 0, to item 1 (14.5° > 14.2°)'
     >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]
     [['airspeed'], ['rise'], ['length']]
     """

@@ -3,7 +3,7 @@
 `logs.verdict.wording` makes words of it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 # "flight", "mission" and "plan" are the whole of it; "missile" and "radar" are a threat's two spheres; "exclusion" and
@@ -31,15 +31,20 @@ class Place:
     mission's fence after the scenario's; None for the whole.
     item: number of the mission item that a waypoint comes from, or that a check names; None where there is none.
     name: that the scenario gives the threat or the zone; "" where it gives none, and for every other kind.
+    to_item: of a leg, the mission item that it leads to, None where it leads to none; a mission that jumps has several
+    legs to one item.  It is no part of what makes two places the same: the index is enough, and older logs have none.
 
     >>> Place("waypoint", 3, item=4)
-    Place(kind='waypoint', index=3, item=4, name='')
+    Place(kind='waypoint', index=3, item=4, name='', to_item=None)
+    >>> Place("leg", 3, to_item=5) == Place("leg", 3)
+    True
     """
 
     kind: PlaceKind
     index: int | None = None
     item: int | None = None
     name: str = ""
+    to_item: int | None = field(default=None, compare=False)
 
 
 FLIGHT, MISSION, PLAN = Place("flight"), Place("mission"), Place("plan")

@@ -81,7 +81,7 @@ def slope_suggestions(demands: RouteDemands, leg: int, item: Finding) -> tuple[S
     allowed = limit - BUFFER_ANGLE
     if allowed <= 0.0 or planned <= allowed:
         return _gentler_arc(demands, leg)
-    place, sign = Place("leg", leg), 1.0 if demands.slopes[leg] >= 0.0 else -1.0
+    place, sign = demands.leg(leg), 1.0 if demands.slopes[leg] >= 0.0 else -1.0
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
     alternatives: list[_Sized] = []
     if gentler >= LEAST_RISE:
@@ -107,7 +107,7 @@ def _gentler_arc(demands: RouteDemands, leg: int) -> tuple[Suggestion, ...]:
         # A leg that goes the other way makes the arc flatter, and stays.
         if rise * steep.tangent > 0.0:
             wanted = math.copysign(math.floor(abs(rise)), rise)
-            changes.append(Change("rise", Place("leg", k), None, wanted, "m"))
+            changes.append(Change("rise", demands.leg(k), None, wanted, "m"))
     return (tuple(changes),) if changes else ()
 
 
@@ -141,7 +141,7 @@ def _longer_legs(demands: RouteDemands, i: int) -> list[_Sized]:
     for leg, needed in ((i - 1, before), (i, after)):
         run = float(demands.runs[leg])
         if math.isfinite(needed) and needed > run:
-            changes.append(Change("length", Place("leg", leg), run, float(math.ceil(needed)), "m"))
+            changes.append(Change("length", demands.leg(leg), run, float(math.ceil(needed)), "m"))
             grown = max(grown, needed / run - 1.0)
     return [(grown, tuple(changes))] if changes else []
 

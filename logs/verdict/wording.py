@@ -16,8 +16,8 @@ def place_text(place: Place) -> str:
 
     >>> [place_text(place) for place in (Place("waypoint", 3, item=4), Place("missile", 0, name="Alfa"), Place("plan"))]
     ['waypoint 3 (item 4)', 'Alfa (missile)', 'plan']
-    >>> place_text(Place("exclusion", 0, name="town"))
-    'town (exclusion)'
+    >>> place_text(Place("exclusion", 0, name="town")), place_text(Place("leg", 7, to_item=9))
+    ('town (exclusion)', 'leg 7, to item 9')
     """
     match place:
         case Place("mission", item=int(item)):
@@ -26,11 +26,18 @@ def place_text(place: Place) -> str:
             return f"{threat_text(place)} ({place.kind})"
         case Place("exclusion" | "inclusion"):
             return f"{place.name} ({place.kind})"
+        case Place("leg", index=int(index), to_item=int(item)):
+            return f"leg {index}, to item {item}"
         case Place(kind, index=int(index), item=int(item)):
             return f"{kind} {index} (item {item})"
         case Place(kind, index=int(index)):
             return f"{kind} {index}"
     return place.kind
+
+
+def _place_within(place: Place) -> str:
+    """A place with words after it: what says which leg it is stands between commas."""
+    return place_text(place) + ("," if place.to_item is not None else "")
 
 
 def threat_text(place: Place) -> str:
@@ -53,17 +60,17 @@ def change_text(change: Change) -> str:
     'pass town 40 m further north'
     >>> change_text(Change("descent", Place("leg", 3), None, 12.0, "m"))
     'fly leg 3 12 m lower'
+    >>> change_text(Change("descent", Place("leg", 3, to_item=5), None, 12.0, "m"))
+    'fly leg 3, to item 5, 12 m lower'
     """
-    where, wanted = place_text(change.place), change.wanted
+    where, wanted = _place_within(change.place), change.wanted
     match change.what:
         case "length":
             return f"make {_length(change)}"
         case "rise":
-            verb = "climb" if math.copysign(1.0, wanted) > 0.0 else "fall"
-            instead = "" if change.current is None else f" instead of {abs(change.current):.0f} m"
-            return f"{verb} {abs(wanted):.0f} m on {where}{instead}"
+            return _rise(change)
         case "airspeed" if change.most is not None:
-            return f"command {wanted:.1f} to {change.most:.1f} m/s on {where}"
+            return f"command {wanted:.1f} to {change.most:.1f} m/s on {place_text(change.place)}"
         case "airspeed":
             return f"fly it at {wanted:g} m/s instead of {change.current:g} m/s"
         case "turn":
@@ -84,10 +91,17 @@ def change_text(change: Change) -> str:
             return f"take a {change.what} {wanted:.2f} times as large"
 
 
+def _rise(change: Change) -> str:
+    verb = "climb" if math.copysign(1.0, change.wanted) > 0.0 else "fall"
+    if change.current is None:
+        return f"{verb} {abs(change.wanted):.0f} m on {place_text(change.place)}"
+    return f"{verb} {abs(change.wanted):.0f} m on {_place_within(change.place)} instead of {abs(change.current):.0f} m"
+
+
 def _length(change: Change) -> str:
     current = change.current or 0.0
     instead = "; it goes nowhere now" if current < ON_THE_SPOT else f" instead of {current:.0f} m"
-    return f"{place_text(change.place)} {change.wanted:.0f} m long{instead}"
+    return f"{_place_within(change.place)} {change.wanted:.0f} m long{instead}"
 
 
 def suggestion_text(suggestion: Suggestion) -> str:
@@ -123,7 +137,7 @@ def disagreement_text(one: Disagreement) -> str:
     'speed at leg 0 passes by geometry and fails in flight'
     """
     verbs = {True: "passes", False: "fails"}
-    where = f"{one.rule} at {place_text(one.place)}"
+    where = f"{one.rule} at {_place_within(one.place)}"
     return f"{where} {verbs[one.there]} {_BY_LEVEL[one.level]} and {verbs[one.here]} in flight"
 
 

@@ -1,20 +1,26 @@
-"""``planfly aircraft``: mass, trims, modes, envelope and step responses of an aircraft, as tables and as pictures."""
+"""``planfly aircraft``: an aircraft as tables and as pictures, or a folder for one of one's own."""
 
 import argparse
 import math
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.progress import progress
+from planfly.terminal.results import print_warnings
 from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
 from world.atomic_files import write_whole
 from world.errors import PlanflyError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from aircraft.catalog import Aircraft
     from aircraft.envelope import Envelope
     from flight.dynamics.characteristics import Mode, TrimRow
+    from planfly.terminal.answers.aircraft_answer import AircraftNumbers
 
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
@@ -23,44 +29,118 @@ _WIND = 10.0
 
 
 def aircraft(args: argparse.Namespace) -> int:
-    """List the embedded aircraft, or print and draw the one that is named."""
-    from aircraft.catalog import aircraft_names, find_aircraft, load_aircraft, model_hash
-    from world.scenario_tables import names_folder
+    """List the embedded aircraft, print and draw the one that is named, or make a folder for a new one."""
+    from aircraft.catalog import aircraft_names, load_aircraft
 
+    if args.new is not None:
+        return _make_folder(args)
+    if args.source is not None:
+        raise PlanflyError("--from: goes with --new FOLDER, the folder to make")
     if args.name is None:
         for name in aircraft_names():
             known = load_aircraft(name)
             print(f"{name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
+        give_answer(args, lambda: aircraft_answer([load_aircraft(name) for name in aircraft_names()]))
         return FLYABLE
-    try:
-        chosen = find_aircraft(str(Path(args.name).resolve()) if names_folder(args.name) else args.name)
-        identity = model_hash(chosen)
-    except ValueError as error:
-        raise PlanflyError(str(error)) from error
+    chosen, identity = _find(args.name)
+    lacking = _check_steering(chosen)
     folder = Path(args.out) if args.out else RESULTS / f"aircraft-{chosen.name}"
     if args.out:
         refuse_folder(folder, args.overwrite)
     # Everything is worked out before anything is written.
-    pictures = _print_and_draw(chosen, identity, motor_braking=args.motor_braking)
+    numbers = _work_out(chosen, motor_braking=args.motor_braking)
+    pictures = _print_and_draw(chosen, identity, numbers)
+    print_warnings(lacking)
     prepare_folder(folder, tuple(pictures))
     for name, data in pictures.items():
         write_whole(folder / name, data)
         print(f"picture   {folder / name}")
+    files = [str(folder / name) for name in pictures]
+    give_answer(args, lambda: aircraft_answer([chosen], numbers, identity, lacking, files))
     return FLYABLE
 
 
-def _print_and_draw(chosen: "Aircraft", identity: str, *, motor_braking: bool) -> dict[str, bytes]:
-    from flight.dynamics.characteristics import TRIM_AMSL, modes_at, step_responses, trim_table
+def aircraft_answer(
+    chosen: "Sequence[Aircraft]",
+    numbers: "AircraftNumbers | None" = None,
+    identity: str = "",
+    lacking: "Sequence[str]" = (),
+    files: "Sequence[str]" = (),
+) -> object:
+    """Return what --json writes: of one aircraft with its numbers, or of several without."""
+    # Imported here: schemas take pydantic.
+    from planfly.terminal.answers.aircraft_answer import AircraftAnswer, aircraft_detail, aircraft_entry
+
+    detail = None if numbers is None else aircraft_detail(numbers, identity, lacking, files)
+    return AircraftAnswer(exit_code=FLYABLE, aircraft=[aircraft_entry(one, detail) for one in chosen])
+
+
+def _find(name: str) -> "tuple[Aircraft, str]":
+    """The aircraft of a name or in a folder, and the hash of its model.  Raises PlanflyError."""
+    from aircraft.catalog import find_aircraft, model_hash
+    from world.scenario_tables import names_folder
+
+    if names_folder(name) and not Path(name).exists():
+        raise PlanflyError(f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it")
+    try:
+        chosen = find_aircraft(str(Path(name).resolve()) if names_folder(name) else name)
+        return chosen, model_hash(chosen)
+    except ValueError as error:
+        raise PlanflyError(str(error)) from error
+
+
+def _make_folder(args: argparse.Namespace) -> int:
+    from aircraft.own_folder import make_own_folder
+
+    if args.name is not None:
+        raise PlanflyError(f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with")
+    folder = Path(args.new)
+    source, _ = _find(args.source or "aerosonde")
+    files = make_own_folder(folder, source)
+    shown = folder if folder.is_absolute() else f"./{folder}"
+    print(f"aircraft  {shown}/ ({', '.join(files)}), as {source.name}")
+    give_answer(args, lambda: aircraft_answer([_find(str(folder.absolute()))[0]]))
+    print(f"next      planfly aircraft {shlex.quote(str(shown))}, and --aircraft {shlex.quote(str(shown))} flies it")
+    return FLYABLE
+
+
+def _check_steering(chosen: "Aircraft") -> list[str]:
+    """What lacks for a flight; raises PlanflyError for gains, parameters or servos that are there and broken."""
+    from flight.ardupilot.parameters import load_parameters
+    from flight.guidance.gains import GAINS_FILE, load_gains
+    from flight.real_autopilot.servo_map import SERVO_FILE, load_servo_map
+
+    load_parameters(chosen)
+    lacking = []
+    if (chosen.folder / GAINS_FILE).exists():
+        load_gains(chosen)
+    else:
+        lacking.append(f"{chosen.folder / GAINS_FILE}: missing: {chosen.name} does not fly without gains")
+    if (chosen.folder / SERVO_FILE).exists():
+        load_servo_map(chosen)
+    else:
+        lacking.append(f"{chosen.folder / SERVO_FILE}: missing: --autopilot needs to know which servo moves what")
+    return lacking
+
+
+def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":
+    from flight.dynamics.characteristics import modes_at, step_responses, trim_table
     from flight.dynamics.envelope_tables import load_envelope
-    from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
-    from logs.figures.elements.style import png_bytes
+    from planfly.terminal.answers.aircraft_answer import AircraftNumbers
 
     with progress(f"trimming {chosen.name}"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
         trims = trim_table(chosen)
         modes = {row.trim.airspeed: modes_at(chosen, row.trim.airspeed) for row in trims}
-        cruise = modes_at(chosen, chosen.airspeed)
-        steps = step_responses(chosen)
+        return AircraftNumbers(envelope, trims, modes, modes_at(chosen, chosen.airspeed), step_responses(chosen))
+
+
+def _print_and_draw(chosen: "Aircraft", identity: str, numbers: "AircraftNumbers") -> dict[str, bytes]:
+    from flight.dynamics.characteristics import TRIM_AMSL
+    from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
+    from logs.figures.elements.style import png_bytes
+
+    envelope, trims, modes, cruise, steps = numbers
     print(f"{chosen.name}: {chosen.title}")
     print(f"  model    {identity[:16]}")
     _print_limits(chosen, envelope)

@@ -20,6 +20,7 @@ from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import campaign_lines
 from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.storage.store import DATABASE
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, INTERRUPTED, LOSS, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planner.plan import plan_json
@@ -44,6 +45,8 @@ def campaign(args: argparse.Namespace) -> int:
     if base.plan is not None and not (folder / "plan.json").exists():
         keep_plan(base, folder)
     if args.refly is not None:
+        if args.json:
+            raise PlanflyError("--json: goes with a campaign, not with --refly")
         return _refly(base, goal, folder, args.refly)
     return _fly(args, base, goal, folder)
 
@@ -61,6 +64,7 @@ def _fly(args: argparse.Namespace, base: CampaignBase, goal: Goal, folder: Path)
         summary = finish_campaign(base, goal, estimate, folder, command_line(args), advance)
     print("\n".join(campaign_lines(summary)))
     print(f"results   {folder}/ (report.html, summary.json, {DATABASE}, worst/)")
+    give_answer(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))
     return _EXITS[estimate.answer]
 
 

@@ -6,14 +6,15 @@ from pathlib import Path
 
 from logs.field_logs.readers.open_log import is_field_log
 from logs.recording.reader import FlightLog, read_log
+from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_geometry
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import is_log, open_mission
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.results import print_verdict, print_warnings, write_verdict
+from planfly.terminal.results import print_verdict, print_warnings
 from planfly.terminal.scenario_options import scenario_change
 from planfly.terminal.stored_logs import judge_log, warn_of_loss
-from planfly.terminal.targets import refuse_existing
 from world.errors import ScenarioError
 from world.scenario_variants import over_terrain
 
@@ -21,13 +22,10 @@ from world.scenario_variants import over_terrain
 def check(args: argparse.Namespace) -> int:
     """Judge without flying; the exit code is the verdict's, or 3 for a log that is cut short."""
     source = Path(args.file)
-    target = Path(args.json) if args.json else None
-    if target:
-        refuse_existing(target, args.overwrite, source)
     if is_field_log(source):
         if args.fence:
             raise ScenarioError(f"{source}: --fence: goes with a log of planfly's: import this one first")
-        return _check_field_log(source, args, target)
+        return _check_field_log(source, args)
     _refuse_field_options(source, args)
     fences = read_named_fences(args.fence)
     if is_log(source):
@@ -37,8 +35,7 @@ def check(args: argparse.Namespace) -> int:
         setup = open_mission(source, args.scenario, args.terrain, change=scenario_change(args), fences=fences).setup
         print_warnings(setup.mission.warnings)
         verdict, loss = judge_geometry(setup), False
-    if target:
-        write_verdict(target, verdict)
+    give_answer(args, lambda: verdict_json(verdict))
     if loss:
         warn_of_loss(log)
     print_verdict(verdict, setup.route.notes)
@@ -47,14 +44,13 @@ def check(args: argparse.Namespace) -> int:
     return FLYABLE if verdict.flyable else NOT_FLYABLE
 
 
-def _check_field_log(source: Path, args: argparse.Namespace, target: Path | None) -> int:
+def _check_field_log(source: Path, args: argparse.Namespace) -> int:
     # Imported here: no other check needs the libraries that read logs of the field.
     from planfly.commands.field_logs.field_options import field_options
     from planfly.field.field_flights import import_flight
 
     flight = import_flight(source, field_options(args), scenario_change(args))
-    if target:
-        write_verdict(target, flight.verdict)
+    give_answer(args, lambda: verdict_json(flight.verdict))
     print_verdict(flight.verdict, flight.setup.route.notes)
     if flight.lossy:
         return LOSS

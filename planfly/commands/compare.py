@@ -1,10 +1,12 @@
 """``planfly compare``: two flights laid over each other, as a table and as pictures."""
 
 import argparse
+import math
 from pathlib import Path
 
 from logs.recording.reader import read_log
 from logs.report.compare import Comparison, compare_logs, difference_lines
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.progress import progress
 from planfly.terminal.stored_logs import warn_of_loss
@@ -23,7 +25,28 @@ def compare(args: argparse.Namespace) -> int:
     cut_short = [log for log in logs if not log.complete]
     for log in cut_short:
         warn_of_loss(log)
-    return LOSS if cut_short else FLYABLE
+    code = LOSS if cut_short else FLYABLE
+    give_answer(args, lambda: _answer(comparison, files, code))
+    return code
+
+
+def _answer(comparison: Comparison, files: list[Path], code: int) -> object:
+    from planfly.terminal.answers.answer_data import CompareAnswer, QuantityPair
+
+    def number(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return CompareAnswer(
+        exit_code=code,
+        names=list(comparison.names),
+        flyable=[verdict.flyable for verdict in comparison.verdicts],
+        quantities=[
+            QuantityPair(name=one.name, unit=one.unit, first=number(one.first), second=number(one.second))
+            for one in comparison.differences
+        ],
+        notes=list(comparison.notes),
+        files=[str(file) for file in files],
+    )
 
 
 def _draw(comparison: Comparison, folder: Path, args: argparse.Namespace) -> list[Path]:

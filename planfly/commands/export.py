@@ -12,6 +12,7 @@ from logs.recording.reader import FlightLog, read_log
 from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import is_log, open_mission, open_plan
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.results import print_warnings
 from planfly.terminal.stored_logs import warn_of_loss
@@ -61,10 +62,19 @@ def export(args: argparse.Namespace) -> int:
     for target, text, content in texts:
         write_whole(target, text)
         print(f"{'map' if target.suffix.lower() in MAPS else 'mission':<9} {target} ({content})")
+    code = FLYABLE
     if source.log is not None and not source.log.complete:
         warn_of_loss(source.log)
-        return LOSS
-    return FLYABLE
+        code = LOSS
+
+    def answer() -> object:
+        from planfly.terminal.answers.answer_data import ExportAnswer, ExportedFile
+
+        files = [ExportedFile(file=str(target), content=content) for target, _, content in texts]
+        return ExportAnswer(exit_code=code, files=files, warnings=[*source.mission.warnings, *source.notes])
+
+    give_answer(args, answer)
+    return code
 
 
 def _refuse_unknown(target: Path) -> None:

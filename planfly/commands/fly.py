@@ -1,13 +1,16 @@
 """``planfly fly``: a plan or any mission file, flown and logged."""
 
 import argparse
+import shlex
 from pathlib import Path
 
 from planfly.flight_limits import flight_text
 from planfly.named_fences import read_named_fences
-from planfly.open_mission import open_mission
-from planfly.pipeline import autopilot_log, fly_and_judge
+from planfly.open_mission import OpenedMission, open_mission
+from planfly.pipeline import JudgedFlight, autopilot_log, fly_and_judge
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.autopilot_option import autopilot_program
+from planfly.terminal.colour import coloured
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import print_verdict, print_warnings
@@ -40,6 +43,28 @@ def fly(args: argparse.Namespace) -> int:
         )
     print_verdict(flown.verdict, opened.setup.route.notes)
     print(f"log       {target}" if len(flown.track) else "log       none: nothing was flown")
-    if program is not None and len(flown.track):
-        print(f"          {autopilot_log(target)} (the autopilot's own)")
-    return FLYABLE if flown.verdict.flyable else NOT_FLYABLE
+    own = autopilot_log(target) if program is not None and len(flown.track) else None
+    if own is not None:
+        print(f"          {own} (the autopilot's own)")
+    if len(flown.track):
+        print(coloured(f"next      planfly report {shlex.quote(str(target))}", "hint"))
+    code = FLYABLE if flown.verdict.flyable else NOT_FLYABLE
+    give_answer(args, lambda: _answer(args, opened, flown, target, own, code))
+    return code
+
+
+def _answer(
+    args: argparse.Namespace, opened: OpenedMission, flown: JudgedFlight, log: Path, own: Path | None, code: int
+) -> object:
+    from planfly.terminal.answers.answer_data import FlyAnswer
+    from planfly.terminal.answers.verdict_document import verdict_document
+
+    return FlyAnswer(
+        exit_code=code,
+        mission=args.mission,
+        seed=opened.setup.seed,
+        log=str(log) if len(flown.track) else None,
+        autopilot_log=None if own is None else str(own),
+        warnings=list(opened.setup.mission.warnings),
+        verdict=verdict_document(flown.verdict),
+    )

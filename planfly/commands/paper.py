@@ -1,10 +1,12 @@
 """``planfly paper``: section V of the paper planned again, as tables and figures."""
 
 import argparse
+from dataclasses import asdict
 from pathlib import Path
 
 from planfly.paper.files import file_names, table_text, write_figures, write_tables
 from planfly.paper.seeded_plans import PROBLEMS, plan_section, table
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
@@ -27,4 +29,11 @@ def paper(args: argparse.Namespace) -> int:
             write_figures(folder, plans)
     print(table_text(rows))
     print(f"results   {folder}/ (table.csv, runs.csv, runs.json, times.csv, paths-, encodings-, convergence.png)")
+
+    def answer() -> object:
+        from planfly.terminal.answers.answer_data import PaperAnswer, PaperRow
+
+        return PaperAnswer(exit_code=FLYABLE, folder=str(folder), rows=[PaperRow(**asdict(row)) for row in rows])
+
+    give_answer(args, answer)
     return FLYABLE

@@ -11,6 +11,7 @@ from types import FrameType
 
 from aircraft.path_limits import Limits
 from planfly.airframe import Airframe, choose_seed, load_airframe
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.scenario_options import scenario_change
@@ -40,7 +41,28 @@ def plan(args: argparse.Namespace) -> int:
     write_whole(target, plan_json(made))
     _print_plan(made, airframe.limits)
     print(f"plan      {target}")
-    return FLYABLE if made.safe else NOT_FLYABLE
+    code = FLYABLE if made.safe else NOT_FLYABLE
+    give_answer(args, lambda: _answer(made, target, seed, code))
+    return code
+
+
+def _answer(made: Plan, target: Path, seed: int, code: int) -> object:
+    from planfly.terminal.answers.answer_data import PlanAnswer
+
+    return PlanAnswer(
+        exit_code=code,
+        scenario=made.scenario.name,
+        seed=seed,
+        file=str(target),
+        safe=made.safe,
+        feasible=made.feasible,
+        waypoints=len(made.waypoints),
+        length_ratio=float(made.objectives[Objective.LENGTH_RATIO]),
+        algorithm=made.algorithm,
+        evaluations=made.evaluations,
+        ended=made.ended,
+        problems=list(made.certificate.problems),
+    )
 
 
 @contextmanager

@@ -3,7 +3,9 @@
 import argparse
 from pathlib import Path
 
+from logs.recording.reader import FlightLog
 from logs.recording.recover import recover_log
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.stored_logs import warn_of_loss
 from planfly.terminal.targets import refuse_existing
@@ -21,9 +23,19 @@ def recover(args: argparse.Namespace) -> int:
     recovered = recover_log(source)
     if recovered is None:
         print(f"{source}: complete: there is nothing to recover, and nothing was written")
+        give_answer(args, lambda: _answer(None, None))
         return FLYABLE
     write_whole(target, recovered.data)
     log = recovered.log
     print(f"log       {target} ({len(log.track)} rows, to {log.end_time:.1f} s)")
     warn_of_loss(log)
+    give_answer(args, lambda: _answer(target, log))
     return LOSS
+
+
+def _answer(target: Path | None, log: FlightLog | None) -> object:
+    from planfly.terminal.answers.answer_data import RecoverAnswer
+
+    if target is None or log is None:
+        return RecoverAnswer(exit_code=FLYABLE, log=None, rows=None, end_s=None)
+    return RecoverAnswer(exit_code=LOSS, log=str(target), rows=len(log.track), end_s=log.end_time)

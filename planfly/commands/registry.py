@@ -24,9 +24,16 @@ COMMAND_NAMES = (
     "import",
     "refly",
     "scenarios",
+    "help",
+    "completion",
 )
 # Commands in rooms of their own, or whose name is a word of Python's: their modules, and functions of their last name.
-_MODULES = {"import": "field_logs.import_log", "refly": "field_logs.refly"}
+_MODULES = {
+    "import": "field_logs.import_log",
+    "refly": "field_logs.refly",
+    "help": "shell.show_help",
+    "completion": "shell.completion",
+}
 
 
 def find_command(name: str) -> CommandFunction:

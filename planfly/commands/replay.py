@@ -1,16 +1,20 @@
 """``planfly replay``: a flight from its log, on the terminal, as a film, or to other programs."""
 
 import argparse
+import math
 import shutil
 import sys
 import time
 from pathlib import Path
 
 from logs.recording.reader import FlightLog, read_log
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.stored_logs import warn_of_loss
 from world.errors import LogError, PlanflyError
 
+# Numbers that may be meant as ports that ground stations listen at.
+_PORTS = range(1024, 65536)
 # Frames a second on a terminal.
 _RATE = 10.0
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"
@@ -38,20 +42,37 @@ def replay(args: argparse.Namespace) -> int:
             from planfly.commands.replay_to.foxglove_server import serve_log
 
             serve_log(args, start, end)
-        elif sys.stdout.isatty() and not args.at_once:
+        elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
             _show_instruments(log, start, end, args.speed or 1.0)
         else:
             _print_timeline(log, start, end, args.speed)
-    if log.complete:
-        return FLYABLE
-    warn_of_loss(log)
-    return LOSS
+    if not log.complete:
+        warn_of_loss(log)
+    code = FLYABLE if log.complete else LOSS
+    give_answer(args, lambda: _answer(args, log, code))
+    return code
+
+
+def _answer(args: argparse.Namespace, log: FlightLog, code: int) -> object:
+    """The timeline of the part that is replayed, all of it where it goes to ground stations."""
+    from logs.replay.timeline import timeline
+    from planfly.terminal.answers.answer_data import ReplayAnswer, TimelineEvent
+
+    start, end = (-math.inf, math.inf) if isinstance(args.to, str) else _part(log, args)
+    events = [TimelineEvent(time_s=one.time, kind=one.kind, text=one.text) for one in timeline(log)]
+    part = [event for event in events if start <= event.time_s <= end]
+    return ReplayAnswer(exit_code=code, log=args.log, complete=log.complete, end_s=log.end_time, timeline=part)
 
 
 def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
     """Start and end of what is replayed, s of the flight.  Raises LogError where there is nothing between them."""
     start = args.start if args.start is not None else float(log.track.time[0])
     end = log.end_time if args.to is None else min(args.to, log.end_time)
+    if args.to is not None and args.to > log.end_time and args.to in _PORTS:
+        raise LogError(
+            f"{args.log}: --to {args.to:g}: the log ends at {log.end_time:.1f} s; if a port is meant, name its address,"
+            f" too: --to 127.0.0.1:{args.to:g}"
+        )
     if start > log.end_time:
         raise LogError(f"{args.log}: --from {start:g}: the log ends at {log.end_time:.1f} s")
     if end < start:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from logs.recording.foxglove_layout import layout_text
 from logs.recording.reader import read_log
+from logs.verdict.findings import Verdict
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.progress import progress
 from planfly.terminal.results import write_pictures
@@ -36,10 +38,20 @@ def report(args: argparse.Namespace) -> int:
         )  # fmt: skip
     for file in files:
         print(f"report    {file}")
+    code = FLYABLE if verdict.flyable else NOT_FLYABLE
     if not log.complete:
         warn_of_loss(log)
-        return LOSS
-    return FLYABLE if verdict.flyable else NOT_FLYABLE
+        code = LOSS
+    give_answer(args, lambda: _answer(files, verdict, code))
+    return code
+
+
+def _answer(files: list[Path], verdict: Verdict | None, code: int) -> object:
+    from planfly.terminal.answers.answer_data import ReportAnswer
+    from planfly.terminal.answers.verdict_document import verdict_document
+
+    document = None if verdict is None else verdict_document(verdict)
+    return ReportAnswer(exit_code=code, files=[str(file) for file in files], verdict=document)
 
 
 def _write_layout(target: Path, args: argparse.Namespace) -> int:
@@ -48,4 +60,5 @@ def _write_layout(target: Path, args: argparse.Namespace) -> int:
     refuse_existing(target, args.overwrite)
     write_whole(target, layout_text())
     print(f"layout    {target}")
+    give_answer(args, lambda: _answer([target], None, FLYABLE))
     return FLYABLE

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import json
+import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,7 @@ from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_air
 from planfly.flight_limits import FlightLimits, flight_text
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planfly.refine import refine
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.autopilot_option import autopilot_program
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
 from planfly.terminal.progress import progress
@@ -23,6 +25,11 @@ from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, 
 from planner.plan import Plan, plan_json
 from world.atomic_files import hold, write_whole
 from world.scenario import Scenario, load_scenario
+
+# Options that decide what is planned and flown, as the line that repeats it has them.
+_REPEATED = (
+    *("refine", "terrain", "aircraft", "airspeed", "wind", "turbulence", "params", "guidance", "nav", "autopilot"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +42,7 @@ class _Task:
     folder: where the results go.
     program: the real autopilot that flies, None for none.
     most: how long it may fly, and how large its log may grow.
+    every: of so many rows one goes into the log.
     """
 
     scenario: Scenario
@@ -44,18 +52,20 @@ class _Task:
     folder: Path
     program: Path | None
     most: FlightLimits
+    every: int
 
 
 def run(args: argparse.Namespace) -> int:
     """Plan, export, fly, record, judge and report; with ``--refine N`` up to N rounds more."""
     program = autopilot_program(args)
-    scenario = scenario_change(args)(load_scenario(args.scenario))
+    scenario = scenario_change(args)(load_scenario(args.scenario, args.terrain))
     seed = choose_seed(scenario, args.seed)
     airframe = load_airframe(scenario)
     folder = Path(args.out) if args.out else default_folder(scenario.name, seed)
     if args.out:
         refuse_folder(folder, args.overwrite)
-    task = _Task(scenario, airframe, seed, _command_line(args, seed), folder, program, flight_limits(args))
+    line, every = _command_line(args, seed), 60 // args.log_hz
+    task = _Task(scenario, airframe, seed, line, folder, program, flight_limits(args), every)
     with contextlib.ExitStack() as held:
         return _rounds(args, task, held)
 
@@ -81,13 +91,33 @@ def _rounds(args: argparse.Namespace, task: _Task, held: contextlib.ExitStack) -
     if args.refine:
         write_whole(folder / "rounds.json", json.dumps(rounds, indent=1) + "\n")
         _print_rounds(rounds, folder)
-    return FLYABLE if verdict.flyable else NOT_FLYABLE
+    code = FLYABLE if verdict.flyable else NOT_FLYABLE
+    give_answer(args, lambda: _answer(task, verdict, rounds if args.refine else [], code))
+    return code
+
+
+def _answer(task: _Task, verdict: Verdict, rounds: list[dict[str, Any]], code: int) -> object:
+    from planfly.terminal.answers.answer_data import RoundAnswer, RunAnswer
+    from planfly.terminal.answers.verdict_document import verdict_document
+
+    told = [RoundAnswer(round=one["round"], changes=one["changes"], summary=one["summary"]) for one in rounds]
+    return RunAnswer(
+        exit_code=code,
+        scenario=task.scenario.name,
+        seed=task.seed,
+        folder=str(task.folder),
+        files=[name for name in (*RUN_FILES, "rounds.json") if (task.folder / name).exists()],
+        rounds=told,
+        verdict=verdict_document(verdict),
+    )
 
 
 def _command_line(args: argparse.Namespace, seed: int) -> str:
-    options = [(name, getattr(args, name)) for name in ("refine", "params", "guidance", "nav", "autopilot")]
-    given = "".join(f" --{name} {value}" for name, value in options if value)
-    return f"planfly run {args.scenario} --seed {seed}{given}"
+    given = {name: getattr(args, name) for name in _REPEATED}
+    if args.wind is not None:
+        given["wind"] = "{:g},{:g}".format(*args.wind)
+    options = [f"--{name} {shlex.quote(format(value))}" for name, value in given.items() if value]
+    return " ".join([f"planfly run {shlex.quote(args.scenario)} --seed {seed}", *options])
 
 
 def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
@@ -105,7 +135,9 @@ def _fly_round(task: _Task, plan: Plan) -> tuple[Verdict, bool]:
         return verdict, False
     setup = make_setup(task.scenario, airframe, mission, task.seed, plan=plan)
     with progress(f"flying {flight_text(setup)}") as advance:
-        flown = fly_and_judge(setup, airframe, folder / "flight.mcap", advance, autopilot=task.program, most=task.most)
+        flown = fly_and_judge(
+            setup, airframe, folder / "flight.mcap", advance, every=task.every, autopilot=task.program, most=task.most
+        )
     write_verdict(folder / "verdict.json", flown.verdict)
     with progress("drawing"):
         write_pictures(folder, flown.setup, flown.track, flown.verdict, flown.ended, task.command, events=flown.events)

@@ -8,6 +8,7 @@ from planfly.campaigns.asked_campaign import campaign_spread, command_line, defa
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.find_winds import ASKED, WindsGoal, find_winds
 from planfly.campaigns.report.wind_files import wind_lines, write_winds
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, INTERRUPTED
 from planfly.terminal.progress import progress
 from planfly.terminal.targets import refuse_folder
@@ -31,4 +32,5 @@ def winds(args: argparse.Namespace) -> int:
     write_winds(folder, base, found, command_line(args))
     print("\n".join(wind_lines(found)))
     print(f"results   {folder}/ (winds.html, winds.png, winds.json)")
+    give_answer(args, lambda: (folder / "winds.json").read_text(encoding="utf-8"))
     return FLYABLE

@@ -1,12 +1,16 @@
 """Options of campaigns: how many flights, with what spread, on which workers, and where they go."""
 
 import argparse
-from collections.abc import Callable
+from typing import Protocol
 
 from planfly.terminal.argument_types import positive_count, seed
-from planfly.terminal.parser_options import flown_by_options, overwrite_option, steering_options, world_options
+from planfly.terminal.command_parser import CommandParser
+from planfly.terminal.completion import completed, files, mission_or_scenario_words
+from planfly.terminal.parser_options import flown_by_options, result_options, steering_options, world_options
 
-_Command = Callable[[str, str, str], argparse.ArgumentParser]
+
+class _Command(Protocol):
+    def __call__(self, name: str, summary: str, *examples: str) -> CommandParser: ...
 
 
 def add_campaigns(command: _Command) -> None:
@@ -37,20 +41,25 @@ def add_campaigns(command: _Command) -> None:
     winds.add_argument("--flights", metavar="N", type=_flights, help="at most, of all directions (default: 5000)")
 
 
-def _shared(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument(
-        "target", metavar="SCENARIO|PLAN|MISSION", help="embedded name, TOML file, plan.json, .waypoints or .plan"
+def _shared(parser: CommandParser) -> None:
+    completed(
+        parser.add_argument(
+            "target", metavar="SCENARIO|PLAN|MISSION", help="embedded name, TOML file, plan.json, .waypoints or .plan"
+        ),
+        mission_or_scenario_words,
     )
     world_options(parser)
     flown_by_options(parser)
     steering_options(parser)
-    parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)")
+    completed(
+        parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)"),
+        files("toml"),
+    )
     parser.add_argument("--confidence", metavar="C", type=_share, default=0.95, help="of each bound (default: 0.95)")
     parser.add_argument("--seed", metavar="N", type=seed, help="of plan and draws (default: the scenario's, or 1)")
     parser.add_argument("--workers", metavar="N", type=positive_count, help="processes here (default: one a core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT")
-    parser.add_argument("--out", metavar="DIR", help="where the files go (default: runs/<name>-<command>)")
-    overwrite_option(parser)
+    result_options(parser, "where the files go (default: runs/<name>-<command>, kept)")
 
 
 def _share(text: str) -> float:

@@ -1,9 +1,12 @@
 """What an exit code means."""
 
 EXIT_CODES = """\
-exit codes: 0 flyable; 1 our fault or the machine's; 2 bad usage or bad input (nothing was written);
-3 done with a stated loss (an unfinished or damaged log), or a probability left undecided; 4 not flyable, or no
-feasible plan; 130 and 143 ended by SIGINT (Ctrl-C) and SIGTERM"""
+exit codes: 0 flyable
+            1 our fault or the machine's
+            2 bad usage or bad input (nothing was written)
+            3 done with a stated loss (an unfinished or damaged log), or undecided
+            4 not flyable, or no feasible plan
+            130 and 143 ended by SIGINT (Ctrl-C) and SIGTERM, within a second"""
 
 FLYABLE, FAULT, BAD_INPUT, LOSS, NOT_FLYABLE = 0, 1, 2, 3, 4
 # By Ctrl-C, as a shell counts what a signal ended: 128 and the signal's number.

@@ -52,7 +52,9 @@ def link_access(args: argparse.Namespace) -> Access:
 
 
 def _address(option: str, text: str) -> tuple[str, int]:
-    host, _, port = text.strip().rpartition(":")
+    host, colon, port = text.strip().rpartition(":")
+    if not colon and port.isdigit():
+        raise FlightError(f"{option} {text}: IP:PORT is expected, such as 127.0.0.1:{port}")
     if not port.isdigit() or not 0 <= int(port) <= 65535:
         raise FlightError(f"{option} {text}: IP:PORT is expected, with a port 0..65535")
     return _ip(option, host.strip("[]")), int(port)

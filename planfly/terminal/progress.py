@@ -4,15 +4,35 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from planfly.pipeline import Advance
 
+_silent: ContextVar[bool] = ContextVar("silent", default=False)
+
+
+@contextmanager
+def silent_progress() -> Iterator[None]:
+    """Report nothing meanwhile."""
+    token = _silent.set(True)
+    try:
+        yield
+    finally:
+        _silent.reset(token)
+
+
+def _say_nothing(_done: float, _whole: float, _remark: str = "") -> None:
+    pass
+
 
 @contextmanager
 def progress(title: str) -> Iterator["Advance"]:
     """Report a stage of work; the caller reports how much of how much is done, and a remark."""
+    if _silent.get():
+        yield _say_nothing
+        return
     if not sys.stderr.isatty():
         yield from _lines(title)
         return

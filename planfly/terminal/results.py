@@ -11,6 +11,7 @@ from flight.simulation.track import Track
 from logs.recording.reader import LogEvent
 from logs.verdict.findings import RULES, Finding, Verdict, verdict_json
 from logs.verdict.wording import place_text, suggestions_text
+from planfly.terminal.colour import coloured
 from world.atomic_files import write_whole
 
 # Failed findings that are listed one by one.
@@ -19,14 +20,17 @@ _LISTED = 12
 
 def print_verdict(verdict: Verdict, notes: Iterable[str]) -> None:
     """The verdict on the terminal: the summary first, then what fails, then the tightest finding of each rule."""
-    print(verdict.summary)
+    first, *rest = verdict.lines or ("",)
+    print(coloured(first, "good" if verdict.flyable else "bad"))
+    for line in rest:
+        print(line)
     failed = [finding for finding in verdict.findings if finding.ok is False]
     for finding in failed[:_LISTED]:
-        print(f"  failed  {finding.rule} at {place_text(finding.place)}: {finding.reason}")
+        print(coloured("  failed  ", "bad") + f"{finding.rule} at {place_text(finding.place)}: {finding.reason}")
         if finding.suggestions:
-            print(f"          would pass: {suggestions_text(finding.suggestions)}")
+            print(coloured("          would pass: ", "hint") + suggestions_text(finding.suggestions))
     if len(failed) > _LISTED:
-        print(f"  failed  and {len(failed) - _LISTED} more")
+        print(coloured("  failed  ", "bad") + f"and {len(failed) - _LISTED} more")
     for rule, title in RULES.items():
         mine = [finding for finding in verdict.findings if finding.rule == rule]
         if mine:
@@ -57,7 +61,7 @@ def _state(findings: list[Finding]) -> str:
 def print_warnings(warnings: Iterable[str]) -> None:
     """Warnings, on standard error."""
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        print(coloured("warning:", "warning", sys.stderr) + f" {warning}", file=sys.stderr)
 
 
 def write_missions(mission: Mission, targets: Iterable[Path]) -> None:

@@ -14,7 +14,7 @@ from world.interruption import Interrupted, interrupt, remove_unfinished
 
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal to the end of the process where its command has not ended by itself, s.
-GRACE = 1.4
+GRACE = 0.7
 _AGAIN = 0.05
 
 

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from world.errors import ScenarioError
+from world.text_files import did_you_mean
 
 Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
@@ -147,5 +148,8 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     """
     found = ALGORITHMS.get(DEFAULT if name is None else name)
     if found is None:
-        raise ScenarioError(f"{source}: planner.algorithm: {name!r}: not known; allowed: {', '.join(ALGORITHMS)}")
+        raise ScenarioError(
+            f"{source}: planner.algorithm: {name!r}: not known; allowed: {', '.join(ALGORITHMS)}"
+            f"{did_you_mean(str(name), ALGORITHMS)}"
+        )
     return found

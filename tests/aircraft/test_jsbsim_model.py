@@ -10,7 +10,7 @@ ORDER = ("elevator", "aileron", "rudder", "throttle")
 
 
 def test_an_empty_table_is_our_own_models() -> None:
-    assert read_model({}) == OURS
+    assert read_model({}, "a") == OURS
     assert [command.name.removesuffix("-rad") for command in OURS.commands[:3]] == [f"command/{c}" for c in ORDER[:3]]
     assert OURS.commands[3].name == "command/throttle-norm"
     assert len(OURS.readings) == 6
@@ -18,7 +18,7 @@ def test_an_empty_table_is_our_own_models() -> None:
 
 @pytest.mark.parametrize("k", range(4))
 def test_a_command_replaces_its_own_and_no_other(k: int) -> None:
-    model = read_model({"command": {ORDER[k]: ["fcs/stick", -2, 3.5]}})
+    model = read_model({"command": {ORDER[k]: ["fcs/stick", -2, 3.5]}}, "a")
     assert model.commands[k] == CommandProperty("fcs/stick", -2.0, 3.5)
     assert [model.commands[i] for i in range(4) if i != k] == [OURS.commands[i] for i in range(4) if i != k]
     assert model.readings == OURS.readings
@@ -26,17 +26,19 @@ def test_a_command_replaces_its_own_and_no_other(k: int) -> None:
 
 @pytest.mark.parametrize(("k", "name"), list(enumerate((*ORDER, "current", "power"))))
 def test_a_reading_replaces_its_own_and_an_empty_one_reads_as_zero(k: int, name: str) -> None:
-    model = read_model({"reading": {name: ["fcs/pos", 0.5]}})
+    model = read_model({"reading": {name: ["fcs/pos", 0.5]}}, "a")
     assert model.readings[k] == Reading("fcs/pos", 0.5)
     assert [model.readings[i] for i in range(6) if i != k] == [OURS.readings[i] for i in range(6) if i != k]
-    assert read_model({"reading": {name: []}}).readings[k] == Reading("", 0.0)
+    assert read_model({"reading": {name: []}}, "a").readings[k] == Reading("", 0.0)
 
 
 def test_what_kind_of_model_it_is() -> None:
-    model = read_model({"shipped_by_jsbsim": True})
-    assert (model.shipped, model.settles) == (True, False)
-    model = read_model({"engine_settles": True})
-    assert (model.shipped, model.settles) == (False, True)
+    model = read_model({"shipped_by_jsbsim": True}, "c172x")
+    assert (model.shipped, model.settles) == ("c172x", False)
+    # A folder of one's own has another name than the model of JSBSim's that it flies.
+    assert read_model({"shipped_by_jsbsim": "c172x"}, "mine").shipped == "c172x"
+    model = read_model({"engine_settles": True}, "c172x")
+    assert (model.shipped, model.settles) == ("", True)
 
 
 @pytest.mark.parametrize(
@@ -55,10 +57,13 @@ def test_what_kind_of_model_it_is() -> None:
         ({"reading": {"power": ["a", 0.0]}}, r"^model\.reading\.power = .* is not a property and 1 number"),
         ({"reading": {"power": ["a", float("nan")]}}, r"^model\.reading\.power = .* is not a property and 1 number"),
         ({"reading": {"power": "ab"}}, r"^model\.reading\.power = 'ab' is not a property and 1 number"),
-        ({"shipped_by_jsbsim": 1}, r"^model\.shipped_by_jsbsim = 1 is not true or false$"),
+        ({"shipped_by_jsbsim": 1}, r"^model\.shipped_by_jsbsim = 1 is not true, false or the name of a model"),
+        ({"shipped_by_jsbsim": "../c172x"}, r"^model\.shipped_by_jsbsim = '\.\./c172x' is not true, false or"),
+        ({"shipped_by_jsbsim": ""}, r"^model\.shipped_by_jsbsim = '' is not true, false or"),
+        ({"engine_settles": 1}, r"^model\.engine_settles = 1 is not true or false$"),
     ],
 )
 def test_each_fault_begins_with_its_key(table: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message) as caught:
-        read_model(table)
+        read_model(table, "a")
     assert "\n" not in str(caught.value)

@@ -81,3 +81,11 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(mission: P
 def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:
     with pytest.raises(MissionError, match=r"no such file; a plan\.json, \.waypoints or \.plan file is expected"):
         open_mission(tmp_path / "none.plan", None, None)
+
+
+def test_a_mission_that_lies_beside_the_name_is_named(mission: Path) -> None:
+    (mission.parent / "m.waypoints.bak").write_text("", encoding="ascii")
+    with pytest.raises(MissionError, match=r"file is expected: did you mean 'm\.waypoints'\?$"):
+        open_mission(mission.with_name("n.waypoints"), None, None)
+    with pytest.raises(MissionError, match=r"file is expected$"):
+        open_mission(mission.parent / "nowhere" / "m.waypoints", None, None)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from world.atomic_files import write_whole
+from world.atomic_files import write_folder, write_whole
 
 
 def test_text_and_bytes_replace_what_was_there(tmp_path: Path) -> None:
@@ -37,3 +37,28 @@ def test_a_failed_write_leaves_what_was_there_and_nothing_else(tmp_path: Path, m
         write_whole(file, "new")
     assert file.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [file]
+
+
+def test_a_folder_is_there_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_folder(tmp_path / "made", {"a": b"1", "in/b": b"2"})
+    assert {str(path.relative_to(tmp_path / "made")) for path in (tmp_path / "made").rglob("*")} == {"a", "in", "in/b"}
+    written = Path.write_bytes
+
+    def fails_at_b(self: Path, data: bytes) -> int:
+        if self.name == "b":
+            raise OSError(28, "No space left on device")
+        return written(self, data)
+
+    monkeypatch.setattr(Path, "write_bytes", fails_at_b)
+    with pytest.raises(OSError, match="No space left") as caught:
+        write_folder(tmp_path / "half", {"a": b"1", "in/b": b"2"})
+    assert caught.value.filename == str(tmp_path / "half")
+    assert [path.name for path in tmp_path.iterdir()] == ["made"]
+
+
+def test_a_folder_that_holds_something_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "mine").write_text("keep", encoding="utf-8")
+    with pytest.raises(OSError, match=r"not empty|exists"):
+        write_folder(tmp_path / "there", {"a": b"1"})
+    assert [path.name for path in tmp_path.rglob("*")] == ["there", "mine"]

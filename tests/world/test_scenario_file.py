@@ -18,6 +18,18 @@ CASES: dict[str, tuple[str, str, str]] = {
     "unknown key at the top": ('name = "small"', 'name = "small"\ncolour = 1', "colour: unknown key"),
     "unknown key like a type": ("", "integer = 1", "destination.integer: unknown key"),
     "unknown key with a line break": ("", '"a\\nb" = 1', 'destination."a\\nb": unknown key'),
+    "a key mistaken": (
+        "",
+        "[limits]\nmin_clearence_m = 3",
+        "min_clearence_m: unknown key: did you mean 'min_clea",
+    ),
+    "a required key mistaken": ('name = "small"', 'nam = "small"', "nam: unknown key: did you mean 'name'?"),
+    "a key of a list mistaken": (
+        "",
+        THREAT + "kill_radus_m = 3",
+        "kill_radus_m: unknown key: did you mean 'kill_radius",
+    ),
+    "a table mistaken": ("", "[wnd]\nspeed_mps = 3", "wnd: unknown key: did you mean 'wind'?"),
     "unknown table": ("", "[weather]\nrain = 1", "weather: unknown key"),
     "missing name": ('name = "small"', "", "name: Field required"),
     "a number of 9000 digits": ("amsl_m = 400", f"amsl_m = 1{'0' * 9000}", "not valid TOML"),

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from world.errors import MissionError, PlanflyError, ScenarioError
-from world.text_files import read_small_file, utf8_text
+from world.text_files import did_you_mean, read_small_file, utf8_text
 
 
 @pytest.mark.parametrize(("size", "ok"), [(0, True), (1000, True), (1001, False)])
@@ -39,3 +39,17 @@ def test_what_is_no_text_is_named_by_line_and_byte(tmp_path: Path, data: bytes, 
     with pytest.raises(MissionError) as caught:
         utf8_text(data, tmp_path, MissionError)
     assert str(caught.value) == f"{tmp_path}:{line}: not a text file in UTF-8 (byte {byte})"
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("jaksboro", ": did you mean 'jacksboro'?"),
+        ("TIGHT", ": did you mean 'tight'?"),
+        ("paper-7", ": did you mean 'paper-07'?"),
+        ("volcano", ""),
+        ("", ""),
+    ],
+)
+def test_a_near_name_is_named_and_no_far_one(name: str, near: str) -> None:
+    assert did_you_mean(name, ["jacksboro", "tight", "paper-07"]) == near

@@ -197,7 +197,7 @@ def _shifted(item: Finding, first: int, setup: FlightSetup) -> Finding:
     if not first or place.index is None or place.kind not in ("leg", "waypoint"):
         return item
     index = place.index + first
-    return replace(item, place=Place(place.kind, index, place.item, place.name))
+    return replace(item, place=replace(place, index=index))
 
 
 def _merged(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:

@@ -87,10 +87,22 @@ class RouteDemands:
         """How many legs there are."""
         return len(self.runs)
 
+    @property
+    def limits_source(self) -> str:
+        """Whose the limits of the scenario are: planfly's own where the mission came without one."""
+        return "default" if self.setup.scenario.external else "scenario"
+
     def waypoint(self, index: int) -> Place:
         """A waypoint as the place of a finding."""
-        item = int(self.setup.route.items[index])
-        return Place("waypoint", index, None if item < 0 else item)
+        return Place("waypoint", index, self._item(index))
+
+    def leg(self, index: int) -> Place:
+        """A leg as the place of a finding, with the item that it leads to."""
+        return Place("leg", index, to_item=self._item(index + 1))
+
+    def _item(self, waypoint: int) -> int | None:
+        item = int(self.setup.route.items[waypoint])
+        return None if item < 0 else item
 
     def leg_unit(self, leg: int) -> Floats:
         """East and north components of a leg's course, (2,)."""

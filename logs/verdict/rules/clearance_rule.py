@@ -8,7 +8,7 @@ from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import FLIGHT, Place
+from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import HEIGHT_ROUNDING
 
 
@@ -20,14 +20,18 @@ def clearance_findings(
     limit = demands.limits.min_clearance
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
-        return [make_finding("clearance", FLIGHT, ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
+        return [
+            make_finding(
+                "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=demands.limits_source, unit="m"
+            )
+        ]
     legs = demands.path.legs
     low, _ = path_clearance(ground.heights, ground.to_pixel.record, demands.path.points)
     planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(demands.legs)]
     out = []
     for leg in range(demands.legs):
         if geometric:
-            out.append(_planned_clearance(leg, planned[leg], limit, ground.vertical_error))
+            out.append(_planned_clearance(demands, leg, planned[leg], limit, ground.vertical_error))
         else:
             out.append(_flown_clearance(demands, aligned, leg, planned[leg], limit))
     return out
@@ -41,20 +45,20 @@ def _less_error(clearance: float, limit: float, error: float | None) -> str:
     return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
 
 
-def _planned_clearance(leg: int, planned: float, limit: float, error: float | None) -> Finding:
+def _planned_clearance(demands: RouteDemands, leg: int, planned: float, limit: float, error: float | None) -> Finding:
     reason = f"{planned:.1f} m above ground at the lowest"
     if math.isnan(planned):
         reason = "the leg leaves the known terrain"
     return make_finding(
         "clearance",
-        Place("leg", leg),
+        demands.leg(leg),
         ok=None if math.isnan(planned) else planned >= limit - HEIGHT_ROUNDING,
         reason=reason
         + ("" if math.isnan(planned) or planned >= limit - HEIGHT_ROUNDING else f"; {limit:.0f} m are required")
         + _less_error(planned, limit, error),
         planned=planned,
         limit=limit,
-        source="scenario",
+        source=demands.limits_source,
         tolerance=HEIGHT_ROUNDING,
         margin=planned - limit,
         unit="m",
@@ -90,13 +94,13 @@ def _flown_clearance(
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
         "clearance",
-        Place("leg", leg),
+        demands.leg(leg),
         ok=ok,
         reason=reason,
         planned=planned,
         flown=least,
         limit=limit,
-        source="scenario",
+        source=demands.limits_source,
         tolerance=HEIGHT_ROUNDING,
         margin=least - limit,
         unit="m",

@@ -6,7 +6,6 @@ from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import Place
 from logs.verdict.tolerances import ROUNDING
 
 
@@ -37,7 +36,7 @@ def _corridor(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geo
             faults.append(message(f"{flown:.0f} m off the legs {where}", f"; the corridor is {limit:.0f} m"))
     return make_finding(
         "corridor",
-        Place("leg", leg),
+        demands.leg(leg),
         ok=ok,
         reason=reason_of(faults) if faults else reason_of([], facts),
         faults=faults,

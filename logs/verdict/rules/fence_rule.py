@@ -7,7 +7,6 @@ included; that the corridor about it reaches further is told beside.
 import math
 
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
-from logs.verdict.measures.airspace import Airspace
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
@@ -37,14 +36,15 @@ def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geome
     for z in range(len(airspace.zones)):
         visits = [planned[z]] if flown is None else [planned[z], flown[z]]
         if any(visit.depth > 0.0 or visit.unknown for visit in visits):
-            touched.append(_touched(airspace, z, planned[z], None if flown is None else flown[z]))
+            touched.append(_touched(demands, z, planned[z], None if flown is None else flown[z]))
     if not any(item.ok is False for item in touched):
-        touched.insert(0, _kept(airspace, planned, flown, demands.setup.corridor))
+        touched.insert(0, _kept(demands, planned, flown))
     return out + touched
 
 
-def _kept(airspace: Airspace, planned: Records, flown: Records | None, corridor: float) -> Finding:
+def _kept(demands: RouteDemands, planned: Records, flown: Records | None) -> Finding:
     """Every zone that could be judged was kept to."""
+    airspace, corridor = demands.airspace, demands.setup.corridor
     count, visits = len(airspace.zones), planned if flown is None else flown
     nearest = int(visits["depth"].argmax())
     margin = -float(visits[nearest].depth)
@@ -53,7 +53,7 @@ def _kept(airspace: Airspace, planned: Records, flown: Records | None, corridor:
     if math.isfinite(margin) and not visits[nearest].unknown:
         facts = [Fact("nearest", margin, "m"), Fact("less the corridor", margin - corridor, "m")]
         name = place_text(airspace.place(nearest))
-        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_where(visits[nearest], 'at')}"
+        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_where(demands, visits[nearest], 'at')}"
         if margin < corridor:
             reason += f", within the corridor of {corridor:.0f} m about the legs"
     return make_finding(
@@ -73,7 +73,8 @@ def _kept(airspace: Airspace, planned: Records, flown: Records | None, corridor:
     )
 
 
-def _touched(airspace: Airspace, z: int, planned: Record, flown: Record | None) -> Finding:
+def _touched(demands: RouteDemands, z: int, planned: Record, flown: Record | None) -> Finding:
+    airspace = demands.airspace
     zone = airspace.zones[z]
     visit = planned if flown is None else flown
     ok: bool | None = visit.depth <= ROUNDING
@@ -85,8 +86,8 @@ def _touched(airspace: Airspace, z: int, planned: Record, flown: Record | None) 
         faults.append(
             message(
                 f"{visit.depth:.1f} m {wrong}",
-                f" at {_where(visit, 'at')}, for {visit.beyond:.1f} s in all:"
-                f" {stay} at {_where(visit, 'entry')} and is back at {_where(visit, 'exit')}"
+                f" at {_where(demands, visit, 'at')}, for {visit.beyond:.1f} s in all:"
+                f" {stay} at {_where(demands, visit, 'entry')} and is back at {_where(demands, visit, 'exit')}"
                 + (f"; {visit.entries} times" if visit.entries > 1 else ""),
             )
         )
@@ -95,7 +96,7 @@ def _touched(airspace: Airspace, z: int, planned: Record, flown: Record | None) 
     if visit.unknown:
         notes.append("the ground that it counts from is not known all along")
     if flown is not None and planned.depth > ROUNDING:
-        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(planned, 'at')}")
+        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(demands, planned, 'at')}")
     return make_finding(
         "fence",
         airspace.place(z),
@@ -105,7 +106,7 @@ def _touched(airspace: Airspace, z: int, planned: Record, flown: Record | None) 
         planned=max(0.0, planned.depth),
         flown=None if flown is None else max(0.0, flown.depth),
         limit=0.0,
-        source="mission" if z >= airspace.of_scenario else "scenario",
+        source=_source(demands, z),
         tolerance=ROUNDING,
         margin=-visit.depth,
         unit="m",
@@ -123,7 +124,15 @@ def _facts(visit: Record) -> list[Fact]:
     return facts
 
 
-def _where(visit: Record, event: str) -> str:
+def _source(demands: RouteDemands, z: int) -> str:
+    """Whose a zone is: zones of a mission without a scenario are those that were named beside it."""
+    if z >= demands.airspace.of_scenario:
+        return "mission"
+    return "fence" if demands.setup.scenario.external else "scenario"
+
+
+def _where(demands: RouteDemands, visit: Record, event: str) -> str:
     """When and where a path was at an event of a visit, in words."""
+    leg = place_text(demands.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
-    return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL (leg {visit[f'{event}_leg']})"
+    return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"

@@ -13,7 +13,7 @@ from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import FLIGHT, Place
+from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import HEIGHT_ROUNDING
 from world.terrain import Terrain
 
@@ -28,7 +28,9 @@ def height_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
         return []
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
-        return [make_finding("height", FLIGHT, ok=None, reason=reason, limit=limit, source="scenario", unit="m")]
+        return [
+            make_finding("height", FLIGHT, ok=None, reason=reason, limit=limit, source=demands.limits_source, unit="m")
+        ]
     path = demands.path
     way = _Way(path.points, path.times, *greatest_heights(ground, path.points))
     planned = [_highest(way, np.flatnonzero(path.legs == leg)) for leg in range(demands.legs)]
@@ -123,14 +125,14 @@ def _finding(
         facts.append(f"the planned path comes up to {planned.height:.1f} m")
     return make_finding(
         "height",
-        Place("leg", leg),
+        demands.leg(leg),
         ok=ok,
         reason=reason_of(faults, facts),
         faults=faults,
         planned=None if planned is None else planned.height,
         flown=None if judged is None or judged is planned else judged.height,
         limit=limit,
-        source="scenario",
+        source=demands.limits_source,
         tolerance=HEIGHT_ROUNDING,
         margin=None if judged is None else limit - judged.height,
         unit="m",

@@ -73,7 +73,7 @@ def fold_loiters(
     found = list(findings)
     for circle in circles(demands):
         corners = {demands.waypoint(i) for i in range(circle.first, circle.last + 1)}
-        legs = {Place("leg", leg) for leg in range(circle.first, circle.last)}
+        legs = {demands.leg(leg) for leg in range(circle.first, circle.last)}
         at = [item for item in found if item.rule in ("turn", "waypoint") and item.place in corners]
         if at:
             found[found.index(at[0])] = _loiter(demands, aligned, circle, at)

@@ -76,7 +76,7 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
     judged = planned if fit is None else fit.value
     return make_finding(
         "slope",
-        Place("leg", leg),
+        demands.leg(leg),
         ok=ok,
         reason=reason_of(faults, facts if measure is not None or not faults else ()),
         faults=faults,

@@ -10,7 +10,6 @@ from logs.verdict.findings import Fact, Finding, Message, make_finding, message,
 from logs.verdict.measures.route_demands import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
-from logs.verdict.places import Place
 from logs.verdict.tolerances import (
     ACCELERATION,
     GUST_SHARE,
@@ -64,7 +63,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     ok: bool | None = not faults
     return make_finding(
         "speed",
-        Place("leg", leg),
+        demands.leg(leg),
         ok=None if ok and unflown else ok,
         reason=reason_of(faults, said),
         faults=faults,

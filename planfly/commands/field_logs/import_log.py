@@ -7,6 +7,7 @@ from pathlib import Path
 from logs.recording.recorder import Recorder
 from planfly.commands.field_logs.field_options import field_options
 from planfly.field.field_flights import ImportedFlight, import_flight
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
 from planfly.terminal.results import print_verdict
 from planfly.terminal.scenario_options import scenario_change
@@ -24,9 +25,17 @@ def import_log(args: argparse.Namespace) -> int:
     _write(target, flight)
     print_verdict(flight.verdict, flight.setup.route.notes)
     print(f"log       {target} ({len(flight.track)} rows)")
-    if flight.lossy:
-        return LOSS
-    return FLYABLE if flight.verdict.flyable else NOT_FLYABLE
+    code = LOSS if flight.lossy else FLYABLE if flight.verdict.flyable else NOT_FLYABLE
+    give_answer(args, lambda: _answer(target, flight, code))
+    return code
+
+
+def _answer(target: Path, flight: ImportedFlight, code: int) -> object:
+    from planfly.terminal.answers.answer_data import ImportAnswer
+    from planfly.terminal.answers.verdict_document import verdict_document
+
+    verdict = verdict_document(flight.verdict)
+    return ImportAnswer(exit_code=code, log=str(target), rows=len(flight.track), verdict=verdict)
 
 
 def _write(target: Path, flight: ImportedFlight) -> None:

@@ -10,6 +10,7 @@ from logs.report.refly_lines import left_lines, refly_lines
 from logs.verdict.field.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
 from planfly.field.model_flight import fly_again
+from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.progress import progress
 from planfly.terminal.stored_logs import warn_of_loss
@@ -30,10 +31,11 @@ def refly(args: argparse.Namespace) -> int:
     with progress("flying again") as advance:
         agains = fly_again(log.setup, log.track, args.aircraft, args.turbulence, advance, REFLOWN)
     prepare_folder(folder, REFLY_FILES)
+    lines: list[str] = []
     for number, again in enumerate(agains, 1):
-        print(*([] if number == 1 else [""]), *refly_lines(again), sep="\n")
-    for line in left_lines(agains, log.setup.source.stretches, REFLOWN):
-        print(line)
+        lines += [*([] if number == 1 else [""]), *refly_lines(again)]
+    lines += left_lines(agains, log.setup.source.stretches, REFLOWN)
+    print("\n".join(lines))
     files: list[Path] = []
     with progress("drawing"):
         for number, again in enumerate(agains, 1):
@@ -43,8 +45,15 @@ def refly(args: argparse.Namespace) -> int:
         print(f"refly     {file}")
     if not log.complete:
         warn_of_loss(log)
-        return LOSS
-    return FLYABLE
+    code = FLYABLE if log.complete else LOSS
+    give_answer(args, lambda: _answer(lines, files, code))
+    return code
+
+
+def _answer(lines: list[str], files: list[Path], code: int) -> object:
+    from planfly.terminal.answers.answer_data import ReflyAnswer
+
+    return ReflyAnswer(exit_code=code, lines=lines, files=[str(file) for file in files])
 
 
 def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:

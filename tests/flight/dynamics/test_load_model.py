@@ -5,6 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from aircraft.catalog import read_aircraft
+from flight.dynamics.fdm import Fdm
 from tests.own_aircraft import assert_refused, change_model
 
 
@@ -58,3 +60,17 @@ def test_a_channel_in_a_file_that_the_model_brings_in(tmp_path: Path, capsys: py
     assert_refused(capsys, "radio.xml:2: <output> opens a port or writes a file")
     Path("own/radio.xml").unlink()
     assert_refused(capsys, "own.xml:", 'file="radio"', "not in the aircraft's folder")
+
+
+# The Aerosonde's model has 11 kg: 1 % is 0.11 kg.
+@pytest.mark.parametrize(("mass", "taken"), [(11.108, True), (11.112, False), (10.892, True), (10.888, False)])
+def test_a_mass_that_is_not_the_models(
+    mass: float, taken: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    change_model(tmp_path, "<fdm_config", "<fdm_config")
+    table = Path("own/own.toml")
+    table.write_text(table.read_text(encoding="utf-8").replace("mass_kg = 11.0", f"mass_kg = {mass}"), encoding="utf-8")
+    if taken:
+        Fdm(read_aircraft(tmp_path / "own"))
+    else:
+        assert_refused(capsys, f"own.toml: mass_kg = {mass}", "own.xml has 11 kg with its fuel", "differ by 1 %")

@@ -54,14 +54,16 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
 def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: FlightSetup) -> None:
     verdict = aside(autopilot, 70.0, FlownBeside(PASSED, DECIDING))
     assert verdict.lines[:2] == (
-        "not flyable: corridor on leg 1 (70.0 m > 60.0 m)",
+        "not flyable: corridor on leg 1, to item 2 (70.0 m > 60.0 m)",
         "The aircraft can, ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it 70 m off leg 1; 14 would"
         " pass",
     )
     assert [level.flyable for level in verdict.levels] == [True, True, False]
     for level in verdict.levels[:2]:
         assert level.disagreements == (Disagreement("corridor", leg(1), level.name, there=True, here=False),)
-    assert verdict.lines[-1].endswith("flyable; corridor at leg 1 passes with planfly's guidance and fails in flight")
+    assert verdict.lines[-1].endswith(
+        "flyable; corridor at leg 1, to item 2, passes with planfly's guidance and fails in flight"
+    )
     assert verdict.deciding == DECIDING
     written = json.loads(verdict_json(verdict))
     assert [level["name"] for level in written["levels"]] == ["geometry", "airframe", "autopilot"]

@@ -8,6 +8,8 @@ from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Disagreement, Pla
 
 
 def test_places_of_the_same_data_are_one_key() -> None:
+    # What a leg leads to comes with its index; logs of before do not hold it.
+    assert Place("leg", 3, to_item=4) == Place("leg", 3)
     found = {Place("waypoint", 3, item=4): "turn", Place("leg", 3): "slope"}
     assert found[Place("waypoint", 3, 4)] == "turn"
     assert found[Place("leg", 3)] == "slope"

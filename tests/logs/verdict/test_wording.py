@@ -24,6 +24,7 @@ LONGER = Change("length", leg(1), 150.0, 300.0, "m")
         (MISSION, "mission"),
         (PLAN, "plan"),
         (leg(0), "leg 0"),
+        (Place("leg", 0, to_item=0), "leg 0, to item 0"),
         (waypoint(0), "waypoint 0"),
         (Place("waypoint", 0, item=0), "waypoint 0 (item 0)"),
         (Place("mission", item=0), "item 0"),
@@ -90,19 +91,37 @@ def powered(volts: float) -> FlightSetup:
 
 # A failing route, its rule and place; where the number stands in the text of what is suggested, and its decimals.
 SUGGESTED = {
-    "rise": (lambda: make_setup(STEEP), "slope", leg(1), r"climb ([\d.]+) m on leg 1 instead of 300 m", 0),
-    "fall": (lambda: make_setup(STEEP[::-1]), "slope", leg(1), r"fall ([\d.]+) m on leg 1 instead of 300 m", 0),
-    "length": (lambda: make_setup(STEEP), "slope", leg(1), r"make leg 1 ([\d.]+) m long instead of 1000 m", 0),
+    "rise": (lambda: make_setup(STEEP), "slope", leg(1), r"climb ([\d.]+) m on leg 1, to item 2, instead of 300 m", 0),
+    "fall": (
+        lambda: make_setup(STEEP[::-1]),
+        "slope",
+        leg(1),
+        r"fall ([\d.]+) m on leg 1, to item 2, instead of 300 m",
+        0,
+    ),
+    "length": (
+        lambda: make_setup(STEEP),
+        "slope",
+        leg(1),
+        r"make leg 1, to item 2, ([\d.]+) m long instead of 1000 m",
+        0,
+    ),
     "airspeed": (lambda: make_setup(SHORT), "turn", waypoint(1), r"fly it at ([\d.]+) m/s instead of 25 m/s", 1),
     "range": (
         lambda: make_setup(STRAIGHT, airspeed=33.0),
         "speed",
         leg(0),
-        r"command ([\d.]+) to [\d.]+ m/s on leg 0",
+        r"command ([\d.]+) to [\d.]+ m/s on leg 0, to item 1$",
         1,
     ),
     "turn": (lambda: make_setup(SHORT), "turn", waypoint(1), r"turn at most ([\d.]+)° there", 1),
-    "height": (lambda: make_setup([[0, 0, 20], [0, 6000, 20]]), "clearance", leg(0), r"fly leg 0 ([\d.]+) m higher", 0),
+    "height": (
+        lambda: make_setup([[0, 0, 20], [0, 6000, 20]]),
+        "clearance",
+        leg(0),
+        r"fly leg 0, to item 1, ([\d.]+) m higher",
+        0,
+    ),
     "inset": (
         lambda: make_setup([[0, 0, 4900], [0, 3000, 5040], [0, 6000, 4900]]),
         "bounds",

@@ -8,7 +8,10 @@ import pytest
 
 import planfly
 from aircraft.catalog import load_aircraft
+from logs.recording.reader import read_log
 from planfly.cli import main
+from tests.authorities.make_digests import track_digests
+from tests.own_aircraft import write_mission, write_scenario
 from world.scenario import load_scenario
 from world.scenario_variants import with_flight
 
@@ -66,9 +69,16 @@ def test_braking_is_steeper(capsys: pytest.CaptureFixture[str]) -> None:
     ("argv", "printed"),
     [
         (["zeppelin"], "no aircraft called 'zeppelin'"),
-        (["./nowhere"], "nowhere.toml: No such file"),
+        (["./nowhere"], "./nowhere: no such folder; planfly aircraft --new ./nowhere makes it"),
+        (["./full"], "full.toml: No such file"),
         (["c172x", "--motor-braking"], "motor/braking is needed and not defined"),
         (["aerosonde", "--out", "full"], "exists and is not empty"),
+        (["aerosond"], "did you mean 'aerosonde'?"),
+        (["full"], "did you mean './full'?"),
+        (["--new", "./full"], "full: exists; name a folder that does not"),
+        (["--new", "./mine", "--from", "zeppelin"], "no aircraft called 'zeppelin'"),
+        (["mine", "--new", "./mine"], "--new takes the folder alone"),
+        (["--from", "aerosonde"], "--from: goes with --new"),
     ],
 )
 def test_a_bad_name_or_folder_is_one_line(
@@ -102,6 +112,41 @@ def test_arduplane_flies_the_cessna_at_equivalent_airspeeds() -> None:
     assert result.verdict.flyable, result.verdict.summary
     # 50 m/s asked: 52 at 800 m, where the air has 0.925 of the density at the sea.
     assert float(np.median(result.track.airspeed)) == pytest.approx(52.0, abs=1.0)
+
+
+def test_a_new_folder_flies_as_the_aircraft_that_it_was_made_from(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft", "--new", "./mine", "--from", "aerosonde"]) == 0
+    assert "next      planfly aircraft ./mine" in capsys.readouterr().out
+    assert main(["aircraft", "./mine"]) == 0
+    shown = capsys.readouterr()
+    assert "mass     11 kg" in shown.out
+    assert "warning" not in shown.err
+    write_scenario()
+    write_mission(1000.0, 1000.0)
+    tracks = []
+    for name in ("aerosonde", "./mine"):
+        argv = ["fly", "m.waypoints", "--scenario", "s.toml", "--aircraft", name, "--guidance", "path"]
+        argv += ["--log", f"{Path(name).name}.mcap"]
+        assert main(argv) == 0
+        tracks.append(read_log(Path(f"{Path(name).name}.mcap")).track)
+    assert track_digests(tracks[0]) == track_digests(tracks[1])
+
+
+def test_gains_that_lack_or_are_broken_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["aircraft", "--new", "mine"]) == 0
+    gains = Path("mine/gains.toml")
+    text = gains.read_text(encoding="utf-8")
+    gains.write_text(text.replace("roll_gain =", "roll_gian ="), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["aircraft", "./mine"]) == 2
+    told = capsys.readouterr()
+    assert told.out == ""
+    assert told.err.endswith("gains.toml: missing roll_gain; unknown roll_gian: did you mean 'roll_gain'?\n")
+    gains.unlink()
+    Path("mine/ardupilot.toml").unlink()
+    assert main(["aircraft", "./mine"]) == 0
+    warned = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+    assert [line.split("mine/")[1].split(":")[0] for line in warned] == ["gains.toml", "ardupilot.toml"]
 
 
 def test_a_folder_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

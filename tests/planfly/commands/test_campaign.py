@@ -8,6 +8,7 @@ import pytest
 from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, read_table
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
+from tests.planfly.terminal.answers.checked_answers import validate
 
 pytestmark = pytest.mark.filterwarnings("default")
 
@@ -26,6 +27,7 @@ def test_it_leaves_its_files_and_says_undecided(flown: tuple[list[str], Path]) -
     assert {path.name for path in out.iterdir()} == {"campaign.sqlite", "summary.json", "report.html", "worst"}
     summary = json.loads((out / "summary.json").read_text())
     assert (summary["flights"], summary["answer"]) == (4, "undecided")
+    validate("campaign", summary)
     assert len(list((out / "worst").iterdir())) == 4
 
 
@@ -39,6 +41,7 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
     ("more", "words"),
     [
         (["--refly", "9"], "no such flight"),
+        (["--refly", "2", "--json", "-"], "--json: goes with a campaign"),
         ([], "--resume goes on with it"),
         (["--resume", "--seed", "2"], "another campaign"),
         (["--resume", "--spread", "none.toml"], "cannot be read"),

@@ -26,7 +26,7 @@ def test_a_climb_on_the_spot_is_judged_and_not_flyable(
     assert main(["check", str(mission), "--json", str(tmp_path / "verdict.json")]) == 4
     verdict = json.loads((tmp_path / "verdict.json").read_text(encoding="utf-8"))
     failed = [item for item in verdict["findings"] if item["ok"] is False]
-    assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1")]
+    assert [(item["rule"], item["where"]) for item in failed] == [("slope", "leg 1, to item 3")]
     rise, angle = abs(up - 200), "89.9" if up == 210.5 else "90.0"
     assert abs(failed[0]["planned"]) == pytest.approx(float(angle), abs=0.1)
     assert f"leg 1 {verb} {rise:g} m on the spot, {angle}°; at 2" in failed[0]["reason"]
@@ -127,3 +127,34 @@ def test_a_log_holds_its_zones_and_repeats_the_verdict(
     assert [item["place"]["name"] for item in flown if item["rule"] == "fence" and item["ok"] is False] == (
         ["town"] if "fence" in rules else []
     )
+
+
+JUMPING = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t36.25\t-84.15\t500\t1
+1\t0\t3\t16\t0\t0\t0\t0\t36.25\t-84.15\t400\t1
+2\t0\t3\t16\t0\t0\t0\t0\t36.28\t-84.15\t400\t1
+3\t0\t3\t16\t0\t0\t0\t0\t36.28\t-84.12\t400\t1
+4\t0\t2\t177\t2\t1\t0\t0\t0\t0\t0\t1
+5\t0\t3\t16\t0\t0\t0\t0\t36.25\t-84.12\t400\t1
+"""
+ZONE = """{"type": "Polygon", "coordinates": [[[-84.16, 36.26], [-84.14, 36.26], [-84.14, 36.27], [-84.16, 36.27],
+[-84.16, 36.26]]]}"""
+
+
+def test_legs_have_their_items_and_limits_their_owner_through_a_jump(tmp_path: Path) -> None:
+    mission, zone = tmp_path / "jumps.waypoints", tmp_path / "zone.geojson"
+    mission.write_text(JUMPING, encoding="utf-8")
+    zone.write_text(ZONE, encoding="utf-8")
+    out = tmp_path / "v.json"
+    argv = ["check", str(mission), "--terrain", "jacksboro", "--fence", str(zone), "--json", str(out)]
+    assert main(argv) == 4
+    findings = json.loads(out.read_text(encoding="utf-8"))["findings"]
+    # Flown are the items 1, 2, 3, then 2 and 3 again, and 5.
+    legs = {item["place"]["index"]: (item["where"], item["place"]["to_item"]) for item in findings
+            if item["rule"] == "clearance"}  # fmt: skip
+    assert legs == {k: (f"leg {k}, to item {item}", item) for k, item in enumerate((2, 3, 2, 3, 5))}
+    assert {item["limit_source"] for item in findings if item["rule"] == "clearance"} == {"default"}
+    (violated,) = [item for item in findings if item["rule"] == "fence" and item["ok"] is False]
+    assert violated["limit_source"] == "fence"
+    assert "(leg 0, to item 2)" in violated["reason"]
+    assert "scenario" not in {item["limit_source"] for item in findings}

@@ -3,6 +3,7 @@
 import json
 import os
 import resource
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -21,7 +22,8 @@ def test_aircraft_and_airspeed_replace_the_scenarios(tmp_path: Path, capsys: pyt
     log = tmp_path / "f.mcap"
     assert main(["fly", name, "--aircraft", "aerosonde", "--airspeed", "21", "--log", str(log)]) == 0
     assert (read_log(log).setup.route.airspeed == 21.0).all()
-    capsys.readouterr()
+    # The next step is a line that a shell takes as it stands.
+    assert capsys.readouterr().out.splitlines()[-1] == f"next      planfly report {shlex.quote(str(log))}"
     for options, message in (
         (["--aircraft", "boeing"], "flight.aircraft: no aircraft called 'boeing'"),
         (["--airspeed", "70"], "airspeed_mps: 70"),

@@ -12,7 +12,12 @@ from planfly.commands.registry import COMMAND_NAMES, find_command
 
 HELPERS = {"__init__", "registry"}
 # Commands whose module stands in a room of its own, or has another name than the command.
-ELSEWHERE = {"import": "field_logs.import_log", "refly": "field_logs.refly"}
+ELSEWHERE = {
+    "import": "field_logs.import_log",
+    "refly": "field_logs.refly",
+    "help": "shell.show_help",
+    "completion": "shell.completion",
+}
 
 
 def test_the_commands_are_the_modules_of_their_folder() -> None:

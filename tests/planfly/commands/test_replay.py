@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from logs.recording.example_log import write_example_log
 from planfly.cli import main
 
 ROOT = Path(__file__).parents[3]
@@ -61,3 +62,18 @@ def test_a_part_is_printed_as_in_the_whole(flight: Path, capsys: pytest.CaptureF
     assert whole[first : first + len(part)] == part
     assert main(["replay", log, "--from", "60", "--to", "20"]) == 2
     assert main(["replay", log, "--from", "5000"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("to", "code"), [("14550", 2), ("1024", 2), ("65535", 2), ("1023", 0), ("65536", 0), ("14550.5", 0)]
+)
+def test_a_port_is_not_taken_for_a_time_in_silence(
+    to: str, code: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = write_example_log(tmp_path / "a.mcap")
+    assert main(["replay", str(log), "--to", to]) == code
+    out = capsys.readouterr()
+    if code:
+        assert f"--to {to}: the log ends at" in out.err
+        assert f"--to 127.0.0.1:{to}" in out.err
+        assert out.out == ""

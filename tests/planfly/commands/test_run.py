@@ -1,6 +1,7 @@
 """The whole chain as a person runs it."""
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -13,6 +14,7 @@ from logs.recording.reader import read_log
 from logs.verdict.findings import RULES
 from planfly.cli import main
 from planfly.terminal.targets import RUN_FILES
+from tests.planfly.conftest import FIELD
 
 ROOT = Path(__file__).parents[3]
 SAME = ("plan.json", "mission.waypoints", "mission.plan", "flight.mcap", "verdict.json")
@@ -178,3 +180,21 @@ def test_no_feasible_plan(tmp_path: Path) -> None:
     assert (tmp_path / "out" / "plan.json").exists()
     assert not (tmp_path / "out" / "flight.mcap").exists()
     assert "no feasible plan" in result.stdout.splitlines()[0]
+
+
+def test_a_run_takes_what_a_flight_takes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    quick = "[planner]\npopulation = 20\ngenerations = 5\n"
+    Path("field.toml").write_text(FIELD + quick, encoding="utf-8")
+    options = ["--wind", "5,90", "--turbulence", "none", "--airspeed", "22", "--guidance", "path", "--nav", "rtk"]
+    assert main(["run", "field.toml", *options, "--log-hz", "10", "--out", "out"]) == 0
+    log = read_log(Path("out/flight.mcap"))
+    wind = log.setup.scenario.wind
+    assert (wind.speed, math.degrees(wind.from_course), wind.turbulence) == (5.0, pytest.approx(90.0), "none")
+    assert (log.setup.route.airspeed == 22.0).all()
+    assert (log.setup.guidance, log.setup.nav, log.setup.aircraft) == ("path", "rtk", "aerosonde")
+    assert log.track.time[1] - log.track.time[0] == pytest.approx(0.1)
+    # The plan was made in that wind, too, and the report names the line that repeats it.
+    assert json.loads(Path("out/plan.json").read_text(encoding="utf-8"))["scenario"]["wind"]["speed_mps"] == 5.0
+    page = Path("out/report.html").read_text(encoding="utf-8")
+    assert "planfly run field.toml --seed 1 --airspeed 22.0 --wind 5,90 --turbulence none" in page

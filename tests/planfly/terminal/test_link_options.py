@@ -30,6 +30,7 @@ def test_addresses_are_split_and_normalised() -> None:
         ({"bind": "127.0.0.1"}, "--bind 127.0.0.1: IP:PORT is expected"),
         ({"bind": "127.0.0.1:65536"}, "--bind 127.0.0.1:65536: IP:PORT is expected"),
         ({"to": "127.0.0.1:14550,"}, "--to : IP:PORT is expected"),
+        ({"to": "14550"}, "--to 14550: IP:PORT is expected, such as 127.0.0.1:14550"),
         ({"to": "localhost:14550"}, "--to localhost: an IP address is expected"),
         ({"allow": "me"}, "--allow me: an IP address is expected"),
         # The link's own rule: nobody beyond this machine without a key or a list.

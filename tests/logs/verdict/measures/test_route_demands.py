@@ -92,3 +92,19 @@ def test_a_slopes_blend_is_a_parabola_about_the_waypoint_or_about_each_end_of_it
     radius = float(demands.radius[1])
     on_arc = (0.04 - 0.01) * radius / (radius * 0.5 * math.pi)
     assert demands.blend[1] == pytest.approx(max(abs(on_arc - 0.04), abs(on_arc + 0.01)) * parabola)
+
+
+def test_a_leg_names_the_item_that_it_leads_to_and_none_of_ours() -> None:
+    setup = make_setup(RIGHT_ANGLE)
+    # As after a jump back to item 4, and along a lead-out that no item asks for.
+    items = np.array([4, 4, -1])
+    demands = route_demands(replace(setup, route=replace(setup.route, items=items)))
+    assert [(demands.leg(k).index, demands.leg(k).to_item) for k in range(2)] == [(0, 4), (1, None)]
+    assert [demands.waypoint(k).item for k in range(3)] == [4, 4, None]
+
+
+def test_limits_of_a_mission_without_a_scenario_are_not_the_scenarios() -> None:
+    setup = make_setup(RIGHT_ANGLE)
+    assert route_demands(setup).limits_source == "scenario"
+    alone = replace(setup, scenario=replace(setup.scenario, external=True))
+    assert route_demands(alone).limits_source == "default"

@@ -1,0 +1,1 @@
+"""Commands on planfly itself: its help, and what a shell completes."""

@@ -1,0 +1,1 @@
+"""What commands answer with ``--json``: data with a schema a command."""

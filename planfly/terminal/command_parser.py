@@ -1,0 +1,86 @@
+"""A parser that answers bad usage in a line, names the option that was meant, and lays its help out in groups."""
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from typing import Any, NoReturn, Protocol
+
+from planfly.terminal.colour import coloured, help_formatter
+from planfly.terminal.exit_codes import BAD_INPUT, EXIT_CODES
+from world.text_files import did_you_mean
+
+_OPTION = re.compile(r"--[a-z][a-z-]*")
+
+
+class OptionTaker(Protocol):
+    """A parser, or a group of its options."""
+
+    def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
+        """Take an option."""
+
+
+class CommandParser(argparse.ArgumentParser):
+    """A parser of one command, or of the whole line."""
+
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(formatter_class=help_formatter, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        """One line, as for every other bad input."""
+        line = f"{self.prog}: {message} (see {self.prog} --help)"
+        self.exit(BAD_INPUT, coloured(line, "bad", sys.stderr) + "\n")
+
+    def group(self, title: str, description: str | None = None) -> OptionTaker:
+        """Options that stand together in the help, under a title."""
+        return self.add_argument_group(title, description)
+
+    def options(self) -> list[str]:
+        """The long options that it takes."""
+        return list(dict.fromkeys(_OPTION.findall(self.format_usage())))
+
+
+class LineParser(CommandParser):
+    """The parser of the whole line.  commands: those of its commands, by name."""
+
+    def __init__(self, version: str, description: str, example: str) -> None:
+        super().__init__(
+            prog="planfly",
+            description=description,
+            epilog=f"{example}\n\n{EXIT_CODES}",
+        )
+        self.add_argument("--version", action="version", version=f"planfly {version}")
+        self.commands: dict[str, CommandParser] = {}
+        # prog is named: to find it out argparse would lay out a help.
+        self._parsers = self.add_subparsers(
+            dest="command", metavar="COMMAND", required=True, parser_class=CommandParser, prog="planfly",
+            title="commands",
+        )  # fmt: skip
+
+    def command(self, name: str, summary: str, *examples: str, more: str = "") -> CommandParser:
+        """Make the parser of a command.  more: what its help says after the examples."""
+        shown = f"\n{' ' * len('example: ')}".join(examples)
+        made: CommandParser = self._parsers.add_parser(
+            name,
+            help=summary,
+            description=summary[0].upper() + summary[1:] + ".",
+            epilog=f"example: {shown}\n\n" + (f"{more}\n\n" if more else "") + EXIT_CODES,
+        )
+        self.commands[name] = made
+        return made
+
+    def parse_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
+    ) -> argparse.Namespace:
+        """The arguments by name; for bad usage one line that names what may have been meant, and SystemExit."""
+        words = sys.argv[1:] if args is None else list(args)
+        if words and not words[0].startswith("-") and words[0] not in self.commands:
+            there = did_you_mean(words[0], self.commands) or f"; there are {', '.join(self.commands)}"
+            self.error(f"{words[0]!r}: no such command{there}")
+        parsed, left = self.parse_known_args(words, namespace)
+        if left:
+            parser = self.commands[parsed.command]
+            unknown = next((word for word in left if word.startswith("-")), left[0]).partition("=")[0]
+            what = "option" if unknown.startswith("-") else "argument"
+            parser.error(f"{unknown}: no such {what}{did_you_mean(unknown, parser.options())}")
+        return parsed

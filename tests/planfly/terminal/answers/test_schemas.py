@@ -1,0 +1,34 @@
+"""Every command with --json has a schema that is one, with its command's name in it."""
+
+import json
+
+import jsonschema
+import pytest
+
+from planfly.terminal.answers.schemas import ANSWERS, answer_schema, schema_text
+from planfly.terminal.parser import build_parser
+
+
+def test_every_command_with_json_has_a_schema_and_no_other() -> None:
+    asked = {name for name, parser in build_parser().commands.items() if "--json" in parser.options()}
+    assert asked == set(ANSWERS)
+
+
+@pytest.mark.parametrize("command", ANSWERS)
+def test_each_is_a_schema_that_asks_for_its_name(command: str) -> None:
+    schema = answer_schema(command)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    assert "schema" in schema["required"]
+    assert schema["additionalProperties"] is False
+    assert json.loads(schema_text(command)) == schema
+    assert "planfly" in schema["properties"]["schema"]["const"]
+
+
+def test_no_two_answers_have_one_name() -> None:
+    names = [answer_schema(command)["properties"]["schema"]["const"] for command in ANSWERS]
+    assert len(set(names)) == len(names)
+
+
+def test_fields_are_described() -> None:
+    limit = answer_schema("check")["$defs"]["FindingDocument"]["properties"]["limit_source"]
+    assert limit["description"].startswith("Whose the limit is")
