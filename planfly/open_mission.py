@@ -61,7 +61,7 @@ def is_log(path: Path) -> bool:
         with path.open("rb") as file:
             head = file.read(len(MCAP_MAGIC))
     except OSError as error:
-        raise PlanflyError(f"{path}: cannot be read: {error.strerror}") from error
+        raise PlanflyError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     return head == MCAP_MAGIC or path.suffix.lower() == ".mcap"
 
 
@@ -85,7 +85,7 @@ def open_mission(
         return fences.on_scenario(change(scenario))
 
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected")
+        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected", file=path)
     if path.suffix.lower() == ".json":
         return _open_planned(path, scenario_name, terrain, seed, changed, fences)
     mission = fences.on_mission(read_mission(path))

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from world.errors import MissionError, ScenarioError
 from world.scenario import Scenario, from_spec
-from world.scenario_file import first_error
+from world.scenario_file import first_fault
 from world.scenario_variants import fixed_ends
 from world.terrain import Terrain
 
@@ -234,11 +234,11 @@ def parse_plan(
     try:
         data = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise MissionError(f"{source}: not valid JSON: {error}") from error
+        raise MissionError(f"{source}: not valid JSON: {error}", file=source) from error
     try:
         file = _PlanFile.model_validate(data)
     except ValidationError as error:
-        raise MissionError(f"{source}: {first_error(error, data)}") from error
+        raise MissionError(**first_fault(error, data).at(source)) from error
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
     waypoints = np.array(file.waypoints_east_north_amsl_m)
@@ -285,9 +285,9 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+        raise MissionError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     except UnicodeDecodeError as error:
-        raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
+        raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})", file=path) from error
     try:
         return parse_plan(text, str(path), base=path.parent, terrain=terrain)
     except ScenarioError as error:
@@ -304,4 +304,4 @@ def _refuse_constant(name: str) -> float:
 
 def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
     if sorted(given) != sorted(wanted):
-        raise MissionError(f"{source}: {field}: keys {sorted(given)}: expected {sorted(wanted)}")
+        raise MissionError(f"{source}: {field}: keys {sorted(given)}: expected {sorted(wanted)}", file=source)

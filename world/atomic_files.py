@@ -76,7 +76,7 @@ def hold(path: Path) -> Iterator[None]:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError as error:
-            raise PlanflyError(f"{path}: another planfly is writing there; name another target") from error
+            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path) from error
         yield
     finally:
         os.close(handle)

@@ -44,6 +44,6 @@ def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat
     # JSBSim's own errors are RuntimeErrors.
     except (RuntimeError, ValueError, OSError) as error:
         message = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
-        raise FlightError(f"{aircraft.model_file}: JSBSim: {message}") from None
+        raise FlightError(f"{aircraft.model_file}: JSBSim: {message}", file=aircraft.model_file) from None
     if not loaded:
-        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model")
+        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model", file=aircraft.model_file)

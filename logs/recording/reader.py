@@ -170,7 +170,7 @@ def read_log(path: Path) -> FlightLog:
     messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
-            raise LogError(f"{path}: not a file: a flight log (.mcap) is expected")
+            raise LogError(f"{path}: not a file: a flight log (.mcap) is expected", file=path)
         with path.open("rb") as file:
             _check_magic(file.read(len(MAGIC)), path)
             for data in read_chunks(file, found):
@@ -180,15 +180,17 @@ def read_log(path: Path) -> FlightLog:
                     found.problem = f"chunk {messages.chunks} holds records that cannot be read"
                     break
     except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+        raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if not messages.chunks:
-        raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}")
+        raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}", file=path)
     if SETUP_FILE not in found.attachments and found.problem:
-        raise LogError(f"{path}: holds no setup: {found.problem}")
+        raise LogError(f"{path}: holds no setup: {found.problem}", file=path)
     stored = unpack_setup(found.attachments, str(path))
     rows, fault = _good_rows(messages.rows(), len(stored.setup.route.waypoints))
     if not len(rows):
-        raise LogError(f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}")
+        raise LogError(
+            f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}", file=path
+        )
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
     beside, unread = _beside(found.attachments)
@@ -214,9 +216,9 @@ def read_log(path: Path) -> FlightLog:
 
 def _check_magic(magic: bytes, path: Path) -> None:
     if not magic:
-        raise LogError(f"{path}: empty: a flight log (.mcap) is expected")
+        raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path, field="empty")
     if magic != MAGIC:
-        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected")
+        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected", file=path)
 
 
 def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:

@@ -147,5 +147,7 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     """
     found = ALGORITHMS.get(DEFAULT if name is None else name)
     if found is None:
-        raise ScenarioError(f"{source}: planner.algorithm: {name!r}: not known; allowed: {', '.join(ALGORITHMS)}")
+        raise ScenarioError.at(
+            source, "planner.algorithm", name, f"not known; allowed: {', '.join(ALGORITHMS)}", shown=f"{name!r}"
+        )
     return found
