@@ -13,6 +13,10 @@
 
 from typing import TYPE_CHECKING, Any
 
+from planfly.own_packages import refuse_hidden_packages
+
+refuse_hidden_packages()
+
 __version__ = "0.1.0"
 __all__ = ["CampaignResult", "PlanThenFly", "__version__", "campaign", "plan_then_fly"]
 
