@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from world.errors import MissionError, ScenarioError
+from world.errors import MissionError
 from world.scenario import Scenario, from_spec
 from world.scenario_file import first_fault
 from world.scenario_variants import fixed_ends
@@ -74,7 +74,7 @@ class Certificate:
         return not self.problems
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Plan:
     """A planned path.
 
@@ -123,6 +123,21 @@ class Plan:
     def safe(self) -> bool:
         """Feasible, and outside every missile sphere."""
         return self.feasible and self.certificate.kill_distance > 0.0
+
+    @property
+    def state(self) -> str:
+        """Safe, feasible or neither, in words."""
+        return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
+
+    def __repr__(self) -> str:
+        ratio = self.objectives[Objective.LENGTH_RATIO]
+        return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        from planner.plan_table import plan_html
+
+        return plan_html(self)
 
 
 class _Model(BaseModel):
@@ -288,10 +303,7 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
         raise MissionError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     except UnicodeDecodeError as error:
         raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})", file=path) from error
-    try:
-        return parse_plan(text, str(path), base=path.parent, terrain=terrain)
-    except ScenarioError as error:
-        raise ScenarioError(str(error)) from error
+    return parse_plan(text, str(path), base=path.parent, terrain=terrain)
 
 
 def _or_inf(value: float | None) -> float:
