@@ -19,6 +19,7 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.along_track import segment_clearances
 from logs.verdict.measures.path_sweeps import path_spheres
 from world.geometry import path_length
+from world.notebooks.html_table import html_table
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +34,7 @@ class Difference:
     second: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Comparison:
     """Two flights and what differs.
 
@@ -47,6 +48,13 @@ class Comparison:
     verdicts: tuple[Verdict, Verdict]
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<Comparison {' and '.join(self.names)}: {len(self.differences)} quantities, {len(self.notes)} notes>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return html_table(" and ".join(self.names), difference_rows(self), ("", "", *self.names, "difference"))
 
 
 def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
