@@ -31,7 +31,8 @@ __all__ = ["EMBEDDED", "MOST_PIXELS", "RasterFile", "open_raster", "read_terrain
 
 Floats = NDArray[np.float64]
 
-EMBEDDED = {"jacksboro": "jacksboro_fault_dem.npz"}
+# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
+EMBEDDED = {"jacksboro": "jacksboro.npz"}
 # Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
 UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
 LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
@@ -44,6 +45,7 @@ MOST_BLOCK = 32 * 2**20
 _PIXELS_AT_ONCE = 2**22
 # Pixels without data that are looked at before the next ones: one inside the area is enough.
 _HOLES_AT_ONCE = 2**16
+_OWN_FILES = Path(__file__).parent / "elevation"
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
@@ -56,10 +58,7 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     (344, 403)
     """
     if path in EMBEDDED:
-        from matplotlib import cbook
-
-        found = cbook.get_sample_data(EMBEDDED[path], asfileobj=False)
-        return open_npz(Path(str(found)), path)
+        return open_npz(_OWN_FILES / EMBEDDED[path], path)
     if path.startswith("/vsi") or "://" in path:
         raise TerrainError(
             f"{path}: terrain path: only local files are read, not URLs or virtual file systems", file=path

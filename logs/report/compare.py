@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from flight.simulation.control_limits import control_limits, held_at_limit
 from flight.simulation.flight_setup import FlightSetup
@@ -161,6 +160,9 @@ def _notes(first: FlightLog, second: FlightLog) -> list[str]:
     if a.scenario.origin == b.scenario.origin:
         there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
         if len(there) and len(here):
+            # Imported here: nothing else of a report needs it.
+            from scipy.spatial import KDTree
+
             away = KDTree(there).query(here)[0]
             notes.append(
                 f"tracks: {number(float(away.mean()))} m apart on average, {number(float(away.max()))} m at most"

@@ -46,9 +46,9 @@ def plan(
     >>> import planfly
     >>> path = planfly.plan("tight", seed=1)
     >>> path
-    <Plan tight: 12 waypoints, safe, ...>
+    <Plan tight: 22 waypoints, safe, ...>
     >>> path.waypoints.shape
-    (12, 3)
+    (22, 3)
     """
     world = changed_scenario(
         opened_scenario(scenario), wind=wind, turbulence=turbulence, aircraft=aircraft, airspeed=airspeed,
