@@ -70,7 +70,10 @@ def test_a_script_of_such_a_name_is_named(tmp_path: Path) -> None:
 
 def test_a_program_of_modules_that_uses_planfly_gets_the_exception(tmp_path: Path) -> None:
     (tmp_path / "logs.py").touch()
-    (tmp_path / "mine.py").write_text("import planfly\n")
+    (tmp_path / "mine").mkdir()
+    # Python imports the package while it still looks for what to run.
+    (tmp_path / "mine" / "__init__.py").write_text("import planfly\n")
+    (tmp_path / "mine" / "__main__.py").touch()
     done = python(tmp_path, "-m", "mine")
     assert (done.returncode, "Traceback" in done.stderr) == (1, True)
 
