@@ -2,32 +2,101 @@
 
     import planfly
 
-    result = planfly.plan_then_fly("jacksboro", seed=1)
-    print(result.verdict.summary)
+    path = planfly.plan("jacksboro", seed=1)
+    flown = planfly.fly(path, wind=(8, 270), turbulence="light", log="flight.mcap")
+    print(flown.verdict.summary)
+    planfly.figures(flown)["map"].savefig("map.png")
+    planfly.export(path, "mission.waypoints")
+    planfly.report(flown, "report")
 
-    sure = planfly.campaign("plan.json", prove=0.99)
-    print(sure.probability, sure.interval)
+plan, fly, plan_then_fly     make a path, fly a plan or a mission file, or both at once
+check, read_log              judge a log, a plan or a mission; read a log, its track as a table
+figures, report, compare     matplotlib figures; a page of a flight; two flights beside each other
+export                       a mission in the forms that ground stations and maps read
+campaign, winds              how likely it is to fly; the largest wind from each direction
+scenarios, aircraft          what is embedded
+optimise                     the planner's estimation of distribution algorithm alone, by ask and tell
+PlanflyError                 what bad input raises, with file, field, value and allowed; and its kinds
 
-`plan_then_fly` and `campaign` are the public Python API; the command line is ``planfly --help``.
+Paths are `str` or `pathlib.Path`.  The command line is ``planfly --help``.
 """
 
 from typing import TYPE_CHECKING, Any
 
+from planfly.own_packages import refuse_hidden_packages
+
+refuse_hidden_packages()
+
 __version__ = "0.1.0"
-__all__ = ["CampaignResult", "PlanThenFly", "__version__", "campaign", "plan_then_fly"]
 
 if TYPE_CHECKING:
-    from planfly.campaigns.campaign_result import CampaignResult
-    from planfly.campaigns.campaign_result import run_campaign as campaign
-    from planfly.pipeline import PlanThenFly, plan_then_fly
+    from flight.simulation.track import Track as Track
+    from logs.recording.reader import FlightLog as FlightLog
+    from logs.recording.reader import read_log as read_log
+    from logs.report.compare import Comparison as Comparison
+    from logs.verdict.findings import Verdict as Verdict
+    from planfly.api.aircraft_data import aircraft as aircraft
+    from planfly.api.flying import check as check
+    from planfly.api.flying import fly as fly
+    from planfly.api.optimising import BestFound as BestFound
+    from planfly.api.optimising import Optimiser as Optimiser
+    from planfly.api.optimising import optimise as optimise
+    from planfly.api.planning import plan as plan
+    from planfly.api.planning import scenarios as scenarios
+    from planfly.api.reporting import compare as compare
+    from planfly.api.reporting import export as export
+    from planfly.api.reporting import figures as figures
+    from planfly.api.reporting import report as report
+    from planfly.api.results import ExportedFiles as ExportedFiles
+    from planfly.api.results import FlownMission as FlownMission
+    from planfly.api.results import WrittenReport as WrittenReport
+    from planfly.api.wind_limits import winds as winds
+    from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
+    from planfly.campaigns.campaign_result import campaign as campaign
+    from planfly.campaigns.engine.cluster import SchedulerError as SchedulerError
+    from planfly.campaigns.find_winds import WindsFound as WindsFound
+    from planfly.campaigns.spread.spread_file import SpreadError as SpreadError
+    from planfly.pipeline import PlanThenFly as PlanThenFly
+    from planfly.pipeline import plan_then_fly as plan_then_fly
+    from planner.plan import Plan as Plan
+    from world.errors import FlightError as FlightError
+    from world.errors import LogError as LogError
+    from world.errors import MissionError as MissionError
+    from world.errors import ParameterError as ParameterError
+    from world.errors import PlanflyError as PlanflyError
+    from world.errors import ScenarioError as ScenarioError
+    from world.errors import StartError as StartError
+    from world.errors import TerrainError as TerrainError
 
-# Module and name there of each public name.
+# The module of each public name.
 _HOMES = {
-    "PlanThenFly": ("planfly.pipeline", "PlanThenFly"),
-    "plan_then_fly": ("planfly.pipeline", "plan_then_fly"),
-    "CampaignResult": ("planfly.campaigns.campaign_result", "CampaignResult"),
-    "campaign": ("planfly.campaigns.campaign_result", "run_campaign"),
+    name: module
+    for module, names in {
+        "flight.simulation.track": ("Track",),
+        "logs.recording.reader": ("FlightLog", "read_log"),
+        "logs.report.compare": ("Comparison",),
+        "logs.verdict.findings": ("Verdict",),
+        "planfly.api.aircraft_data": ("aircraft",),
+        "planfly.api.flying": ("check", "fly"),
+        "planfly.api.optimising": ("BestFound", "Optimiser", "optimise"),
+        "planfly.api.planning": ("plan", "scenarios"),
+        "planfly.api.reporting": ("compare", "export", "figures", "report"),
+        "planfly.api.results": ("ExportedFiles", "FlownMission", "WrittenReport"),
+        "planfly.api.wind_limits": ("winds",),
+        "planfly.campaigns.campaign_result": ("CampaignResult", "campaign"),
+        "planfly.campaigns.engine.cluster": ("SchedulerError",),
+        "planfly.campaigns.find_winds": ("WindsFound",),
+        "planfly.campaigns.spread.spread_file": ("SpreadError",),
+        "planfly.pipeline": ("PlanThenFly", "plan_then_fly"),
+        "planner.plan": ("Plan",),
+        "world.errors": (
+            *("FlightError", "LogError", "MissionError", "ParameterError", "PlanflyError", "ScenarioError"),
+            *("StartError", "TerrainError"),
+        ),
+    }.items()
+    for name in names
 }
+__all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:
@@ -35,6 +104,10 @@ def __getattr__(name: str) -> Any:
     if name in _HOMES:
         from importlib import import_module
 
-        module, there = _HOMES[name]
-        return getattr(import_module(module), there)
+        return getattr(import_module(_HOMES[name]), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """The public names, whatever of planfly is loaded."""
+    return sorted(__all__)

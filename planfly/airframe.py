@@ -83,7 +83,9 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
         aircraft = find_aircraft(table.aircraft)
         model_hash(aircraft)
     except ValueError as error:
-        raise ScenarioError(f"{scenario.name}: flight.aircraft: {error}") from error
+        raise ScenarioError(
+            f"{scenario.name}: flight.aircraft: {error}", file=scenario.name, field="flight.aircraft"
+        ) from error
     return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 
 

@@ -13,7 +13,7 @@ from flight.simulation.flight_setup import FlightSetup
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.named_fences import NamedFences
 from planfly.pipeline import make_setup
-from planner.plan import Plan, read_plan
+from planner.plan import Plan, parse_plan, plan_json, read_plan
 from world.errors import MissionError, PlanflyError
 from world.scenario import Scenario, load_scenario
 from world.text_files import did_you_mean
@@ -22,6 +22,8 @@ MCAP_MAGIC = b"\x89MCAP"
 
 ScenarioChange = Callable[[Scenario], Scenario]
 _NO_FENCES = NamedFences()
+# What the mission of a plan that is no file is said to be from.
+_PLAN_FILE, _PLAN_STEM = "plan.json", "plan"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +64,7 @@ def is_log(path: Path) -> bool:
         with path.open("rb") as file:
             head = file.read(len(MCAP_MAGIC))
     except OSError as error:
-        raise PlanflyError(f"{path}: cannot be read: {error.strerror}") from error
+        raise PlanflyError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     return head == MCAP_MAGIC or path.suffix.lower() == ".mcap"
 
 
@@ -87,9 +89,10 @@ def open_mission(
 
     if not path.is_file():
         near = did_you_mean(path.name, _mission_names(path.parent))
-        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}")
+        raise MissionError(f"{path}: no such file; a plan.json, .waypoints or .plan file is expected{near}", file=path)
     if path.suffix.lower() == ".json":
-        return _open_planned(path, scenario_name, terrain, seed, changed, fences)
+        opened = open_plan(path, terrain, changed)
+        return _placed(opened, path.stem, scenario_name, terrain, seed, changed, fences)
     mission = fences.on_mission(read_mission(path))
     if scenario_name is not None:
         scenario = changed(load_scenario(scenario_name, terrain))
@@ -115,16 +118,46 @@ def open_plan(path: Path, terrain: str | None = None, change: ScenarioChange = _
 
     terrain, change: as of `open_mission`.  Raises MissionError, ScenarioError or TerrainError.
     """
-    plan = read_plan(path, terrain=terrain)
+    return _with_mission(read_plan(path, terrain=terrain), str(path), change)
+
+
+def open_planned(
+    plan: Plan,
+    scenario_name: str | None = None,
+    terrain: str | None = None,
+    *,
+    seed: int | None = None,
+    change: ScenarioChange = _unchanged,
+    fences: NamedFences = _NO_FENCES,
+) -> OpenedMission:
+    """A plan that is at hand, opened as `open_mission` opens the file of one; its mission's source is plan.json.
+
+    >>> from planfly.pipeline import make_plan
+    >>> scenario = load_scenario("paper-07")
+    >>> opened = open_planned(make_plan(scenario, load_airframe(scenario), 1))
+    >>> opened.name, opened.setup.mission.source
+    ('paper-07', 'plan.json')
+    """
+    if terrain is not None:
+        plan = parse_plan(plan_json(plan), _PLAN_FILE, terrain=terrain)
+
+    def changed(scenario: Scenario) -> Scenario:
+        return fences.on_scenario(change(scenario))
+
+    return _placed(_with_mission(plan, _PLAN_FILE, changed), _PLAN_STEM, scenario_name, terrain, seed, changed, fences)
+
+
+def _with_mission(plan: Plan, source: str, change: ScenarioChange) -> OpenedPlan:
     scenario = change(plan.scenario)
     airframe = load_airframe(scenario)
     tracking = airframe.limits.tracking
-    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=str(path), tracking=tracking)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source=source, tracking=tracking)
     return OpenedPlan(plan, scenario, airframe, mission)
 
 
-def _open_planned(
-    path: Path,
+def _placed(
+    opened: OpenedPlan,
+    stem: str,
     scenario_name: str | None,
     terrain: str | None,
     seed: int | None,
@@ -132,12 +165,11 @@ def _open_planned(
     fences: NamedFences,
 ) -> OpenedMission:
     """A plan in the scenario it was made for, or its mission in another."""
-    opened = open_plan(path, terrain, change)
     number, mission = seed if seed is not None else opened.plan.seed, fences.on_mission(opened.mission)
     if scenario_name is not None:
         # The plan's waypoints are in the map of its own scenario: another judges the mission, as a file.
         other = change(load_scenario(scenario_name, terrain))
         airframe = load_airframe(other)
-        return OpenedMission(make_setup(other, airframe, mission, number), airframe, path.stem)
+        return OpenedMission(make_setup(other, airframe, mission, number), airframe, stem)
     setup = make_setup(opened.scenario, opened.airframe, mission, number, plan=opened.plan)
     return OpenedMission(setup, opened.airframe, opened.scenario.name)

@@ -44,7 +44,7 @@ MOST_STORES = 2.0
 _USUAL_LIMITS = FlightLimits()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class PlanThenFly:
     """What `plan_then_fly` returns.
 
@@ -62,6 +62,13 @@ class PlanThenFly:
     mission: Mission
     track: Track | None
     verdict: Verdict
+
+    def __repr__(self) -> str:
+        return f"<PlanThenFly {self.plan!r}, {self.verdict!r}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return self.plan._repr_html_() + self.verdict._repr_html_()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +103,9 @@ class JudgedFlight:
     beside: FlownBeside | None = None
 
 
-def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Path | str | None = None) -> PlanThenFly:
+def plan_then_fly(
+    scenario: Scenario | str | Path, *, seed: int | None = None, log: Path | str | None = None
+) -> PlanThenFly:
     """Plan a path, fly it in JSBSim and judge the flight.
 
     scenario: an embedded name, a TOML file's path, or a `Scenario`.  seed: of planner and turbulence; None takes
@@ -107,7 +116,7 @@ def plan_then_fly(scenario: Scenario | str, *, seed: int | None = None, log: Pat
     >>> result.plan.safe, result.verdict.flyable
     (True, False)
     """
-    world = load_scenario(scenario) if isinstance(scenario, str) else scenario
+    world = scenario if isinstance(scenario, Scenario) else load_scenario(str(scenario))
     number = choose_seed(world, seed)
     airframe = load_airframe(world)
     plan = make_plan(world, airframe, number)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from world.errors import MissionError, ScenarioError
+from world.errors import MissionError
 from world.scenario import Scenario, from_spec
-from world.scenario_file import first_error
+from world.scenario_file import first_fault
 from world.scenario_variants import fixed_ends
 from world.terrain import Terrain
 
@@ -74,7 +74,7 @@ class Certificate:
         return not self.problems
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Plan:
     """A planned path.
 
@@ -123,6 +123,21 @@ class Plan:
     def safe(self) -> bool:
         """Feasible, and outside every missile sphere."""
         return self.feasible and self.certificate.kill_distance > 0.0
+
+    @property
+    def state(self) -> str:
+        """Safe, feasible or neither, in words."""
+        return "safe" if self.safe else "feasible, but inside a missile's reach" if self.feasible else "not feasible"
+
+    def __repr__(self) -> str:
+        ratio = self.objectives[Objective.LENGTH_RATIO]
+        return f"<Plan {self.scenario.name}: {len(self.waypoints)} waypoints, {self.state}, {ratio:.4f} times straight>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        from planner.plan_table import plan_html
+
+        return plan_html(self)
 
 
 class _Model(BaseModel):
@@ -234,11 +249,11 @@ def parse_plan(
     try:
         data = json.loads(text, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise MissionError(f"{source}: not valid JSON: {error}") from error
+        raise MissionError(f"{source}: not valid JSON: {error}", file=source) from error
     try:
         file = _PlanFile.model_validate(data)
     except ValidationError as error:
-        raise MissionError(f"{source}: {first_error(error, data)}") from error
+        raise MissionError(**first_fault(error, data).at(source)) from error
     _check_names(source, "violations", file.violations, [item.name.lower() for item in Violation])
     _check_names(source, "objectives", file.objectives, [item.name.lower() for item in Objective])
     waypoints = np.array(file.waypoints_east_north_amsl_m)
@@ -285,13 +300,10 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+        raise MissionError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     except UnicodeDecodeError as error:
-        raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
-    try:
-        return parse_plan(text, str(path), base=path.parent, terrain=terrain)
-    except ScenarioError as error:
-        raise ScenarioError(str(error)) from error
+        raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})", file=path) from error
+    return parse_plan(text, str(path), base=path.parent, terrain=terrain)
 
 
 def _or_inf(value: float | None) -> float:
@@ -304,4 +316,4 @@ def _refuse_constant(name: str) -> float:
 
 def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
     if sorted(given) != sorted(wanted):
-        raise MissionError(f"{source}: {field}: keys {sorted(given)}: expected {sorted(wanted)}")
+        raise MissionError(f"{source}: {field}: keys {sorted(given)}: expected {sorted(wanted)}", file=source)

@@ -1,14 +1,20 @@
 """Files that are written whole or not at all, folders that do not outlive their use, targets kept to one process."""
 
 import contextlib
-import fcntl
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from world.errors import PlanflyError
 from world.interruption import unfinished, uninterrupted
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 
 def write_whole(path: Path, data: str | bytes) -> None:
@@ -94,12 +100,38 @@ def hold(path: Path) -> Iterator[None]:
     ...         print("held")
     held
     """
-    handle = os.open(path, os.O_RDONLY)
-    try:
+    with contextlib.ExitStack() as held:
+        try:
+            held.enter_context(_locked(path))
+        except (BlockingIOError, PermissionError) as error:
+            if isinstance(error, PermissionError) and fcntl is not None:
+                raise
+            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path) from error
+        yield
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """The system's lock on a file or folder.
+
+    Raises BlockingIOError, on Windows PermissionError, where another has it.
+    """
+    if fcntl is not None:
+        handle = os.open(path, os.O_RDONLY)
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise PlanflyError(f"{path}: another planfly is writing there; name another target") from error
+            yield
+        finally:
+            os.close(handle)
+        return
+    # Windows locks bytes of files, for readers too, and opens no folder: a file beside stands for either.
+    beside = path.with_name(f".{path.name}.planfly-lock")
+    handle = os.open(beside, os.O_RDWR | os.O_CREAT)
+    try:
+        windows: Any = import_module("msvcrt")
+        windows.locking(handle, windows.LK_NBLCK, 1)
         yield
     finally:
         os.close(handle)
+        with contextlib.suppress(OSError):
+            beside.unlink()

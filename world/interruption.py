@@ -132,6 +132,10 @@ def deaf_children() -> Iterator[None]:
     # Imported here: few commands have children, and --help answers at once.
     from multiprocessing import resource_tracker
 
+    if not hasattr(signal, "pthread_sigmask"):
+        # Windows: a console's children hear it, whatever their parent does.
+        yield
+        return
     # It unblocks the signal again where it is started later.
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})

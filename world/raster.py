@@ -32,7 +32,8 @@ __all__ = ["EMBEDDED", "MOST_PIXELS", "RasterFile", "open_raster", "read_terrain
 
 Floats = NDArray[np.float64]
 
-EMBEDDED = {"jacksboro": "jacksboro_fault_dem.npz"}
+# Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
+EMBEDDED = {"jacksboro": "jacksboro.npz"}
 # Data that is missing without a stated nodata value: these, and what is lower or higher than any ground, m.
 UNSTATED_NODATA = (-9999.0, -32768.0, -32767.0)
 LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
@@ -45,6 +46,7 @@ MOST_BLOCK = 32 * 2**20
 _PIXELS_AT_ONCE = 2**22
 # Pixels without data that are looked at before the next ones: one inside the area is enough.
 _HOLES_AT_ONCE = 2**16
+_OWN_FILES = Path(__file__).parent / "elevation"
 EARTH_DATUM = "mean sea level, as the file's heights are taken"
 
 
@@ -57,24 +59,24 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     (344, 403)
     """
     if path in EMBEDDED:
-        from matplotlib import cbook
-
-        found = cbook.get_sample_data(EMBEDDED[path], asfileobj=False)
-        return open_npz(Path(str(found)), path)
+        return open_npz(_OWN_FILES / EMBEDDED[path], path)
     if path.startswith("/vsi") or "://" in path:
-        raise TerrainError(f"{path}: terrain path: only local files are read, not URLs or virtual file systems")
+        raise TerrainError(
+            f"{path}: terrain path: only local files are read, not URLs or virtual file systems", file=path
+        )
     file = Path(path) if base is None else base / path
     if not file.is_file():
         known = ", ".join(sorted(EMBEDDED))
         raise TerrainError(
             f"{file}: terrain path: no such file (a .tif, .hgt or .npz file, or one of: {known})"
-            f"{did_you_mean(path, EMBEDDED)}"
+            f"{did_you_mean(path, EMBEDDED)}",
+            file=file,
         )
     try:
         with file.open("rb") as handle:
             head = handle.read(4)
     except OSError as error:
-        raise TerrainError(f"{file}: cannot be read: {error.strerror}") from error
+        raise TerrainError(f"{file}: cannot be read: {error.strerror}", file=file) from error
     if head[:2] == b"PK":
         return open_npz(file, str(path))
     if head in (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"):
@@ -82,7 +84,7 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     if file.suffix.lower() == ".hgt":
         return _open_rasterio(file, "SRTMHGT")
     raise TerrainError(
-        f"{file}: not an elevation file: a GeoTIFF, an SRTM .hgt or an .npz with `elevation` is expected"
+        f"{file}: not an elevation file: a GeoTIFF, an SRTM .hgt or an .npz with `elevation` is expected", file=file
     )
 
 
@@ -103,7 +105,8 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     if e0 < -1e-6 or n0 < -1e-6 or e1 > cols - 1 + 1e-6 or n1 > rows - 1 + 1e-6:
         raise TerrainError(
             f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
-            f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}"
+            f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}",
+            file=raster.name,
         )
     c0, c1, r0, r1 = _outline_window(raster, origin, box, buffer)
     left, right = max(0, math.floor(c0) - 1), min(cols, math.ceil(c1) + 2)
@@ -111,7 +114,8 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     if (right - left) * (bottom - top) > MOST_PIXELS:
         raise TerrainError(
             f"{raster.name}: the area needs {(right - left) * (bottom - top):,} pixels;"
-            f" at most {MOST_PIXELS:,} are read"
+            f" at most {MOST_PIXELS:,} are read",
+            file=raster.name,
         )
     heights = raster.read(top, bottom, left, right)
     valid = (heights >= LOWEST_GROUND) & (heights <= HIGHEST_GROUND) & ~np.isin(heights, UNSTATED_NODATA)
@@ -122,7 +126,9 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
         PIXEL_TOLERANCE,
     )
     if to_pixel.residual > 10 * PIXEL_TOLERANCE:
-        raise TerrainError(f"{raster.name}: the area is too large to map: {to_pixel.residual:.2g} pixels of error")
+        raise TerrainError(
+            f"{raster.name}: the area is too large to map: {to_pixel.residual:.2g} pixels of error", file=raster.name
+        )
     middle = box.mean(axis=1)
     col, row = to_pixel(middle[0] + np.array([0.0, 100.0, 0.0]), middle[1] + np.array([0.0, 0.0, 100.0]))
     # Columns and rows per metre of the map; the pitch is the length of the shorter pixel side.
@@ -203,7 +209,7 @@ def tile_bounds(raster: RasterFile, origin: GeoOrigin) -> Floats:
         c0, c1, r0, r1 = _outline_window(raster, origin, box, 0.0)
         if c0 >= 0 and r0 >= 0 and c1 <= cols - 1 and r1 <= rows - 1:
             return box
-    raise TerrainError(f"{raster.name}: no upright area fits inside the tile; give [area]")
+    raise TerrainError(f"{raster.name}: no upright area fits inside the tile; give [area]", file=raster.name)
 
 
 def _tile_cover(raster: RasterFile, origin: GeoOrigin) -> str:
@@ -255,17 +261,19 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         transformer = None if crs is None else crs_transformer(crs.to_wkt())
         stated, metres = height_unit(crs.to_wkt()) if crs is not None else ("metre", 1.0)
     except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
-        raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}") from error
+        raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}", file=file) from error
     if bands != 1 or kind not in "iuf":
-        raise TerrainError(f"{file}: bands: {bands} of kind {kind!r}; an elevation file has 1 band of numbers")
+        found = f"{bands} of kind {kind!r}"
+        raise TerrainError(f"{file}: bands: {found}; an elevation file has 1 band of numbers", file=file)
     if transformer is None or forward.determinant == 0.0:
-        raise TerrainError(f"{file}: no coordinate reference system and position are stated")
+        raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
     if (unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError(f"{file}: heights in {stated if metres != 1.0 else unit}: metres are expected")
+        raise TerrainError(f"{file}: heights in {stated if metres != 1.0 else unit}: metres are expected", file=file)
     if block > MOST_BLOCK:
-        raise TerrainError(f"{file}: blocks of {block:,} pixels, read whole: at most {MOST_BLOCK:,} are; tile the file")
+        allowed = f"at most {MOST_BLOCK:,} are; tile the file"
+        raise TerrainError(f"{file}: blocks of {block:,} pixels, read whole: {allowed}", file=file, allowed=allowed)
     if min(rows, cols) < 2:
-        raise TerrainError(f"{file}: size {cols} x {rows}: at least 2 x 2 pixels are expected")
+        raise TerrainError(f"{file}: size {cols} x {rows}: at least 2 x 2 pixels are expected", file=file)
 
     inverse = ~forward
     middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan
@@ -282,7 +290,7 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
             with rasterio.Env(**guard), rasterio.open(os.fspath(file.resolve()), driver=driver) as opened:
                 return _read_strips(opened, (top, bottom, left, right), scale, offset)
         except (RasterioError, RasterioIOError, OSError) as error:
-            raise TerrainError(f"{file}: cannot be read: {one_line(error)}") from error
+            raise TerrainError(f"{file}: cannot be read: {one_line(error)}", file=file) from error
 
     col, row = outline(cols, rows)
     x, y = _applied(forward, col + 0.5, row + 0.5)

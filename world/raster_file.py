@@ -18,8 +18,8 @@ ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 # A window, or an .npz file, with more pixels than this is refused before it is allocated.
 MOST_PIXELS = 120_000_000
-# Rows of the tile that matplotlib ships, and what it states as xmin, xmax, ymin and ymax, deg; a copy of it under
-# another name is known by them, to a hundredth of a pixel.
+# Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
+# it under another name is known by them, to a hundredth of a pixel.
 _TILE_ROWS, _TILE_EDGES, _SAME_EDGE = 344, (-84.41375, -84.07791667, 36.73291667, 36.44625), 1e-5
 
 
@@ -78,7 +78,7 @@ def one_line(error: BaseException) -> str:
 def open_npz(file: Path, name: str) -> RasterFile:
     """Open an .npz with `elevation` (rows from north to south) and xmin, xmax, ymin, ymax: pixel edges in degrees.
 
-    The order within each pair does not matter, but for the tile that matplotlib ships: see `_edges`.
+    The order within each pair does not matter, but for the tile that we ship: see `_edges`.
     Raises TerrainError.
     """
     heights, edges = _read_npz(file, name)
@@ -110,7 +110,7 @@ def open_npz(file: Path, name: str) -> RasterFile:
 def _edges(stated: list[float], rows: int) -> tuple[float, float, float, float]:
     """West, east, south and north edge, deg, of what a file states as xmin, xmax, ymin, ymax.
 
-    In matplotlib's tile of 344 rows ymax, 36.44625, is the north edge, and ymin, 36.73292, is that plus the tile's
+    In the tile of 344 rows that we ship ymax, 36.44625, is the north edge, and ymin, 36.73292, is that plus the tile's
     height where it should be less: read as south and north edge the tile stands 0.28667 degrees too far north.  So the
     ground says: the highest pixel lies 0.2479 degrees south of the tile's north edge, and Cross Mountain, as high, at
     36.1983 N; the lake ends 0.2208 degrees south of it, and Norris Dam stands at 36.2242 N (both places:

@@ -123,7 +123,9 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
         missing = True
     if missing:
         near = did_you_mean(name_or_path, [*known, *_files_beside(path)])
-        raise ScenarioError(f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)}){near}")
+        raise ScenarioError(
+            f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)}){near}", file=name_or_path
+        )
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
 
@@ -189,7 +191,7 @@ def from_spec(
     elif raster is not None:
         bounds = tile_bounds(raster, origin)
     else:
-        raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from")
+        raise ScenarioError(f"{source}: area: missing, and there is no tile to take it from", file=source, field="area")
     if ground is None:
         if raster is not None:
             ground = read_terrain(raster, origin, bounds, GROUND_BUFFER)
@@ -236,9 +238,9 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
     try:
         raster = open_raster(path, base)
     except TerrainError as error:
-        raise TerrainError(f"{source}: terrain.path: {error}") from error
+        raise TerrainError(f"{source}: terrain.path: {error}", file=source, field="terrain.path") from error
     if table.sha256 not in (None, raster.sha256):
-        raise ScenarioError(f"{source}: terrain.path: {path}: the file has changed since (its SHA-256 differs)")
+        raise ScenarioError.at(source, "terrain.path", path, "the file has changed since (its SHA-256 differs)")
     if path not in EMBEDDED:
         path = str(Path(base or "", path).resolve())
     return raster, TerrainTable(kind="dem", path=path, vertical_error_m=table.vertical_error_m, sha256=raster.sha256)
@@ -268,7 +270,7 @@ def _assemble(
     # Of a mission that came without a scenario they are where it goes: for the verdict to find, too.
     check_ends(zones, source, ends if zones and not external else (), ground)
     if not external and math.dist(start[:2], destination[:2]) < 10.0:
-        raise ScenarioError(f"{source}: destination: less than 10 m from start")
+        raise ScenarioError(f"{source}: destination: less than 10 m from start", file=source, field="destination")
     wind = Wind(
         spec.wind.speed_mps,
         math.radians(spec.wind.from_deg),

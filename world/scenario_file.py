@@ -5,7 +5,7 @@ import math
 import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import Any, NamedTuple, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
@@ -28,10 +28,12 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
         data = tomllib.loads(text)
     # Beside its own TOMLDecodeError: a number of thousands of digits, and brackets within brackets without end.
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"{source}: not valid TOML: {_line(error)}") from error
+        raise ScenarioError(f"{source}: not valid TOML: {_line(error)}", file=source) from error
     terrain = data.get("terrain")
     if isinstance(terrain, dict) and terrain.get("kind") == "none":
-        raise ScenarioError(f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"')
+        raise ScenarioError(
+            f'{source}: terrain.kind: "none": allowed are "dem", "peaks" and "flat"', file=source, field="terrain.kind"
+        )
     return check_scenario(data, source)
 
 
@@ -41,11 +43,13 @@ def check_scenario(data: Any, source: str) -> ScenarioFile:
     Raises ScenarioError as `parse_scenario` does.
     """
     if not isinstance(data, dict):
-        raise ScenarioError(f"{source}: scenario: a table of keys is expected, got {type(data).__name__}")
+        raise ScenarioError(
+            f"{source}: scenario: a table of keys is expected, got {type(data).__name__}", file=source, field="scenario"
+        )
     try:
         return ScenarioFile.model_validate(data)
     except ValidationError as error:
-        raise ScenarioError(f"{source}: {first_error(error, data, ScenarioFile)}") from error
+        raise ScenarioError(**first_fault(error, data, ScenarioFile).at(source)) from error
 
 
 def checked_table(make: Callable[[], Table], source: str) -> Table:
@@ -53,7 +57,7 @@ def checked_table(make: Callable[[], Table], source: str) -> Table:
     try:
         return make()
     except ValidationError as error:
-        raise ScenarioError(f"{source}: {first_error(error)}") from error
+        raise ScenarioError(**first_fault(error).at(source)) from error
 
 
 def read_scenario_text(path: Path) -> str:
@@ -62,11 +66,30 @@ def read_scenario_text(path: Path) -> str:
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise ScenarioError(f"{path}: not a text file in UTF-8 (byte {error.start})") from error
+        raise ScenarioError(f"{path}: not a text file in UTF-8 (byte {error.start})", file=path) from error
 
 
-def first_error(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> str:
-    """First of the faults that pydantic found, as ``key: value: what is allowed``.
+class Fault(NamedTuple):
+    """A value that a file may not have.
+
+    field: its key.  value: as it is there; None where it is missing, or a table or a list.  allowed: what is expected.
+    text: all of it, as a message has it.
+    """
+
+    field: str
+    value: Any
+    allowed: str
+    text: str
+
+    def at(self, source: str, part: str = "") -> dict[str, Any]:
+        """What makes a `PlanflyError` of it: source: the file.  part: what of the file it is in."""
+        begin = f"{source}: {part}" if part else source
+        message = f"{begin}: {self.text}"
+        return {"message": message, "file": source, "field": self.field, "value": self.value, "allowed": self.allowed}
+
+
+def first_fault(error: ValidationError, data: Any = None, model: type[BaseModel] | None = None) -> Fault:
+    """First of the faults that pydantic found; its text is ``key: value: what is allowed``.
 
     data: what was checked; needed where a field takes more than one type, to tell its keys from pydantic's branches.
     model: what it was checked as; needed to name the key that an unknown one may stand for.
@@ -76,8 +99,8 @@ def first_error(error: ValidationError, data: Any = None, model: type[BaseModel]
     >>> try:
     ...     WindTable(speed_mps=41.0)
     ... except ValidationError as error:
-    ...     print(first_error(error))
-    speed_mps: 41.0: allowed 0..40
+    ...     print(first_fault(error))
+    Fault(field='speed_mps', value=41.0, allowed='allowed 0..40', text='speed_mps: 41.0: allowed 0..40')
     """
     found = error.errors(include_url=False)
     # A key that is mistaken is missing, too: the mistake tells more.
@@ -87,16 +110,18 @@ def first_error(error: ValidationError, data: Any = None, model: type[BaseModel]
     # Of a check of ours the message is that of the error that it raised.
     message = str(first["ctx"]["error"]) if first["type"] == "value_error" else first["msg"]
     value = first.get("input")
-    shown = "" if isinstance(value, dict | list) else f": {_shown(value)}"
+    if isinstance(value, dict | list):
+        value = None
+    shown = "" if isinstance(first.get("input"), dict | list) else f": {_shown(value)}"
     if first["type"] == "extra_forbidden":
         message = f"unknown key{_near(first['loc'], model)}"
         shown = ""
     if first["type"] == "missing":
-        shown = ""
+        value, shown = None, ""
         keys = [str(part) for part in first["loc"]]
     more = f" (and {len(found) - 1} more)" if len({item["loc"][:2] for item in found}) > 1 else ""
     named = ".".join(key if key.isprintable() else json.dumps(key) for key in keys)
-    return f"{named or 'file'}{shown}: {message}{more}"
+    return Fault(named, value, message, f"{named or 'file'}{shown}: {message}{more}")
 
 
 def _near(parts: Sequence[str | int], model: type[BaseModel] | None) -> str:

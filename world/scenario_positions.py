@@ -30,7 +30,8 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
     if math.isnan(under):
         raise ScenarioError(
             f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
-            " no terrain there to count a height from; give amsl_m"
+            " no terrain there to count a height from; give amsl_m",
+            file=source,
         )
     return np.array([east, north, under + (table.height_m or 0.0)])
 
@@ -42,16 +43,18 @@ def check_inside(
     for axis, name in enumerate(("east", "north")):
         low, high = bounds[axis]
         if not low <= point[axis] <= high:
-            raise ScenarioError(f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}")
+            raise ScenarioError(
+                f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}", file=source
+            )
     if not floor <= point[2] <= ceiling:
         raise ScenarioError(
-            f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+            f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}", file=source
         )
     if ground is not None:
         under = float(ground.height(point[0], point[1]))
         if point[2] <= under:
             raise ScenarioError(
-                f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
+                f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m", file=source
             )
 
 

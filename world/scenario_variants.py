@@ -108,7 +108,7 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> 
     ['mast']
     """
     if len(scenario.zones) + len(tables) > MOST_ZONES:
-        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MOST_ZONES:,} in all")
+        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MOST_ZONES:,} in all", file=source)
     zones = make_zones(tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))
     check_ends(zones, source, () if scenario.external else ends, scenario.terrain)

@@ -2,8 +2,23 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 from world.errors import PlanflyError
+
+
+class TextLine(NamedTuple):
+    """A line of a file, as messages name it.  number: from 1.
+
+    >>> print(TextLine("a.waypoints", 4))
+    a.waypoints:4
+    """
+
+    file: str
+    number: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.number}"
 
 
 def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError]) -> bytes:
@@ -19,10 +34,10 @@ def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError])
     try:
         size = path.stat().st_size
         if size > most:
-            raise error(f"{path}: {size:,} bytes: a {kind} file has at most {most:,}")
+            raise error(f"{path}: {size:,} bytes: a {kind} file has at most {most:,}", file=path)
         return path.read_bytes()
     except OSError as problem:
-        raise error(f"{path}: cannot be read: {problem.strerror}") from problem
+        raise error(f"{path}: cannot be read: {problem.strerror}", file=path) from problem
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
@@ -39,7 +54,7 @@ def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as problem:
         line = data.count(b"\n", 0, problem.start) + 1
-        raise error(f"{path}:{line}: not a text file in UTF-8 (byte {problem.start})") from problem
+        raise error(f"{path}:{line}: not a text file in UTF-8 (byte {problem.start})", file=path) from problem
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from world.errors import ParameterError
-from world.text_files import read_small_file, utf8_text
+from world.text_files import TextLine, read_small_file, utf8_text
 
 # A vehicle has some 1,500 parameters in lines of 40 bytes.
 MOST_BYTES = 4 * 2**20
@@ -33,7 +33,7 @@ class Entry:
 
     name: str
     value: float
-    where: str
+    where: TextLine
 
 
 def read_parameter_file(path: Path) -> dict[str, Entry]:
@@ -52,7 +52,7 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
     finite number, a name that comes twice, and a file without a parameter.
 
     >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
-    >>> found["WP_RADIUS"].value, found["WP_RADIUS"].where
+    >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
     (90.0, 'qgc.params:2')
     >>> list(parse_parameters("WP_RADIUS 90  # m\nTHR_MAX,100\n", "any.parm"))
     ['WP_RADIUS', 'THR_MAX']
@@ -62,17 +62,21 @@ def parse_parameters(text: str, source: str) -> dict[str, Entry]:
         line = whole.partition("#")[0].strip()
         if not line:
             continue
-        entry = _entry(line, f"{source}:{number}")
+        entry = _entry(line, TextLine(source, number))
         if entry.name in found:
-            first = found[entry.name].where.rpartition(":")[2]
-            raise ParameterError(f"{entry.where}: {entry.name}: already on line {first}: each name is expected once")
+            first = found[entry.name].where.number
+            allowed = "each name is expected once"
+            raise ParameterError(
+                f"{entry.where}: {entry.name}: already on line {first}: {allowed}",
+                file=source, field=entry.name, value=entry.value, allowed=allowed,
+            )  # fmt: skip
         found[entry.name] = entry
     if not found:
-        raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected")
+        raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected", file=source)
     return found
 
 
-def _entry(line: str, where: str) -> Entry:
+def _entry(line: str, where: TextLine) -> Entry:
     fields = line.split("\t")
     if len(fields) == _QGC_FIELDS and _WHOLE.fullmatch(fields[0].strip()):
         name, text = fields[2].strip(), fields[3].strip()
@@ -80,14 +84,20 @@ def _entry(line: str, where: str) -> Entry:
         fields = _BETWEEN.split(line)
         if len(fields) != 2:
             raise ParameterError(
-                f"{where}: {_shown(line)}: a name and a value are expected, or QGroundControl's five columns"
+                f"{where}: {_shown(line)}: a name and a value are expected, or QGroundControl's five columns",
+                file=where.file,
             )
         name, text = fields
     if not _NAME.fullmatch(name):
-        raise ParameterError(f"{where}: name {_shown(name)}: up to 16 capitals, digits and _ are expected")
+        raise ParameterError(
+            f"{where}: name {_shown(name)}: up to 16 capitals, digits and _ are expected", file=where.file
+        )
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
-        raise ParameterError(f"{where}: {name}: {_shown(text)}: a finite number is expected")
+        allowed = "a finite number is expected"
+        raise ParameterError(
+            f"{where}: {name}: {_shown(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
+        )
     return Entry(name, value, where)
 
 

@@ -17,6 +17,7 @@ from aircraft.catalog import Aircraft
 from flight.ardupilot.parameter_file import Entry, parse_parameters, read_parameter_file
 from world.errors import ParameterError
 from world.kernels import Record, record_dtype
+from world.text_files import TextLine
 
 Origin = Literal["file", "aircraft", "default"]
 
@@ -251,7 +252,10 @@ def stored_parameters(
     origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
     for name, value, origin in values:
         if name in _BY_NAME:
-            origins[origin][name] = _allowed(_BY_NAME[name][0], value, f"{name}: {value:g}")
+            definition, _ = _BY_NAME[name]
+            if not definition.low <= value <= definition.high:
+                raise _refused(source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
+            origins[origin][name] = value
     return _parameters(list(origins.items()), source, unused)
 
 
@@ -277,7 +281,9 @@ def _check_order(made: ArduPilotParameters, source: str) -> None:
     values = {name: value for name, value, _ in made.values}
     for least, most in (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX")):
         if values[least] >= values[most]:
-            raise ParameterError(f"{source}: {least} {values[least]:g}: must be below {most} {values[most]:g}")
+            value, allowed = values[least], f"must be below {most} {values[most]:g}"
+            message = f"{source}: {least} {value:g}: {allowed}"
+            raise ParameterError(message, file=source, field=least, value=value, allowed=allowed)
 
 
 # Definition and factor to its unit, by each name that a file may have.
@@ -295,16 +301,17 @@ def _known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, .
             unused.append(name)
             continue
         definition, factor = _BY_NAME[name]
-        value = _allowed(definition, entry.value * factor, f"{entry.where}: {name}: {entry.value:g}", factor)
-        if values.setdefault(definition.name, value) != value:
-            raise ParameterError(
-                f"{entry.where}: {name}: {entry.value:g}: the same parameter has another value under its other name"
+        value = entry.value * factor
+        if not definition.low <= value <= definition.high:
+            raise _refused(
+                entry.where, name, entry.value, f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
             )
+        if values.setdefault(definition.name, value) != value:
+            raise _refused(entry.where, name, entry.value, "the same parameter has another value under its other name")
     return values, tuple(unused)
 
 
-def _allowed(definition: Definition, value: float, where: str, factor: float = 1.0) -> float:
-    # Written so that NaN fails.
-    if definition.low <= value <= definition.high:
-        return value
-    raise ParameterError(f"{where}: allowed {definition.low / factor:g}..{definition.high / factor:g}")
+def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
+    """The error of a value.  where: its line; of one that was recorded, the source, which the message does not name."""
+    at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
+    return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)

@@ -50,9 +50,9 @@ def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat
     # JSBSim's own errors are RuntimeErrors.
     except (RuntimeError, ValueError, OSError) as error:
         message = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
-        raise FlightError(f"{aircraft.model_file}: JSBSim: {message}") from None
+        raise FlightError(f"{aircraft.model_file}: JSBSim: {message}", file=aircraft.model_file) from None
     if not loaded:
-        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model")
+        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model", file=aircraft.model_file)
     _check_mass(instance, aircraft)
 
 
@@ -64,8 +64,12 @@ def _check_mass(instance: Any, aircraft: Aircraft) -> None:
     pounds = sum(map(instance.get_property_value, tanks), instance.get_property_value("inertia/weight-lbs"))
     mass = pounds * POUND
     if not abs(aircraft.mass - mass) <= MASS_TOLERANCE * mass:
+        file = aircraft.folder / f"{aircraft.name}.toml"
         raise FlightError(
-            f"{aircraft.folder / aircraft.name}.toml: mass_kg = {aircraft.mass:g}: the model"
+            f"{file}: mass_kg = {aircraft.mass:g}: the model"
             f" {aircraft.model_file.name} has {mass:.5g} kg with its fuel; the two may differ by"
-            f" {100.0 * MASS_TOLERANCE:g} %"
+            f" {100.0 * MASS_TOLERANCE:g} %",
+            file=file,
+            field="mass_kg",
+            value=aircraft.mass,
         )

@@ -56,9 +56,11 @@ class _Reader:
             self.data = self.file.read_bytes()
             self._parser.Parse(self.data, True)
         except OSError as error:
-            raise FlightError(f"{self.file}: the aircraft model cannot be read: {error.strerror}") from None
+            raise FlightError(
+                f"{self.file}: the aircraft model cannot be read: {error.strerror}", file=self.file
+            ) from None
         except expat.ExpatError as error:
-            raise FlightError(f"{self.file}: not well-formed XML: {error}") from None
+            raise FlightError(f"{self.file}: not well-formed XML: {error}", file=self.file) from None
 
     def without_channels(self) -> bytes:
         """The file's bytes with blanks for the channels, so that lines keep their numbers."""

@@ -37,7 +37,10 @@ def try_model(aircraft: Aircraft) -> None:
     code = _try(str(aircraft.folder), model_hash(aircraft))
     if code not in {0, _REFUSED}:
         how = "hangs" if code is None else "aborts the process"
-        raise FlightError(f"{aircraft.model_file}: JSBSim {how} with this model, probably over an undefined property")
+        raise FlightError(
+            f"{aircraft.model_file}: JSBSim {how} with this model, probably over an undefined property",
+            file=aircraft.model_file,
+        )
 
 
 @cache

@@ -149,13 +149,13 @@ def load_gains(aircraft: Aircraft) -> Gains:
     try:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
-        raise FlightError(f"{file}: {error.strerror}: guidance needs gains for {aircraft.name}") from error
+        raise FlightError(f"{file}: {error.strerror}: guidance needs gains for {aircraft.name}", file=file) from error
     except ValueError as error:
-        raise FlightError(f"{file}: {' '.join(str(error).split())}") from error
+        raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from error
     values: dict[str, float] = {}
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise FlightError(f"{file}: {key} = {value!r} is not a finite number")
+            raise FlightError(f"{file}: {key} = {value!r} is not a finite number", file=file, field=key, value=value)
         unit = next((unit for unit in _UNITS if key.endswith(unit)), "")
         values[key.removesuffix(unit)] = float(value) * _UNITS.get(unit, 1.0)
     known = {item.name for item in fields(Gains)}
@@ -164,6 +164,7 @@ def load_gains(aircraft: Aircraft) -> Gains:
     if missing or unknown:
         raise FlightError(
             f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
-            f"{did_you_mean(unknown[0], sorted(known - set(values))) if unknown else ''}"
+            f"{did_you_mean(unknown[0], sorted(known - set(values))) if unknown else ''}",
+            file=file,
         )
     return Gains(**values)

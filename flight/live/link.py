@@ -146,7 +146,7 @@ class Link:
         self._socket.close()
 
     def fileno(self) -> int:
-        """For `select`."""
+        """For `multiprocessing.connection.wait`, which waits for sockets and pipes on any system."""
         return self._socket.fileno()
 
     @property

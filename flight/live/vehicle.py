@@ -2,10 +2,9 @@
 
 import contextlib
 import errno
-import select
 import time
 from collections.abc import Callable, Sequence
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -125,13 +124,13 @@ class Vehicle:
 
     def step(self, patience: float) -> None:
         """Wait for something to do, at most ``patience`` s, and do it."""
-        wire, flight = self.link.fileno(), self._flight.fileno()
-        readable, _, _ = select.select([wire, flight], [], [], self.down.wait(self._clock(), patience))
+        watched: list[Any] = [self.link, self._flight]
+        readable: list[Any] = wait(watched, self.down.wait(self._clock(), patience))
         now = self._clock()
         self.status.boot, self.status.wall = now - self._born, time.time()
-        if flight in readable:
+        if self._flight in readable:
             self._from_flight()
-        if wire in readable:
+        if self.link in readable:
             for message, peer in self.link.receive():
                 self._from_station(message, peer, now)
         for reply in self.server.tick(now):

@@ -91,7 +91,9 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
     positions = [item for item in mission.items if item.has_position and item.seq >= first.item]
     lat, lon = (positions[0].lat_deg, positions[0].lon_deg) if positions else (first.lat_deg, first.lon_deg)
     if abs(lat) > 89.0:
-        raise MissionError(f"{mission.source}: latitude {lat:.7f}: a mission is flown within -89..89 degrees")
+        raise MissionError(
+            f"{mission.source}: latitude {lat:.7f}: a mission is flown within -89..89 degrees", file=mission.source
+        )
     origin = GeoOrigin(lat, lon)
     home = mission.home
     if home is not None and abs(home.lat_deg) <= 89.0:
@@ -124,7 +126,8 @@ def _ground(
         raise TerrainError(
             f"{path}: the mission flies to east {e0:.0f}..{e1:.0f} m, north {n0:.0f}..{n1:.0f} m of"
             f" {origin.lat_deg:.5f}, {origin.lon_deg:.5f}; the terrain covers"
-            f" east {te0:.0f}..{te1:.0f} m, north {tn0:.0f}..{tn1:.0f} m"
+            f" east {te0:.0f}..{te1:.0f} m, north {tn0:.0f}..{tn1:.0f} m",
+            file=path,
         )
     file = Path(path)
     found = str(file.resolve()) if file.is_file() else path

@@ -120,7 +120,8 @@ def make_itinerary(mission: Mission) -> Itinerary:
         walk.visit(item)
         if len(walk.stops) > MOST_STOPS:
             raise MissionError(
-                f"{mission.source}: item {item.seq}: more than {MOST_STOPS:,} places to fly to, jumps unrolled"
+                f"{mission.source}: item {item.seq}: more than {MOST_STOPS:,} places to fly to, jumps unrolled",
+                file=mission.source,
             )
         if walk.ended:
             break
@@ -128,7 +129,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
         if item.seq not in reached and not (walk.ended and item.command == Command.DO_JUMP):
             walk.notes.add("never reached", item.seq)
     if not walk.stops:
-        raise MissionError(f"{mission.source}: no item with a position: at least two are expected")
+        raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)
     stops, notes = tuple(walk.stops), walk.notes.lines()
     return Itinerary(stops, walk.home, walk.has_home, walk.takeoff, notes, walk.endless, walk.landing)
 
@@ -142,7 +143,10 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
         item = mission.items[k]
         steps += 1
         if steps > _MOST_STEPS:
-            raise MissionError(f"{mission.source}: item {item.seq}: jumps lead through more than {_MOST_STEPS:,} items")
+            raise MissionError(
+                f"{mission.source}: item {item.seq}: jumps lead through more than {_MOST_STEPS:,} items",
+                file=mission.source,
+            )
         k += 1
         yield item
         if item.command != Command.DO_JUMP:
@@ -150,7 +154,8 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
         target, repeats = int(item.params[0]), int(item.params[1])
         if target not in index:
             raise MissionError(
-                f"{mission.source}: item {item.seq}: DO_JUMP p1 {target}: the mission has no item {target}"
+                f"{mission.source}: item {item.seq}: DO_JUMP p1 {target}: the mission has no item {target}",
+                file=mission.source,
             )
         if repeats < 0 and item.seq in jumped:
             walk.notes.add("DO_JUMP without end: taken once; the flight ends there", item.seq)
@@ -208,7 +213,9 @@ class _Walk:
                 self.notes.add(f"{name} in the air: not flown", item.seq)
             return
         if math.isnan(item.alt):
-            raise MissionError(f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected")
+            raise MissionError(
+                f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected", file=self.source
+            )
         self.takeoff = item
         over_home = replace(self._stop(item), lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg)
         goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (self.home.lat_deg, self.home.lon_deg)
@@ -291,4 +298,4 @@ def _first_position(mission: Mission) -> Home:
     for item in mission.items:
         if item.command in PLACES | TAKEOFFS | LANDINGS and item.has_position:
             return Home(item.lat_deg, item.lon_deg, math.nan)
-    raise MissionError(f"{mission.source}: no item with a position: at least two are expected")
+    raise MissionError(f"{mission.source}: no item with a position: at least two are expected", file=mission.source)

@@ -100,7 +100,9 @@ def lay_circles(
         up = laid[-1].position[2]
         points += laid
         if len(points) > MOST_STOPS:
-            raise MissionError(f"{source}: item {node.stop.item}: more than {MOST_STOPS:,} places, circles laid out")
+            raise MissionError(
+                f"{source}: item {node.stop.item}: more than {MOST_STOPS:,} places, circles laid out", file=source
+            )
     return points
 
 
@@ -135,7 +137,9 @@ def _turn(source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: No
     """Signed radius of a loiter, m."""
     radius = abs(loiter.radius)
     if radius > WIDEST:
-        raise MissionError(f"{source}: item {stop.item}: loiter radius {radius:g} m: allowed up to {WIDEST:,.0f}")
+        raise MissionError(
+            f"{source}: item {stop.item}: loiter radius {radius:g} m: allowed up to {WIDEST:,.0f}", file=source
+        )
     if radius == 0.0:
         radius = own_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
@@ -195,7 +199,8 @@ def _around(
     if sweep > MOST_STOPS * CORNER:
         raise MissionError(
             f"{source}: item {node.stop.item}: {sweep / (2.0 * math.pi):,.0f} turns to loiter: at most"
-            f" {MOST_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
+            f" {MOST_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown",
+            file=source,
         )
     count = max(1, math.ceil(sweep / CORNER - 1e-9))
     step = sweep / count

@@ -112,7 +112,8 @@ def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> 
         raise MissionError(
             f"{source}: {_name(stop)}: latitude {stop.lat_deg:.7f}, longitude {stop.lon_deg:.7f}: more than"
             f" {MAP_EXTENT / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
-            " (columns swapped, or a sign lost?)"
+            " (columns swapped, or a sign lost?)",
+            file=source,
         )
     return points
 
@@ -134,7 +135,9 @@ class _Heights:
         """Height of a stop; ``last``: the one before, NaN at the first."""
         if math.isnan(stop.alt):
             if math.isnan(last):
-                raise MissionError(f"{self.source}: {_name(stop)}: no altitude, and none before to keep")
+                raise MissionError(
+                    f"{self.source}: {_name(stop)}: no altitude, and none before to keep", file=self.source
+                )
             return last
         if stop.frame in AMSL:
             height = stop.alt
@@ -144,7 +147,8 @@ class _Heights:
             height = self._ground(stop, east, north) + stop.alt
         if not LOWEST <= height <= HIGHEST:
             raise MissionError(
-                f"{self.source}: {_name(stop)}: {height:.1f} m AMSL: allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+                f"{self.source}: {_name(stop)}: {height:.1f} m AMSL: allowed {LOWEST:.0f}..{HIGHEST:.0f}",
+                file=self.source,
             )
         return height
 
@@ -225,7 +229,8 @@ def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> Itin
         if after.command not in TAKEOFFS:
             raise MissionError(
                 f"{source}: {_name(after)}: {abs(climb):.1f} m straight {side} {_name(before)}:"
-                " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing"
+                " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing",
+                file=source,
             )
         notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", after.item)
     else:

@@ -77,7 +77,10 @@ def lay_route(placed: PlacedMission, default_airspeed: float, fly_over: bool, li
     kept = [_with_airspeed(place, default_airspeed) for place in placed.stops]
     points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
     if len(points) < 2:
-        raise MissionError(f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected")
+        raise MissionError(
+            f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected",
+            file=mission.source,
+        )
     stops = [point.stop for point in points]
     waypoints = np.array([point.position for point in points])
     arcs = np.array([point.arc for point in points])

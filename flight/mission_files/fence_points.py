@@ -40,12 +40,13 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     """
     points = [_point(f"{source}:{number}", line) for number, line in _lines(text)]
     if len(points) > MOST_POINTS:
-        raise MissionError(f"{source}: {len(points)} points: at most {MOST_POINTS} are read")
+        raise MissionError(f"{source}: {len(points)} points: at most {MOST_POINTS} are read", file=source)
     ring = points if points[0] == points[-1] else points[1:]
     if len(ring) < 4 or ring[0] != ring[-1]:
         raise MissionError(
             f"{source}: {len(points)} points: a return point and a ring of three corners or more is expected, the first"
-            " again last"
+            " again last",
+            file=source,
         )
     none = (float(len(ring) - 1), 0.0, 0.0, 0.0)
     command = int(Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION)

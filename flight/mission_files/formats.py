@@ -39,7 +39,14 @@ def mission_kind(path: Path) -> FileKind:
     try:
         return KINDS[path.suffix.lower()]
     except KeyError:
-        raise MissionError(f"{path}: suffix {path.suffix!r}: allowed {', '.join(KINDS)}") from None
+        allowed = ", ".join(KINDS)
+        raise MissionError(
+            f"{path}: suffix {path.suffix!r}: allowed {allowed}",
+            file=path,
+            field="suffix",
+            value=path.suffix,
+            allowed=allowed,
+        ) from None
 
 
 def read_mission(path: Path) -> Mission:
@@ -88,7 +95,7 @@ def read_fence(path: Path) -> tuple[MissionItem, ...]:
     text = _read_text(path)
     fences = parse_fence_points(text, str(path)) if is_point_list(text) else parse_mission(text, str(path)).fences
     if not fences:
-        raise MissionError(f"{path}: no fence in it: items of commands 5001 to 5004 are expected")
+        raise MissionError(f"{path}: no fence in it: items of commands 5001 to 5004 are expected", file=path)
     return fences
 
 
@@ -107,9 +114,9 @@ def mission_text(mission: Mission, kind: FileKind) -> str:
 def _read_text(path: Path) -> str:
     data = read_small_file(path, MOST_BYTES, "mission", MissionError)
     if not data.strip():
-        raise MissionError(f"{path}: empty: a mission is expected")
+        raise MissionError(f"{path}: empty: a mission is expected", file=path)
     if data.startswith(_UTF16):
-        raise MissionError(f"{path}: text in UTF-16: a mission file is UTF-8 or ASCII")
+        raise MissionError(f"{path}: text in UTF-16: a mission file is UTF-8 or ASCII", file=path)
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
         raise MissionError(f"{path}:{line}: a NUL byte: a text file is expected")

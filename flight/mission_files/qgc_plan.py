@@ -31,7 +31,7 @@ from flight.mission.items import (
 )
 from flight.mission_files.qgc_complex_items import expand_items
 from world.errors import MissionError
-from world.scenario_file import first_error
+from world.scenario_file import first_fault
 
 _HOVER_SPEED = 5.0  # QGC's own default; a fixed wing has none
 _CRUISE_SPEED = 15.0  # QGC's own default
@@ -105,12 +105,12 @@ def parse_plan_file(text: str, source: str) -> Mission:
     try:
         data = json.loads(text.removeprefix("\ufeff"), parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
-        raise MissionError(f"{source}: not valid JSON: {_line(error)}") from error
+        raise MissionError(f"{source}: not valid JSON: {_line(error)}", file=source) from error
     warnings = _check_kind(data, source)
     try:
         file = _File.model_validate(data)
     except ValidationError as error:
-        raise MissionError(f"{source}: {first_error(error, data)}") from error
+        raise MissionError(**first_fault(error, data).at(source)) from error
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
     if not items:
         raise MissionError(f"{source}: mission.items: no items")

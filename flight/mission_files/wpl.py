@@ -29,6 +29,7 @@ from flight.mission.items import (
     renumbered,
 )
 from world.errors import MissionError
+from world.text_files import TextLine
 
 HEADER = "QGC WPL 110"
 # Lines of a file, comments and empty ones included: ten an item.
@@ -57,7 +58,7 @@ _ALLOWED = {"seq": (0, 65535), "current": (0, 1), "frame": (0, 255), "command": 
 class _Row:
     """One line of the file, as numbers."""
 
-    where: str
+    where: TextLine
     current: bool
     item: MissionItem
 
@@ -71,7 +72,7 @@ def parse_waypoints(text: str, source: str) -> Mission:
     """
     breaks = max(text.count("\n"), text.count("\r"))
     if breaks > MOST_LINES:
-        raise MissionError(f"{source}: {breaks:,} lines: at most {MOST_LINES:,} are read")
+        raise MissionError(f"{source}: {breaks:,} lines: at most {MOST_LINES:,} are read", file=source)
     lines = [
         (number, line.strip())
         for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
@@ -79,19 +80,24 @@ def parse_waypoints(text: str, source: str) -> Mission:
     ]
     if not lines:
         raise MissionError(
-            f"{source}: empty: a first line '{HEADER}' and lines of {len(_COLUMNS)} columns are expected"
+            f"{source}: empty: a first line '{HEADER}' and lines of {len(_COLUMNS)} columns are expected",
+            file=source,
         )
     number, header = lines[0]
     if header.split() != HEADER.split():
-        raise MissionError(f"{source}:{number}: header {_shown(header)}: '{HEADER}' is expected")
+        raise MissionError(
+            f"{source}:{number}: header {_shown(header)}: '{HEADER}' is expected",
+            file=source, field="header", value=header, allowed=HEADER,
+        )  # fmt: skip
     if len(lines) - 1 > MOST_ITEMS:
-        raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MOST_ITEMS:,} are read")
-    rows = [_row(f"{source}:{number}", line) for number, line in lines[1:]]
+        raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MOST_ITEMS:,} are read", file=source)
+    rows = [_row(TextLine(source, number), line) for number, line in lines[1:]]
     if not rows:
-        raise MissionError(f"{source}: no items after the header")
+        raise MissionError(f"{source}: no items after the header", file=source)
     for before, after in pairwise(rows):
         if after.item.seq <= before.item.seq:
-            raise MissionError(f"{after.where}: seq {after.item.seq}: must be above the one before, {before.item.seq}")
+            allowed = f"must be above the one before, {before.item.seq}"
+            raise _refused(after.where, "seq", after.item.seq, str(after.item.seq), allowed)
     home, body = _split_home(rows)
     fences = numbered([row.item for row in body if row.item.command in FENCES])
     fence_shapes(fences, source)
@@ -105,10 +111,12 @@ def parse_waypoints(text: str, source: str) -> Mission:
     )
 
 
-def _row(where: str, line: str) -> _Row:
+def _row(where: TextLine, line: str) -> _Row:
     fields = line.split()
     if len(fields) != len(_COLUMNS):
-        raise MissionError(f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})")
+        raise MissionError(
+            f"{where}: {len(fields)} columns: {len(_COLUMNS)} are expected ({', '.join(_COLUMNS)})", file=where.file
+        )
     values = dict(zip(_COLUMNS, fields, strict=True))
     whole = {name: _whole(where, name, values[name]) for name in _ALLOWED}
     p1, p2, p3, p4, lat, lon, alt = (_number(where, name, values[name]) for name in _COLUMNS[4:11])
@@ -121,21 +129,27 @@ def _row(where: str, line: str) -> _Row:
     )
     problem = item_problem(item)
     if problem is not None:
-        raise MissionError(f"{where}: {problem}")
+        raise MissionError(f"{where}: {problem}", file=where.file)
     return _Row(where, bool(whole["current"]), item)
 
 
-def _whole(where: str, name: str, text: str) -> int:
+def _refused(where: TextLine, field: str, value: str | int, shown: str, allowed: str) -> MissionError:
+    return MissionError(
+        f"{where}: {field} {shown}: {allowed}", file=where.file, field=field, value=value, allowed=allowed
+    )
+
+
+def _whole(where: TextLine, name: str, text: str) -> int:
     low, high = _ALLOWED[name]
     if not _WHOLE.fullmatch(text) or not low <= int(text) <= high:
-        raise MissionError(f"{where}: {name} {_shown(text)}: a whole number {low}..{high} is expected")
+        raise _refused(where, name, text, _shown(text), f"a whole number {low}..{high} is expected")
     return int(text)
 
 
-def _number(where: str, name: str, text: str) -> float:
+def _number(where: TextLine, name: str, text: str) -> float:
     if not _NUMBER.fullmatch(text) or not math.isfinite(float(text)):
         hint = " (a decimal comma?)" if "," in text else ""
-        raise MissionError(f"{where}: {name} {_shown(text)}: a finite number is expected{hint}")
+        raise _refused(where, name, text, _shown(text), f"a finite number is expected{hint}")
     # 0.0 for -0.0, which no other form of a mission keeps.
     return float(text) + 0.0
 

@@ -38,15 +38,17 @@ def check_binary(binary: Path) -> str:
     nobody/arduplane: no such file; the program of an ArduPlane for software in the loop is expected
     """
     if not binary.exists():
-        raise FlightError(f"{binary}: no such file; the program of an ArduPlane for software in the loop is expected")
+        raise FlightError(
+            f"{binary}: no such file; the program of an ArduPlane for software in the loop is expected", file=binary
+        )
     if not binary.is_file():
-        raise FlightError(f"{binary}: not a file; the program of an ArduPlane is expected")
+        raise FlightError(f"{binary}: not a file; the program of an ArduPlane is expected", file=binary)
     if not os.access(binary, os.X_OK):
-        raise FlightError(f"{binary}: not executable (chmod +x)")
+        raise FlightError(f"{binary}: not executable (chmod +x)", file=binary)
     try:
         return hashlib.sha256(binary.read_bytes()).hexdigest()
     except OSError as error:
-        raise FlightError(f"{binary}: cannot be read: {error.strerror}") from error
+        raise FlightError(f"{binary}: cannot be read: {error.strerror}", file=binary) from error
 
 
 class AutopilotProcess:
@@ -109,7 +111,9 @@ class AutopilotProcess:
                     preexec_fn=_die_with_parent if sys.platform == "linux" else None,
                 )
             except OSError as error:
-                raise FlightError(f"{self.binary}: not an executable program: {error.strerror}") from error
+                raise FlightError(
+                    f"{self.binary}: not an executable program: {error.strerror}", file=self.binary
+                ) from error
 
     def __enter__(self) -> "AutopilotProcess":
         """Return the process itself."""

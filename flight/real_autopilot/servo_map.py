@@ -99,16 +99,17 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
         table = tomllib.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise FlightError(
-            f"{file}: {error.strerror}: a real autopilot needs to know which servo moves what on {aircraft.name}"
+            f"{file}: {error.strerror}: a real autopilot needs to know which servo moves what on {aircraft.name}",
+            file=file,
         ) from error
     except ValueError as error:
-        raise FlightError(f"{file}: {' '.join(str(error).split())}") from error
+        raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from error
     if set(table) != set(FUNCTIONS):
-        raise FlightError(f"{file}: tables {', '.join(sorted(table))}: {', '.join(FUNCTIONS)} are expected")
+        raise FlightError(f"{file}: tables {', '.join(sorted(table))}: {', '.join(FUNCTIONS)} are expected", file=file)
     try:
         outputs = {name: _output(name, entry) for name, entry in table.items()}
     except ValueError as error:
-        raise FlightError(f"{file}: {error}") from None
+        raise FlightError(f"{file}: {error}", file=file) from None
     return ServoMap(**outputs)
 
 

@@ -48,7 +48,7 @@ class LocalMap:
         lon = here + (lon - here + math.pi) % (2.0 * math.pi) - math.pi
         bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
         if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
-            raise FlightError(f"{setup.mission.source}: the area lies about a pole")
+            raise FlightError(f"{setup.mission.source}: the area lies about a pole", file=setup.mission.source)
 
         def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
             return to_map(origin, np.degrees(phi), np.degrees(lam))
@@ -64,7 +64,8 @@ class LocalMap:
         if not (local.position.residual <= WORST[0] and local.angle.residual <= WORST[1]):
             raise FlightError(
                 f"{setup.mission.source}: the area is too large to fly in: its map is out by"
-                f" {local.position.residual:.2g} m; {WORST[0]:g} m is allowed"
+                f" {local.position.residual:.2g} m; {WORST[0]:g} m is allowed",
+                file=setup.mission.source,
             )
         return local
 

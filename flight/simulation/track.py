@@ -3,6 +3,8 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,11 +43,16 @@ DIGITS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Track:
     """What was flown, as it is logged: float64 time and position, float32 for the rest, so that a log loses nothing.
 
     All arrays have t rows.  World axes east, north, up; SI and radians.
+
+    >>> rows = np.zeros(3, TRACK_ROW)
+    >>> rows["time"] = 0.0, 0.5, 1.0
+    >>> as_track(rows)
+    <Track: 3 rows, 0.0 to 1.0 s>
     """
 
     time: Floats  # (t,) s since the start
@@ -85,6 +92,38 @@ class Track:
     def rows(self, start: int, stop: int) -> "Track":
         """Rows start..stop as a track of their own."""
         return Track(*(getattr(self, item.name)[start:stop] for item in fields(self)))
+
+    def to_pandas(self) -> Any:
+        """A `pandas.DataFrame`: a row a tick, columns with units in their names.
+
+        Raises ImportError where pandas is not installed.
+        """
+        from flight.simulation.track_table import track_frame
+
+        return track_frame(self)
+
+    def to_csv(self, path: Path | str) -> None:
+        """Write it as comma-separated text, whole or not at all; numbers read back as they were.  Raises OSError."""
+        from flight.simulation.track_table import write_track_csv
+
+        write_track_csv(self, Path(path))
+
+    def to_parquet(self, path: Path | str) -> None:
+        """Write it as Parquet.  Raises ImportError where pyarrow is not installed, and OSError."""
+        from flight.simulation.track_table import write_track_parquet
+
+        write_track_parquet(self, Path(path))
+
+    def __repr__(self) -> str:
+        from flight.simulation.track_table import track_title
+
+        return f"<{track_title(self)}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        from flight.simulation.track_table import track_html
+
+        return track_html(self)
 
 
 _KINDS = [np.float64, np.float64, *([np.float32] * 11), np.int32, *([np.float32] * 4)]

@@ -76,21 +76,23 @@ def make_flight(raw: RawLog, number: int | None = None) -> FieldFlight:
     """
     if raw.vehicle in _REFUSED:
         named = f" ({raw.program})" if raw.program else ""
-        raise LogError(f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: flights of aeroplanes are judged")
+        raise LogError(
+            f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: flights of aeroplanes are judged", file=raw.source
+        )
     series = raw.series["position"]
     if len(series.time) > _MOST_ROWS:
-        raise LogError(f"{raw.source}: {len(series.time):,} places: at most {_MOST_ROWS:,} are read")
+        raise LogError(f"{raw.source}: {len(series.time):,} places: at most {_MOST_ROWS:,} are read", file=raw.source)
     places = clean_places(series, raw.clock_jumps)
     spans = flown_spans(places.time, places.lat, places.lon)
     if not spans:
-        raise LogError(f"{raw.source}: no flight in it: {_why_none(places)}")
+        raise LogError(f"{raw.source}: no flight in it: {_why_none(places)}", file=raw.source)
     last = float(places.time[-1])
     modes = [type(one)(float(places.on_clock(np.array([one.time]))[0]), one.name, one.automatic) for one in raw.modes]
     parts = flight_parts(spans, modes, raw.missions, last)
     chosen = choose_part(parts)
     if number is not None:
         if not 1 <= number <= len(parts):
-            raise LogError(f"{raw.source}: --flight {number}: it holds flights 1..{len(parts)}")
+            raise LogError(f"{raw.source}: --flight {number}: it holds flights 1..{len(parts)}", file=raw.source)
         chosen = number - 1
     others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != chosen)
     return _cut(raw, places, parts[chosen], chosen + 1, len(parts), others)

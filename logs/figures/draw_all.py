@@ -32,7 +32,14 @@ FIGURE_FILES = ("map", "profile", "scene", "turns", "envelope")
 
 
 def draw_figures(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Figure]:
-    """Draw all pictures of a flight, or of a plan that was not flown, by name; what has no data is left out."""
+    """Draw all pictures of a flight, or of a plan that was not flown, by name; what has no data is left out.
+
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.judge_geometry import judge_geometry
+    >>> setup = example_log().setup
+    >>> list(draw_figures(setup, None, judge_geometry(setup)))
+    ['map', 'profile', 'scene', 'turns', 'envelope']
+    """
     drawn = with_fence_zones(setup)
     plan = setup.plan.waypoints if setup.plan is not None else None
     paths: dict[str, Any] = {"plan_waypoints": plan, "route_waypoints": setup.route.waypoints}

@@ -40,6 +40,7 @@ from logs.recording.state_channel import (
 from logs.verdict.beside_file import parse_beside
 from logs.verdict.levels import FlownBeside
 from world.errors import LogError
+from world.notebooks.html_table import html_table
 
 _MESSAGE = struct.Struct("<HIQQ")
 _LEVEL_NAMES = {number: name for name, number in LEVELS.items()}
@@ -57,7 +58,7 @@ class LogEvent:
     level: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class FlightLog:
     """A flight, as recorded.
 
@@ -85,6 +86,23 @@ class FlightLog:
     end_time: float
     lost: str = ""
     beside: FlownBeside | None = None
+
+    def __repr__(self) -> str:
+        name, state = Path(self.source).name, self.ended or "cut short"
+        return f"<FlightLog {name}: {self.setup.scenario.name}, {self.end_time:.1f} s, {state}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        setup = self.setup
+        rows = [
+            ("scenario", setup.scenario.name),
+            ("aircraft", Path(setup.aircraft).name),
+            ("mission", f"{setup.mission.source}: {len(setup.mission.items)} items"),
+            ("flown", f"{self.end_time:.1f} s, {len(self.track):,} rows, {self.track.energy[-1]:.1f} Wh"),
+            ("ended", self.ended or "not recorded"),
+            *([("incomplete", self.problem)] if self.problem else []),
+        ]
+        return html_table(f"Flight log {Path(self.source).name}", rows)
 
 
 class _MessageCollector:
@@ -153,7 +171,7 @@ class _MessageCollector:
         return join_records(self.parts, RECORD)
 
 
-def read_log(path: Path) -> FlightLog:
+def read_log(path: Path | str) -> FlightLog:
     """Read a flight log; a damaged or unfinished one is given up to its damage, with ``complete`` False.
 
     Raises LogError, in one line, for a file that is missing, empty, not an MCAP file or not a planfly log, or that
@@ -166,11 +184,12 @@ def read_log(path: Path) -> FlightLog:
     >>> log.complete, log.ended, len(log.track), log.setup.aircraft
     (True, 'completed', 366, 'aerosonde')
     """
+    path = Path(path)
     found = Container()
     messages = _MessageCollector()
     try:
         if path.exists() and not path.is_file():
-            raise LogError(f"{path}: not a file: a flight log (.mcap) is expected")
+            raise LogError(f"{path}: not a file: a flight log (.mcap) is expected", file=path)
         with path.open("rb") as file:
             _check_magic(file.read(len(MAGIC)), path)
             for data in read_chunks(file, found):
@@ -180,15 +199,17 @@ def read_log(path: Path) -> FlightLog:
                     found.problem = f"chunk {messages.chunks} holds records that cannot be read"
                     break
     except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+        raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if not messages.chunks:
-        raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}")
+        raise LogError(f"{path}: holds no whole chunk: {found.problem or 'an empty log'}", file=path)
     if SETUP_FILE not in found.attachments and found.problem:
-        raise LogError(f"{path}: holds no setup: {found.problem}")
+        raise LogError(f"{path}: holds no setup: {found.problem}", file=path)
     stored = unpack_setup(found.attachments, str(path))
     rows, fault = _good_rows(messages.rows(), len(stored.setup.route.waypoints))
     if not len(rows):
-        raise LogError(f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}")
+        raise LogError(
+            f"{path}: holds no whole second of flight: {fault or found.problem or 'an empty log'}", file=path
+        )
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
     beside, unread = _beside(found.attachments)
@@ -214,9 +235,9 @@ def read_log(path: Path) -> FlightLog:
 
 def _check_magic(magic: bytes, path: Path) -> None:
     if not magic:
-        raise LogError(f"{path}: empty: a flight log (.mcap) is expected")
+        raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path, field="empty")
     if magic != MAGIC:
-        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected")
+        raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected", file=path)
 
 
 def _good_rows(rows: StateRecords, waypoints: int) -> tuple[StateRecords, str]:

@@ -41,7 +41,7 @@ from logs.recording.terrain_attachment import pack_terrain, unpack_terrain
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
 from world.scenario import Scenario, from_spec
-from world.scenario_file import first_error
+from world.scenario_file import first_fault
 from world.scenario_types import Guidance, Navigation
 from world.terrain import Terrain
 
@@ -162,16 +162,18 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     altered or does not fit.
     """
     if SETUP_FILE not in attachments:
-        raise LogError(f"{source}: no {SETUP_FILE}: not a planfly flight log, or cut off before its first second")
+        raise LogError(
+            f"{source}: no {SETUP_FILE}: not a planfly flight log, or cut off before its first second", file=source
+        )
     try:
         file = _Setup.model_validate_json(attachments[SETUP_FILE])
     except ValidationError as error:
-        raise LogError(f"{source}: {SETUP_FILE}: {first_error(error)}") from error
+        raise LogError(**first_fault(error).at(source, SETUP_FILE)) from error
     for name, digest in file.sha256.items():
         if name not in attachments:
-            raise LogError(f"{source}: {name}: missing; {SETUP_FILE} lists it")
+            raise LogError(f"{source}: {name}: missing; {SETUP_FILE} lists it", file=source)
         if hashlib.sha256(attachments[name]).hexdigest() != digest:
-            raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}")
+            raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}", file=source)
     listed = {name: attachments[name] for name in file.sha256}
     terrain = unpack_terrain(listed, source) if TERRAIN_FILE in listed else None
     scenario = _scenario(listed, source, terrain, file.external)
@@ -216,9 +218,9 @@ def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
     try:
         return attachments[name].decode()
     except KeyError:
-        raise LogError(f"{source}: {name}: missing") from None
+        raise LogError(f"{source}: {name}: missing", file=source) from None
     except UnicodeDecodeError as error:
-        raise LogError(f"{source}: {name}: not a text in UTF-8 (byte {error.start})") from error
+        raise LogError(f"{source}: {name}: not a text in UTF-8 (byte {error.start})", file=source) from error
 
 
 def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:

@@ -184,14 +184,22 @@ def read_route(file: RouteFile, source: str) -> Route:
     """Read the route of a table.  Raises LogError for arrays that do not fit each other, and legs without length."""
     waypoints = np.array(file.waypoints_east_north_amsl_m, dtype=np.float64)
     if not (leg_runs(waypoints) > 0.0).all():
-        raise LogError(f"{source}: route.waypoints_east_north_amsl_m: a leg without horizontal length")
+        raise LogError(
+            f"{source}: route.waypoints_east_north_amsl_m: a leg without horizontal length",
+            file=source,
+            field="route.waypoints_east_north_amsl_m",
+        )
     count = len(waypoints)
     wanted = {"airspeed_mps": count - 1, "acceptance_m": count, "fly_over": count, "items": count}
     if file.arcs_m:
         wanted["arcs_m"] = count
     for name, length in wanted.items():
         if len(getattr(file, name)) != length:
-            raise LogError(f"{source}: route.{name}: {len(getattr(file, name))} values: {length} are expected")
+            raise LogError(
+                f"{source}: route.{name}: {len(getattr(file, name))} values: {length} are expected",
+                file=source,
+                field=f"route.{name}",
+            )
     return Route(
         waypoints=waypoints,
         airspeed=np.array(file.airspeed_mps, dtype=np.float64),
@@ -235,7 +243,11 @@ def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
         values = getattr(file, name)
         lengths = [len(values), *({len(row) for row in values} if len(shape) == 2 else ())]
         if lengths != list(shape):
-            raise LogError(f"{source}: envelope.{name}: shape {lengths}: {list(shape)} is expected")
+            raise LogError(
+                f"{source}: envelope.{name}: shape {lengths}: {list(shape)} is expected",
+                file=source,
+                field=f"envelope.{name}",
+            )
         return np.array(values, dtype=np.float64)
 
     def power(name: str) -> Floats:
@@ -244,7 +256,7 @@ def read_envelope(file: EnvelopeFile, source: str) -> Envelope:
 
     for name in ("airspeed_mps", "amsl_m"):
         if (np.diff(getattr(file, name)) <= 0.0).any():
-            raise LogError(f"{source}: envelope.{name}: not increasing")
+            raise LogError(f"{source}: envelope.{name}: not increasing", file=source, field=f"envelope.{name}")
     return Envelope(
         aircraft=file.aircraft,
         model_hash=file.model_hash,
@@ -279,7 +291,7 @@ def read_parameters(file: ParametersFile, source: str) -> ArduPilotParameters:
     try:
         return stored_parameters(values, tuple(file.unused), file.source)
     except ParameterError as error:
-        raise LogError(f"{source}: parameters.values: {error}") from error
+        raise LogError(f"{source}: parameters.values: {error}", file=source, field="parameters.values") from error
 
 
 def program_file(program: AutopilotProgram) -> ProgramFile:

@@ -12,6 +12,7 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from numpy.typing import NDArray
 
 from flight.simulation.track import COLUMNS, Track
+from flight.simulation.track_table import COLUMN_NAMES
 from logs.recording.chunk_layout import MESSAGE_HEADER, MESSAGE_OPCODE
 from world.kernels import compiled
 
@@ -30,32 +31,6 @@ LOG_NAME = "foxglove.Log"
 STATE_TOPIC = "/state"
 EVENT_TOPIC = "/log"
 
-# Field of `Track`: the names of its columns in the message, each with its unit.
-_NAMES = {
-    "time": ("time_s",),
-    "position": ("east_m", "north_m", "up_amsl_m"),
-    "velocity": ("velocity_east_mps", "velocity_north_mps", "velocity_up_mps"),
-    "attitude": ("roll_rad", "pitch_rad", "yaw_rad"),
-    "rates": ("roll_rate_rad_per_s", "pitch_rate_rad_per_s", "yaw_rate_rad_per_s"),
-    "airspeed": ("airspeed_mps",),
-    "flow": ("alpha_rad", "beta_rad"),
-    "controls": ("elevator_rad", "aileron_rad", "rudder_rad", "throttle_fraction"),
-    "commands": (
-        "elevator_command_rad",
-        "aileron_command_rad",
-        "rudder_command_rad",
-        "throttle_command_fraction",
-    ),
-    "wind": ("wind_east_mps", "wind_north_mps", "wind_up_mps"),
-    "load_factor": ("load_factor_g",),
-    "current": ("battery_current_a",),
-    "energy": ("energy_used_wh",),
-    "leg": ("leg_index",),
-    "cross_track": ("cross_track_m",),
-    "height_error": ("height_error_m",),
-    "speed_command": ("speed_command_mps",),
-    "clearance": ("clearance_seen_m",),
-}
 _DOUBLES = ("time", "position")
 _TYPE = descriptor_pb2.FieldDescriptorProto
 _KINDS = {
@@ -88,7 +63,7 @@ class StateField(NamedTuple):
 def _fields() -> tuple[StateField, ...]:
     """Every field of the message after `row`, in order."""
     found = []
-    for source, names in _NAMES.items():
+    for source, names in COLUMN_NAMES.items():
         kind = "<f8" if source in _DOUBLES else "<i4" if source == "leg" else "<f4"
         found += [StateField(name, kind, source, None if len(names) == 1 else k) for k, name in enumerate(names)]
     return tuple(found)

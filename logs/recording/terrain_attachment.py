@@ -17,7 +17,7 @@ from logs.recording.attachment_names import TERRAIN_FILE, heights_name
 from world.errors import LogError
 from world.frames import MOST_TERMS, PolyMap
 from world.raster import MOST_PIXELS
-from world.scenario_file import first_error
+from world.scenario_file import first_fault
 from world.terrain import Terrain
 
 TERRAIN_SCHEMA = "planfly.terrain/1"
@@ -78,12 +78,14 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
     try:
         file = _File.model_validate_json(attachments[TERRAIN_FILE])
     except ValidationError as error:
-        raise LogError(f"{source}: {TERRAIN_FILE}: {first_error(error)}") from error
+        raise LogError(**first_fault(error).at(source, TERRAIN_FILE)) from error
     if file.rows * file.cols > MOST_PIXELS:
-        raise LogError(f"{source}: {TERRAIN_FILE}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read")
+        raise LogError(
+            f"{source}: {TERRAIN_FILE}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read", file=source
+        )
     blocks = _row_blocks(file.rows, file.cols)
     if len(blocks) != len(file.parts) or any(name not in attachments for name in file.parts):
-        raise LogError(f"{source}: {TERRAIN_FILE}: parts: {len(blocks)} are expected, each in the log")
+        raise LogError(f"{source}: {TERRAIN_FILE}: parts: {len(blocks)} are expected, each in the log", file=source)
     heights = np.empty((file.rows, file.cols), dtype=np.float32)
     for name, (first, last) in zip(file.parts, blocks, strict=True):
         heights[first:last] = _unpack(attachments[name], last - first, file.cols, f"{source}: {name}")
@@ -128,7 +130,7 @@ def _coefficients(rows: list[list[float]], source: str) -> NDArray[np.float64]:
     size = len(rows[0])
     if len(rows) != 2 + 2 * size or any(len(row) != size for row in rows) or size < 2:
         found = f"{len(rows)} rows of {size}"
-        raise LogError(f"{source}: {TERRAIN_FILE}: map_to_pixel: {found}: 2 + 2n rows of n are expected")
+        raise LogError(f"{source}: {TERRAIN_FILE}: map_to_pixel: {found}: 2 + 2n rows of n are expected", file=source)
     if not (math.fabs(rows[1][0]) > 0.0 and math.fabs(rows[1][1]) > 0.0):
-        raise LogError(f"{source}: {TERRAIN_FILE}: map_to_pixel: half-widths {rows[1][:2]}: not above 0")
+        raise LogError(f"{source}: {TERRAIN_FILE}: map_to_pixel: half-widths {rows[1][:2]}: not above 0", file=source)
     return np.array(rows)

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import KDTree
 
 from flight.simulation.control_limits import control_limits, held_at_limit
 from flight.simulation.flight_setup import FlightSetup
@@ -19,6 +18,7 @@ from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.along_track import segment_clearances
 from logs.verdict.measures.path_sweeps import path_spheres
 from world.geometry import path_length
+from world.notebooks.html_table import html_table
 
 Floats = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Difference:
     second: float
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Comparison:
     """Two flights and what differs.
 
@@ -47,6 +47,13 @@ class Comparison:
     verdicts: tuple[Verdict, Verdict]
     differences: tuple[Difference, ...]
     notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<Comparison {' and '.join(self.names)}: {len(self.differences)} quantities, {len(self.notes)} notes>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return html_table(" and ".join(self.names), difference_rows(self), ("", "", *self.names, "difference"))
 
 
 def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
@@ -153,6 +160,9 @@ def _notes(first: FlightLog, second: FlightLog) -> list[str]:
     if a.scenario.origin == b.scenario.origin:
         there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
         if len(there) and len(here):
+            # Imported here: nothing else of a report needs it.
+            from scipy.spatial import KDTree
+
             away = KDTree(there).query(here)[0]
             notes.append(
                 f"tracks: {number(float(away.mean()))} m apart on average, {number(float(away.max()))} m at most"

@@ -13,7 +13,7 @@ from logs.verdict.findings import RULES
 from logs.verdict.levels import AirframeAnswer, DecidingParameter, FlownBeside
 from logs.verdict.places import Place, PlaceKind
 from world.errors import LogError
-from world.scenario_file import first_error
+from world.scenario_file import first_fault
 
 BESIDE_SCHEMA = "planfly.beside/1"
 
@@ -84,12 +84,12 @@ def parse_beside(text: str | bytes, source: str) -> FlownBeside:
     try:
         file = _Beside.model_validate_json(text)
     except ValidationError as error:
-        raise LogError(f"{source}: {first_error(error)}") from error
+        raise LogError(**first_fault(error).at(source)) from error
     airframe, deciding = file.airframe, file.deciding
     rules = [rule for rule, _ in airframe.failed] if airframe is not None else []
     unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULES]
     if unknown:
-        raise LogError(f"{source}: {unknown[0]!r} is no rule")
+        raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source)
     return FlownBeside(
         None if airframe is None else airframe.answer(),
         None if deciding is None else deciding.parameter(),

@@ -89,7 +89,7 @@ class Finding:
     facts: tuple[Fact, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Verdict:
     """Whether a plan really flies.
 
@@ -111,6 +111,8 @@ class Verdict:
     >>> verdict = Verdict((), flyable=True, complete=True, lines=("flyable", "Start: not stated"), level="flown")
     >>> verdict.headline, verdict.summary.count("Start")
     ('flyable', 1)
+    >>> verdict
+    <Verdict flown: flyable; 0 findings, 0 failed>
     """
 
     findings: tuple[Finding, ...]
@@ -134,6 +136,21 @@ class Verdict:
     def summary(self) -> str:
         """All lines as one text."""
         return "\n".join(self.lines)
+
+    @property
+    def failed(self) -> tuple[Finding, ...]:
+        """The findings that fail."""
+        return tuple(finding for finding in self.findings if finding.ok is False)
+
+    def __repr__(self) -> str:
+        answer = "flyable" if self.flyable else "not flyable" if self.complete else "incomplete"
+        return f"<Verdict {self.level}: {answer}; {len(self.findings)} findings, {len(self.failed)} failed>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        from logs.verdict.notebooks.verdict_table import verdict_html
+
+        return verdict_html(self)
 
 
 @dataclass(frozen=True, slots=True)

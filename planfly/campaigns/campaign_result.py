@@ -14,17 +14,18 @@ from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report.campaign_files import clear_campaign
 from planfly.campaigns.report.finish_campaign import finish_campaign
-from planfly.campaigns.report.summary import CampaignSummary, summarise
+from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, summarise
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
 from planfly.campaigns.statistics.decision import Answer, Goal
 from planfly.campaigns.statistics.proportions import Interval
 from planfly.campaigns.storage.store import DATABASE, read_table
+from world.notebooks.html_table import html_table
 
 # Flights of a campaign that says no number, and the most of one that stops by itself.
 USUAL_FLIGHTS, MOST_FLIGHTS = 300, 5000
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CampaignResult:
     """What `planfly.campaign` returns.
 
@@ -68,8 +69,18 @@ class CampaignResult:
             return {name: np.array(values) for name, values in self.columns.items()}
         return pd.DataFrame(dict(self.columns))
 
+    def __repr__(self) -> str:
+        tally, (low, high) = self.summary.estimate.tally, self.interval
+        return (
+            f"<CampaignResult {self.probability:.4f} ({low:.4f} to {high:.4f}) of {tally.flown} flights; {self.answer}>"
+        )
 
-def run_campaign(
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return html_table(campaign_lines(self.summary)[0], self.by_rule.items(), ("rule", "flights that it fails"))
+
+
+def campaign(
     target: str | Path,
     *,
     spread: Path | str | None = None,
@@ -96,7 +107,12 @@ def run_campaign(
     out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
 
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
-    Raises a `world.errors.PlanflyError` for bad input.
+    Raises ValueError for numbers that are none, and a `planfly.PlanflyError` for bad input.
+
+    >>> campaign("paper-07", prove=1.5)
+    Traceback (most recent call last):
+    ...
+    ValueError: prove: 1.5: at least 0.5 and below 1 is expected
     """
     goal = make_goal(flights, prove, at_least, confidence)
     chosen = default_spread() if spread is None else read_spread(Path(spread))

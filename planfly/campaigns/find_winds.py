@@ -31,7 +31,7 @@ class WindsGoal:
     flights: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class WindsFound:
     """The boundary of each direction, and the flights it rests on: direction, speed, and whether flyable."""
 
@@ -42,6 +42,10 @@ class WindsFound:
     def from_deg(self, direction: int) -> float:
         """Where the wind of a direction comes from, degrees."""
         return 360.0 * direction / self.goal.directions
+
+    def __repr__(self) -> str:
+        least = min(one.estimate for one in self.boundaries)
+        return f"<WindsFound {len(self.boundaries)} directions, {least:.1f} m/s the least; {len(self.flights)} flights>"
 
 
 def find_winds(

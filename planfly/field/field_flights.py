@@ -132,7 +132,7 @@ def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> 
     if options.plan is not None:
         mismatch = plan_mismatch(setup, track)
         if mismatch is not None:
-            raise MissionError(f"{path}: not flown by {options.plan}: {mismatch.text}")
+            raise MissionError(f"{path}: not flown by {options.plan}: {mismatch.text}", file=path)
     verdict = judge_flight(setup, track, "")
     ended = "completed" if verdict.complete else _end_of(verdict)
     return ImportedFlight(setup, track, _events(flight), verdict, ended)
@@ -145,10 +145,12 @@ def _mission(path: Path, flight: FieldFlight, options: FieldOptions) -> tuple[Mi
             opened = open_plan(options.plan, options.terrain)
             return opened.mission, f"of {options.plan.name}", opened.scenario
         if not options.plan.is_file():
-            raise MissionError(f"{options.plan}: no such file; a plan.json, .waypoints or .plan file is expected")
+            raise MissionError(
+                f"{options.plan}: no such file; a plan.json, .waypoints or .plan file is expected", file=options.plan
+            )
         return read_mission(options.plan), f"of {options.plan.name}", None
     if flight.mission is None:
-        raise LogError(f"{path}: holds no mission: --plan MISSION names the one that was to be flown")
+        raise LogError(f"{path}: holds no mission: --plan MISSION names the one that was to be flown", file=path)
     found = flight.mission
     when = f", at {found.time:.1f} s" if found.time > 0.0 else ""
     return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None

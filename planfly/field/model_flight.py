@@ -51,7 +51,7 @@ def _one_again(
 
     flown = simulate(own, model, progress=report)
     if len(flown.track) < 2:
-        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {flown.ended}")
+        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {flown.ended}", file=scenario.name)
     stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
     return compare_with_model(own, legs, flown.track, flown.ended, stands_in=stands_in)
 

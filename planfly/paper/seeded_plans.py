@@ -148,7 +148,7 @@ def plan_section(
     names = [find_algorithm(algorithm, "--algorithm").name]
     names += [name for name in (STRIP, *BASELINES) if name not in names]
     tasks = [(threats, name, seed) for threats in problems for name in names for seed in range(1, seeds + 1)]
-    count = min(len(tasks), jobs or len(os.sched_getaffinity(0)))
+    count = min(len(tasks), jobs or usable_cores())
     done: list[SeededPlan] = []
     for item in _results(tasks, count):
         done.append(item)
@@ -156,6 +156,16 @@ def plan_section(
             remark = f"{item.threats} threats, {item.algorithm}, seed {item.seed}"
             advance(len(done), len(tasks), remark)
     return done
+
+
+def usable_cores() -> int:
+    """Cores that this process may use; where the system does not say, all that there are.
+
+    >>> usable_cores() >= 1
+    True
+    """
+    may_use = getattr(os, "sched_getaffinity", None)
+    return len(may_use(0)) if may_use is not None else os.cpu_count() or 1
 
 
 def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPlan]:

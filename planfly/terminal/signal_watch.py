@@ -1,12 +1,13 @@
 """SIGINT and SIGTERM end a command in time: in order where it comes to it, at once where it does not."""
 
 import contextlib
+import functools
 import os
 import signal
 import sys
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import FrameType
 from typing import NoReturn
 
@@ -28,8 +29,7 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
 
     Gives the list that holds the signal's number once one has come.
     """
-    read, write = os.pipe()
-    os.set_blocking(write, False)
+    read, write = _signal_pipe()
     heard: list[int] = []
     deaf = False
 
@@ -64,9 +64,23 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
         deaf = True
 
 
-def _watch(read: int, heard: list[int], grace: float) -> None:
+def _signal_pipe() -> tuple[Callable[[int], bytes], int]:
+    """What reads the numbers of signals, and the handle that Python writes them to, which never blocks."""
+    if hasattr(os, "set_blocking"):
+        read, write = os.pipe()
+        os.set_blocking(write, False)
+        return functools.partial(os.read, read), write
+    # Windows before Python 3.12: pipes always block there, sockets need not.
+    import socket
+
+    receiver, sender = socket.socketpair()
+    sender.setblocking(False)
+    return receiver.recv, sender.detach()
+
+
+def _watch(read: Callable[[int], bytes], heard: list[int], grace: float) -> None:
     """Wait for the first signal, give the command its time, and end the process."""
-    while (number := os.read(read, 1)[0]) not in ENDING:
+    while (number := read(1)[0]) not in ENDING:
         pass
     # Here too: a command may have handlers of its own.
     heard.append(number)

@@ -66,12 +66,16 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
     """
     terrain = scenario.terrain
     if terrain is None:
-        raise ScenarioError(f"{scenario.name}: terrain: none given; a path is planned over terrain")
+        raise ScenarioError(
+            f"{scenario.name}: terrain: none given; a path is planned over terrain", file=scenario.name, field="terrain"
+        )
     for name in ("max_turn", "max_climb", "max_dive"):
         value = getattr(limits, name)
         if value is not None and value <= ANGLE_MARGIN:
             allowed = 'a plan keeps 0.5 inside it; allowed: above 0.5, or "aircraft"'
-            raise ScenarioError(f"{scenario.name}: limits.{name}_deg: {math.degrees(value):g}: {allowed}")
+            raise ScenarioError.at(
+                scenario.name, f"limits.{name}_deg", math.degrees(value), f"{allowed}", shown=f"{math.degrees(value):g}"
+            )
     certified = _certified_arrays(scenario, limits, terrain)
     across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.strays else (0.0, 0.0)
     # What the ground rises across the way comes on top; the certificate looks at the ground there.

@@ -148,8 +148,6 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
     """
     found = ALGORITHMS.get(DEFAULT if name is None else name)
     if found is None:
-        raise ScenarioError(
-            f"{source}: planner.algorithm: {name!r}: not known; allowed: {', '.join(ALGORITHMS)}"
-            f"{did_you_mean(str(name), ALGORITHMS)}"
-        )
+        allowed = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
+        raise ScenarioError.at(source, "planner.algorithm", name, allowed, shown=f"{name!r}")
     return found

@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
 from world.kernels import compiled
@@ -59,6 +58,9 @@ def closing_zones(scenario: Scenario) -> Closed | None:
         cells[end] = _OPEN
     if _reached(cells, ends):
         return None
+    # Imported here, as below: only the explanation of a failure needs it.
+    from scipy import ndimage
+
     regions, _ = ndimage.label(cells == _OPEN)
     beside = [ndimage.binary_dilation(regions == regions[end]) for end in ends]
     both = [set(cells[edge].tolist()) for edge in beside]
@@ -76,6 +78,8 @@ def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Fl
 
 def _reached(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
     """Whether open cells lead from the one end to the other."""
+    from scipy import ndimage
+
     regions, _ = ndimage.label(cells == _OPEN)
     return bool(regions[ends[0]] == regions[ends[1]] != 0)
 

@@ -115,25 +115,35 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
         if search.finished(best[1]) or search.over():
             break
     if best is None:  # pragma: no cover - the loop always runs
-        raise ScenarioError(f"{search.problem.scenario.name}: planner: nothing was tried")
+        raise ScenarioError(
+            f"{search.problem.scenario.name}: planner: nothing was tried",
+            file=search.problem.scenario.name,
+            field="planner",
+        )
     return best
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
     if scenario.wind.speed > MOST_WIND * airspeed:
-        raise ScenarioError(
-            f"{scenario.name}: wind.speed_mps: {scenario.wind.speed:g}: a path is searched for in at most"
-            f" {MOST_WIND:.0%} of the airspeed {airspeed:g}, to make way on every course"
+        raise ScenarioError.at(
+            scenario.name,
+            "wind.speed_mps",
+            scenario.wind.speed,
+            f"a path is searched for in at most {MOST_WIND:.0%} of the airspeed {airspeed:g}, to make way on every"
+            " course",
+            shown=f"{scenario.wind.speed:g}",
         )
     table = scenario.planner
     if table.population * 3 * table.waypoints > MOST_NUMBERS:
         raise ScenarioError(
             f"{scenario.name}: planner.population: {table.population} of {table.waypoints} waypoints: "
-            f"too large; allowed: population x 3 x waypoints up to {MOST_NUMBERS:,}"
+            f"too large; allowed: population x 3 x waypoints up to {MOST_NUMBERS:,}",
+            file=scenario.name,
+            field="planner.population",
         )
     if table.budget is not None and table.budget < table.population:
         allowed = f"at least the population, {table.population}, is evaluated"
-        raise ScenarioError(f"{scenario.name}: planner.budget: {table.budget}: {allowed}")
+        raise ScenarioError.at(scenario.name, "planner.budget", table.budget, f"{allowed}")
     threats = scenario.threats
     for name, end in (("start", scenario.start), ("destination", scenario.destination)):
         outside = np.sqrt(((threats.position - end) ** 2).sum(axis=1)) - threats.kill_radius
@@ -142,7 +152,8 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
             unit = int(inside[0])
             raise ScenarioError(
                 f"{scenario.name}: {name}: {-outside[unit]:.0f} m inside the kill radius of {threats.names[unit]} "
-                f"({threats.kill_radius[unit]:.0f} m): no path from there is safe"
+                f"({threats.kill_radius[unit]:.0f} m): no path from there is safe",
+                file=scenario.name,
             )
 
 

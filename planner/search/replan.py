@@ -59,7 +59,7 @@ def replan(
     """
     count = len(old.waypoints)
     if not 0 <= leg < count - 1:
-        raise MissionError(f"{scenario.name}: leg {leg}: the plan has legs 0..{count - 2}")
+        raise MissionError(f"{scenario.name}: leg {leg}: the plan has legs 0..{count - 2}", file=scenario.name)
     same_mission(scenario, old)
     _outside(scenario, old, leg)
     rest = with_waypoints(old.waypoints[leg:], max(FEWEST, count - leg))
@@ -93,7 +93,10 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
     ):
         away = math.dist(planned, asked)
         if away > 1.0:
-            raise MissionError(f"{scenario.name}: {name}: {away:.0f} m from that of the plan; it is another mission's")
+            raise MissionError(
+                f"{scenario.name}: {name}: {away:.0f} m from that of the plan; it is another mission's",
+                file=scenario.name,
+            )
 
 
 def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
@@ -104,12 +107,13 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
     if unit >= 0 and threats.kill_radius[unit] > 0.0 and inside[unit] >= 0.0:
         raise MissionError(
             f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {inside[unit]:.0f} m inside the kill "
-            f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe"
+            f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe",
+            file=scenario.name,
         )
     forbidden = zones_entered(scenario, old.waypoints[[leg, leg]])
     if forbidden:
         begins = f"waypoint {leg}, where it begins, does not keep to {forbidden[0]}"
-        raise MissionError(f"{scenario.name}: leg {leg}: {begins}: no path from there does")
+        raise MissionError(f"{scenario.name}: leg {leg}: {begins}: no path from there does", file=scenario.name)
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:

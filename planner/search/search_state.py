@@ -286,7 +286,11 @@ class Search:
                 exposed = (path, certificate)
         result = exposed or first
         if result is None:  # pragma: no cover - an archive is never empty after an attempt
-            raise ScenarioError(f"{self.problem.scenario.name}: planner: nothing was evaluated")
+            raise ScenarioError(
+                f"{self.problem.scenario.name}: planner: nothing was evaluated",
+                file=self.problem.scenario.name,
+                field="planner",
+            )
         return result
 
     def best_path(self) -> tuple[Floats, Certificate]:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aircraft import beard_mclain as reference
 from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim, attitude, full_throttle, idle, linearise, straight
+from tests.aircraft import beard_mclain as reference
 from world.kernels import Record
 
 Floats = NDArray[np.float64]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from aircraft import beard_mclain as reference
+from tests.aircraft import beard_mclain as reference
 
 CLEAN = reference.BookAtmosphere(parasite_drag=0.0)
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from aircraft import beard_mclain as reference
 from aircraft.catalog import load_aircraft
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import linearise, straight
+from tests.aircraft import beard_mclain as reference
 from tests.bench.limits import Limit, calm_limits, wind_limits
 
 CLEAN = Variation(parasite_drag=0.0)

@@ -1,6 +1,8 @@
 """Every error of bad input is one kind, which the command line catches in one place."""
 
 import inspect
+import pickle
+from pathlib import Path
 
 import pytest
 
@@ -22,7 +24,8 @@ KINDS = (ScenarioError, TerrainError, MissionError, FlightError, ParameterError,
 
 
 def test_every_error_is_a_planfly_error() -> None:
-    defined = [kind for _, kind in inspect.getmembers(world.errors, inspect.isclass)]
+    members = [kind for _, kind in inspect.getmembers(world.errors, inspect.isclass)]
+    defined = [kind for kind in members if kind.__module__ == "world.errors"]
     assert set(defined) == {PlanflyError, StartError, *KINDS}
     assert all(issubclass(kind, PlanflyError) for kind in defined)
 
@@ -50,3 +53,26 @@ def test_the_command_line_ends_with_exit_code_2_and_the_message(
     monkeypatch.setattr(scenarios, "scenarios", fail)
     assert main(["scenarios"]) == 2
     assert capsys.readouterr().err.splitlines() == ["planfly: file.toml: limits: too many"]
+
+
+@pytest.mark.parametrize("kind", [PlanflyError, *KINDS])
+def test_an_error_of_one_value_holds_the_four_and_says_them(kind: type[PlanflyError]) -> None:
+    error = kind.at(Path("a.toml"), "wind.speed_mps", 41.0, "allowed 0..40", shown="41")
+    assert str(error) == "a.toml: wind.speed_mps: 41: allowed 0..40"
+    assert (error.file, error.field, error.value, error.allowed) == ("a.toml", "wind.speed_mps", 41.0, "allowed 0..40")
+    assert str(kind.at("a.toml", "seed", -1, "0 or more")) == "a.toml: seed: -1: 0 or more"
+
+
+def test_what_is_not_known_is_empty() -> None:
+    error = MissionError("no items")
+    assert (error.file, error.field, error.value, error.allowed) == ("", "", None, "")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [ScenarioError.at("a.toml", "seed", -1, "0 or more"), StartError("a.plan", "no way made"), LogError("empty")],
+)
+def test_errors_come_whole_from_another_process(error: PlanflyError) -> None:
+    again = pickle.loads(pickle.dumps(error))
+    assert type(again) is type(error)
+    assert (str(again), vars(again)) == (str(error), vars(error))

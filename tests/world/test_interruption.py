@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from world.interruption import Interrupted, interrupt, remove_unfinished, unfinished, uninterrupted
+from world.interruption import Interrupted, deaf_children, interrupt, remove_unfinished, unfinished, uninterrupted
 
 
 def test_a_signal_waits_for_the_end_of_what_is_done_whole() -> None:
@@ -94,3 +94,9 @@ def test_children_do_not_hear_ctrl_c_and_go_with_their_parent(number: signal.Sig
     assert [path.name for path in folder.iterdir()] == ["begun"]
     stat = Path(f"/proc/{child}/stat")
     assert not stat.exists() or stat.read_text("ascii").rsplit(")", 1)[1].split()[0] == "Z"
+
+
+def test_children_are_started_where_signals_cannot_be_blocked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(signal, "pthread_sigmask")
+    with deaf_children():
+        pass

@@ -1,6 +1,10 @@
 """Every format of elevation file reads the same heights at the same places."""
 
+import hashlib
 import math
+import re
+import subprocess
+import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -8,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rasterio
-from matplotlib import cbook
 from numpy.typing import NDArray
 from pyproj import Transformer
 from rasterio.transform import Affine
 from scipy.interpolate import RegularGridInterpolator
 
+import world
 from tests.world.made.elevation_files import (
     BOUNDS,
     COLS,
@@ -83,7 +87,36 @@ def test_any_reference_system(crs: str, tmp_path: Path) -> None:
     assert terrain.height(east, north) == pytest.approx(made_ground(lon, lat), abs=0.1)
 
 
-# The tile that matplotlib ships.
+# The tile that we ship.
+TILE = Path(world.__file__).parent / "elevation" / "jacksboro.npz"
+# Of the file that all plans over it were made with, which matplotlib's sample data held too.
+TILE_SHA256 = "d493f50a33e82a4420494c54d1fca1539d177bdc27ab190bc5fe6e92f62fb637"
+
+
+def test_the_tile_is_the_one_that_plans_were_made_over() -> None:
+    assert hashlib.sha256(TILE.read_bytes()).hexdigest() == TILE_SHA256
+    assert open_raster("jacksboro").sha256 == TILE_SHA256
+    readme = (TILE.parent / "README.md").read_text(encoding="utf-8")
+    assert TILE_SHA256 in readme
+    assert {"**Source**", "**Licence**"} <= set(re.findall(r"\*\*\w+\*\*", readme))
+
+
+def test_the_tile_needs_no_matplotlib() -> None:
+    code = (
+        "import sys\nsys.modules['matplotlib'] = None\nfrom world.raster import open_raster\n"
+        "print(open_raster('jacksboro').shape)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout == "(344, 403)\n", done.stderr
+
+
+def test_its_pixels_stand_on_the_grid_of_the_shuttles_survey() -> None:
+    """Centres at whole multiples of 3 arc seconds, as SRTM's tiles of that spacing have them."""
+    with np.load(TILE) as data:
+        west, north, pitch = (float(data[name]) for name in ("xmin", "ymax", "dx"))
+    assert pitch == pytest.approx(1.0 / 1200.0, rel=1e-12)
+    for centre in (west + pitch / 2, north - pitch / 2):
+        assert centre * 1200.0 == pytest.approx(round(centre * 1200.0), abs=1e-5)
 
 
 def _jacksboro() -> tuple[Floats, Floats, Floats]:
@@ -91,7 +124,7 @@ def _jacksboro() -> tuple[Floats, Floats, Floats]:
 
     The tile's 344 rows of 3 arc seconds begin at the north edge that the file states as its ymax.
     """
-    with np.load(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False)) as data:
+    with np.load(TILE) as data:
         heights = data["elevation"].astype(np.float64)
         north, west = float(data["ymax"]), float(data["xmin"])
         pitch = float(data["dx"])
@@ -151,7 +184,7 @@ def test_norris_dam_stands_where_the_lake_ends() -> None:
 
 def test_a_copy_of_the_tile_lies_where_the_tile_does(tmp_path: Path) -> None:
     copy = tmp_path / "copy.npz"
-    copy.write_bytes(Path(str(cbook.get_sample_data("jacksboro_fault_dem.npz", asfileobj=False))).read_bytes())
+    copy.write_bytes(TILE.read_bytes())
     assert open_raster(str(copy)).centre == open_raster("jacksboro").centre
     assert open_raster("jacksboro").centre.lat_deg == pytest.approx((36.15958 + 36.44625) / 2, abs=1e-5)
 

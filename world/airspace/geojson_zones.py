@@ -25,15 +25,15 @@ def geojson_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]
     try:
         data = json.loads(text, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}") from error
+        raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
     if not isinstance(data, dict):
-        raise ScenarioError(f"{source}: a GeoJSON object is expected, got {type(data).__name__}")
+        raise ScenarioError(f"{source}: a GeoJSON object is expected, got {type(data).__name__}", file=source)
     _check_crs(data, source)
     kind = data.get("type")
     if kind == "FeatureCollection":
         features = data.get("features")
         if not isinstance(features, list):
-            raise ScenarioError(f"{source}: features: a list is expected")
+            raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
         for k, feature in enumerate(features):
             yield _zone(feature, f"features[{k}]", k, source)
     elif kind == "Feature":
@@ -54,12 +54,14 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
     if not (isinstance(name, str) and name.endswith(_DEGREES)):
-        raise ScenarioError(f"{source}: crs: coordinates are longitude and latitude on WGS84 (RFC 7946)")
+        raise ScenarioError(
+            f"{source}: crs: coordinates are longitude and latitude on WGS84 (RFC 7946)", file=source, field="crs"
+        )
 
 
 def _zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict[str, Any]]:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        raise ScenarioError(f"{source}: {where}: a Feature is expected")
+        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source)
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {number + 1}"
@@ -72,20 +74,24 @@ def _zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict
         if kind == "Point":
             lat, lon = _corner(coordinates)
             if "radius_m" not in entries:
-                raise ScenarioError(f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder")
+                raise ScenarioError(
+                    f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder", file=source
+                )
             return label, entries | {"lat_deg": lat, "lon_deg": lon}
         if kind == "Polygon":
             coordinates, kind = [coordinates], "MultiPolygon"
         if kind == "MultiPolygon":
             parts = [_rings(part) for part in coordinates]
             if not all(holes_lie_inside(part) for part in parts if part):
-                raise ScenarioError(f"{source}: {label}: coordinates: a hole lies outside its outline")
+                raise ScenarioError(f"{source}: {label}: coordinates: a hole lies outside its outline", file=source)
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
-        raise ScenarioError(f"{source}: {label}: coordinates: lists of [longitude, latitude] are expected") from error
+        raise ScenarioError(
+            f"{source}: {label}: coordinates: lists of [longitude, latitude] are expected", file=source
+        ) from error
     known = "Polygon, MultiPolygon or Point is expected"
-    raise ScenarioError(f"{source}: {label}: geometry {json.dumps(kind)[:40]}: a {known}")
+    raise ScenarioError(f"{source}: {label}: geometry {json.dumps(kind)[:40]}: a {known}", file=source)
 
 
 def _rings(coordinates: Any) -> list[list[tuple[float, float]]]:

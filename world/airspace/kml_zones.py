@@ -30,13 +30,13 @@ def kml_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
     """
     # Entities may name other files, and grow a small file without end: KML has no use of them.
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ScenarioError(f"{source}: a document type is declared: not allowed in a file of zones")
+        raise ScenarioError(f"{source}: a document type is declared: not allowed in a file of zones", file=source)
     try:
         root = ElementTree.fromstring(text)  # what could grow was refused above
     except (ElementTree.ParseError, ValueError) as error:
-        raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}") from error
+        raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}", file=source) from error
     if _tag(root) != "kml":
-        raise ScenarioError(f"{source}: a <kml> element is expected")
+        raise ScenarioError(f"{source}: a <kml> element is expected", file=source)
     for number, placemark in enumerate((element for element in root.iter() if _tag(element) == "Placemark"), 1):
         name = _text(placemark, "name") or f"zone {number}"
         label = f"Placemark {number}" + (f" ({name})" if name.isprintable() else "")
@@ -61,7 +61,9 @@ def _zone(placemark: _Element, source: str) -> dict[str, Any]:
     polygons, points = _all(placemark, "Polygon"), _all(placemark, "Point")
     if not polygons:
         if len(points) != 1 or "radius_m" not in entries:
-            raise ScenarioError(f"{source}: a Polygon is expected, or a Point with radius_m in its ExtendedData")
+            raise ScenarioError(
+                f"{source}: a Polygon is expected, or a Point with radius_m in its ExtendedData", file=source
+            )
         ((lon, lat, _),) = _coordinates(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
         return entries | {"lat_deg": lat, "lon_deg": lon}
     rings, ceilings = [], set()
@@ -73,7 +75,9 @@ def _zone(placemark: _Element, source: str) -> dict[str, Any]:
             corners += ring
         ceilings.add(_ceiling(polygon, [up for _, _, up in corners], source))
     if len(ceilings) > 1:
-        raise ScenarioError(f"{source}: its polygons have different heights: give each a placemark of its own")
+        raise ScenarioError(
+            f"{source}: its polygons have different heights: give each a placemark of its own", file=source
+        )
     key, height = ceilings.pop()
     stated = any(side in entries for side in ("ceiling_amsl_m", "ceiling_agl_m"))
     return {"rings_deg": rings, **({key: height} if key and not stated else {}), **entries}
@@ -86,11 +90,15 @@ def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, flo
         return "", 0.0
     key = {"absolute": "ceiling_amsl_m", "relativeToGround": "ceiling_agl_m"}.get(mode)
     if key is None:
-        raise ScenarioError(f"{source}: altitudeMode {mode[:40]!r}: allowed clampToGround, relativeToGround, absolute")
+        raise ScenarioError(
+            f"{source}: altitudeMode {mode[:40]!r}: allowed clampToGround, relativeToGround, absolute", file=source
+        )
     if _text(polygon, "extrude") not in ("1", "true"):
-        raise ScenarioError(f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace")
+        raise ScenarioError(
+            f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace", file=source
+        )
     if not ups or max(ups) - min(ups) > _LEVEL:
-        raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling")
+        raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
     return key, ups[0]
 
 
@@ -103,7 +111,7 @@ def _coordinates(element: _Element, source: str) -> list[tuple[float, float, flo
                 lon, lat, *rest = (float(part) for part in position.split(","))
             except ValueError as error:
                 raise ScenarioError(
-                    f"{source}: coordinates {position[:40]!r}: lon,lat or lon,lat,up is expected"
+                    f"{source}: coordinates {position[:40]!r}: lon,lat or lon,lat,up is expected", file=source
                 ) from error
             out.append((lon, lat, rest[0] if rest else 0.0))
     return out
@@ -119,7 +127,7 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
             try:
                 found[key] = float(value)
             except ValueError as error:
-                raise ScenarioError(f"{source}: {key}: {value[:40]!r}: a number is expected") from error
+                raise ScenarioError(f"{source}: {key}: {value[:40]!r}: a number is expected", file=source) from error
         elif value:
             found[key] = value
     return found

@@ -26,7 +26,11 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
     for file in [files] if isinstance(files, str) else files:
         tables += read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}")
     if len(tables) > MOST_ZONES:
-        raise ScenarioError(f"{source}: zones_file: {len(tables):,} zones in all: at most {MOST_ZONES:,}")
+        raise ScenarioError(
+            f"{source}: zones_file: {len(tables):,} zones in all: at most {MOST_ZONES:,}",
+            file=source,
+            field="zones_file",
+        )
     return tables
 
 
@@ -46,26 +50,30 @@ def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise ScenarioError(f"{source}: suffix {path.suffix!r}: a file of zones is .geojson, .json or .kml")
+        raise ScenarioError(
+            f"{source}: suffix {path.suffix!r}: a file of zones is .geojson, .json or .kml", file=source
+        )
     tables = []
     for where, entries in reader(_text(path, source), source):
         tables.append(_table(entries, f"{source}: {where}"))
     if not tables:
-        raise ScenarioError(f"{source}: there is no zone in it")
+        raise ScenarioError(f"{source}: there is no zone in it", file=source)
     return tables
 
 
 def _text(path: Path, source: str) -> str:
     try:
         if not path.is_file():
-            raise ScenarioError(f"{source}: no such file")
+            raise ScenarioError(f"{source}: no such file", file=source)
         if path.stat().st_size > MOST_BYTES:
-            raise ScenarioError(f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MOST_BYTES:,}")
+            raise ScenarioError(
+                f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MOST_BYTES:,}", file=source
+            )
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise ScenarioError(f"{source}: cannot be read: {error.strerror}") from error
+        raise ScenarioError(f"{source}: cannot be read: {error.strerror}", file=source) from error
     except UnicodeDecodeError as error:
-        raise ScenarioError(f"{source}: not a text file in UTF-8 (byte {error.start})") from error
+        raise ScenarioError(f"{source}: not a text file in UTF-8 (byte {error.start})", file=source) from error
 
 
 def _table(entries: dict[str, Any], source: str) -> ZoneTable:

@@ -70,7 +70,7 @@ def check_ends(zones: Sequence[Zone], source: str, ends: Sequence[tuple[str, Flo
         broken = _first_broken(zones, records, point, ground)
         if broken is not None:
             side = "inside the exclusion" if broken.kind == "exclusion" else "outside the inclusion"
-            raise ScenarioError(f"{source}: zones: {broken.name}: {key} lies {side}")
+            raise ScenarioError.at(source, "zones", broken.name, f"{key} lies {side}")
 
 
 def zone_broken_at(zones: Sequence[Zone], point: Floats, ground: Terrain | None) -> Zone | None:

@@ -23,11 +23,15 @@ def read_gpx(path: Path) -> RawLog:
     try:
         found = gpxpy.parse(text)
     except (gpxpy.gpx.GPXException, ValueError) as error:
-        raise LogError(f"{path}: not a GPX file that can be read: {' '.join(str(error).split())[:120]}") from error
+        raise LogError(
+            f"{path}: not a GPX file that can be read: {' '.join(str(error).split())[:120]}", file=path
+        ) from error
     points = [point for track in found.tracks for segment in track.segments for point in segment.points]
     timed = [point for point in points if point.time is not None]
     if len(timed) < 2:
-        raise LogError(f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected")
+        raise LogError(
+            f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected", file=path
+        )
     # Times without a zone are UTC, as the format has all of them.
     times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
     stamps = np.array([time.timestamp() for time in times])

@@ -34,7 +34,7 @@ def read_igc(path: Path) -> RawLog:
     lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
     rows, unreadable = _fixes(lines)
     if len(rows) < 2:
-        raise LogError(f"{path}: {len(rows)} fixes (B records): at least 2 are expected")
+        raise LogError(f"{path}: {len(rows)} fixes (B records): at least 2 are expected", file=path)
     table = np.array(rows)
     time = _over_midnight(table[:, 0])
     gnss, pressure = table[:, 4], table[:, 3]

@@ -20,7 +20,9 @@ def read_kml(path: Path) -> RawLog:
     try:
         root = ElementTree.fromstring(track_text(path, xml=True))
     except (ElementTree.ParseError, ValueError) as error:
-        raise LogError(f"{path}: not a KML file that can be read: {' '.join(str(error).split())[:120]}") from error
+        raise LogError(
+            f"{path}: not a KML file that can be read: {' '.join(str(error).split())[:120]}", file=path
+        ) from error
     rows, unreadable, mode = [], 0, "clampToGround"
     for track in root.iter():
         if _name(track) != "Track":
@@ -37,7 +39,7 @@ def read_kml(path: Path) -> RawLog:
     if len(rows) < 2:
         lines = sum(_name(one) == "LineString" for one in root.iter())
         why = f"; its {lines} lines have no times" if lines else ""
-        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}")
+        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
     table = np.array(rows)
     datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
     return RawLog(

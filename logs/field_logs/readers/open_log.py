@@ -35,21 +35,21 @@ def open_log(path: Path) -> RawLog:
     """
     try:
         if not path.is_file():
-            raise LogError(f"{path}: no such file: a log ({', '.join(SUFFIXES)}) is expected")
+            raise LogError(f"{path}: no such file: a log ({', '.join(SUFFIXES)}) is expected", file=path)
         size = path.stat().st_size
         if size > MOST_BYTES:
-            raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read")
+            raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read", file=path)
         with path.open("rb") as file:
             head = file.read(_HEAD)
         if not head:
-            raise LogError(f"{path}: empty: a log is expected")
+            raise LogError(f"{path}: empty: a log is expected", file=path, field="empty")
         # What is no number in a damaged log is left out later, and told.
         with np.errstate(all="ignore"):
             return _reader(path, head)(path)
     except OSError as error:
-        raise LogError(f"{path}: cannot be read: {error.strerror}") from error
+        raise LogError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     except MemoryError:
-        raise LogError(f"{path}: claims more than fits into memory") from None
+        raise LogError(f"{path}: claims more than fits into memory", file=path) from None
 
 
 def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
@@ -89,5 +89,6 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
         return read_telemetry
     raise LogError(
         f"{path}: not a log that is known (it starts with {head[:8]!r}): ArduPilot .BIN, MAVLink .tlog, PX4 .ulg,"
-        " .gpx, .igc, .kml or .kmz is expected"
+        " .gpx, .igc, .kml or .kmz is expected",
+        file=path,
     )

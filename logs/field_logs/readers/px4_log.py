@@ -50,9 +50,9 @@ def read_px4(path: Path) -> RawLog:
         with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
             found = ULog(_Steps(file), _TOPICS, disable_str_exceptions=True)
     except MemoryError:
-        raise LogError(f"{path}: claims more than fits into memory") from None
+        raise LogError(f"{path}: claims more than fits into memory", file=path) from None
     except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
-        raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}") from error
+        raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}", file=path) from error
     return _Topics(found, str(path), _damage_of(path)).log()
 
 

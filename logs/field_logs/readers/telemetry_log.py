@@ -57,7 +57,7 @@ def read_telemetry(path: Path) -> RawLog:
             items.append((stamp, message))
     vehicles = [found for found in systems.values() if any(_is_vehicle(one) for _, one in found.named("HEARTBEAT"))]
     if not vehicles:
-        raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew")
+        raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
     # Of several the one that is heard most often.
     return _Messages(max(vehicles, key=len), items, str(path)).log(reader)
 

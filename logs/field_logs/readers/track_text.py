@@ -21,10 +21,12 @@ def track_text(path: Path, *, xml: bool) -> str:
     """
     size = path.stat().st_size
     if size > MOST_BYTES:
-        raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read of a track")
+        raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read of a track", file=path)
     text = _bytes_of(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
-        raise LogError(f"{path}: a document type: none is expected in a track, and entities are not expanded")
+        raise LogError(
+            f"{path}: a document type: none is expected in a track, and entities are not expanded", file=path
+        )
     return text
 
 

@@ -48,7 +48,7 @@ def corner_passes(demands: RouteDemands, aligned: AlignedTrack) -> tuple[CornerP
     (True, True)
     """
     found = _nearest(demands, aligned)
-    times, tick = [time for time, _ in found], aligned.tick()
+    times, tick = [time for time, _ in found], aligned.tick
     out = []
     for k, (time, nearest) in enumerate(found):
         overshoot, beyond = None, 0.0

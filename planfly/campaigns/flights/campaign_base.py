@@ -101,7 +101,9 @@ def open_campaign(
 def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) -> Plan:
     plan = make_plan(scenario, load_airframe(scenario), choose_seed(scenario, seed), advance=advance)
     if not plan.feasible:
-        raise MissionError(f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why")
+        raise MissionError(
+            f"{scenario.name}: no feasible plan, so nothing to fly; `planfly plan` says why", file=scenario.name
+        )
     return plan
 
 

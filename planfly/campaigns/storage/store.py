@@ -65,7 +65,7 @@ class Store:
         """
         self.path, self.made_of = path, made_of
         if resume and not path.is_file():
-            raise StoreError(f"{path}: no such campaign to resume")
+            raise StoreError(f"{path}: no such campaign to resume", file=path)
         self._connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
         try:
             with _told(path):
@@ -85,11 +85,12 @@ class Store:
         run("CREATE TABLE IF NOT EXISTS campaign (key TEXT PRIMARY KEY, value TEXT NOT NULL)")
         known = dict(run("SELECT key, value FROM campaign").fetchall())
         if known and known.get("schema") != SCHEMA:
-            raise StoreError(f"{self.path}: schema {known.get('schema')!r}: {SCHEMA} is expected")
+            raise StoreError(f"{self.path}: schema {known.get('schema')!r}: {SCHEMA} is expected", file=self.path)
         if known and known.get("made_of") != self.made_of:
             raise StoreError(
                 f"{self.path}: is of another campaign: its code, mission, aircraft, scenario, spread or seed differs"
-                f" ({known.get('made_of')}, not {self.made_of})"
+                f" ({known.get('made_of')}, not {self.made_of})",
+                file=self.path,
             )
         values = {"schema": SCHEMA, "made_of": self.made_of, "settings": json.dumps(settings, sort_keys=True)}
         run("DELETE FROM campaign")
@@ -195,8 +196,8 @@ class _told:
         if code is not None and code & 0xFF == sqlite3.SQLITE_FULL:
             raise OSError(errno.ENOSPC, "no space left; the flights before are kept, --resume goes on", str(self._path))
         if code is not None and code & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
-            raise StoreError(f"{self._path}: is held by another process") from error
-        raise StoreError(f"{self._path}: {error}") from error
+            raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
+        raise StoreError(f"{self._path}: {error}", file=self._path) from error
 
 
 def _known(name: str) -> str:

@@ -83,3 +83,15 @@ def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:
         read_key(path)
     with pytest.raises(FlightError, match="cannot be read"):
         read_key(tmp_path / "none")
+
+
+def test_where_users_have_no_numbers_a_key_is_read_whatever_its_mode(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(b"correct horse battery")
+    key.chmod(0o644)
+    with pytest.raises(FlightError, match="mode 644"):
+        read_key(key)
+    monkeypatch.delattr("os.getuid")
+    assert len(read_key(key)) == 32

@@ -4,6 +4,7 @@ import dataclasses
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -146,3 +147,18 @@ def test_rows_missing_at_the_end_are_counted(tmp_path: Path, log_file: Path) -> 
 
     log = read_log(rewrite(log_file, tmp_path / "b.mcap", lose))
     assert (log.complete, log.problem, log.ended) == (False, "470 of 480 rows are there", "completed")
+
+
+def test_a_log_prints_in_a_line_and_is_a_table_in_a_notebook(log_file: Path, tmp_path: Path) -> None:
+    log = read_log(str(log_file))
+    assert repr(log) == f"<FlightLog flight.mcap: {log.setup.scenario.name}, {log.end_time:.1f} s, completed>"
+    rows = {row[0].text: row[1].text for row in ElementTree.fromstring(log._repr_html_()).iter("tr")}
+    assert rows["aircraft"] == "aerosonde"
+    assert rows["ended"] == "completed"
+    assert "incomplete" not in rows
+    cut, data = tmp_path / "cut.mcap", log_file.read_bytes()
+    cut.write_bytes(data[: data.index(b"result.json") - 100])
+    short = read_log(cut)
+    assert repr(short).endswith(" s, cut short>")
+    rows = {row[0].text: row[1].text for row in ElementTree.fromstring(short._repr_html_()).iter("tr")}
+    assert rows["incomplete"] == short.problem

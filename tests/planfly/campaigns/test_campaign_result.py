@@ -12,7 +12,7 @@ from tests.planfly.campaigns.report.made_report import made_report
 
 
 def test_the_public_name_is_the_package_s() -> None:
-    assert planfly.campaign.__name__ == "run_campaign"
+    assert planfly.campaign.__name__ == "campaign"
     assert planfly.CampaignResult is CampaignResult
 
 

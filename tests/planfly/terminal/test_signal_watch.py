@@ -52,3 +52,20 @@ def test_a_process_ends_whatever_it_does(body: str, number: signal.Signals, tmp_
         assert said == b"planfly: interrupted\n"
     assert least <= took < 2.0
     assert not mine.exists()
+
+
+def test_it_ends_in_time_where_no_pipe_can_be_told_not_to_block(tmp_path: Path) -> None:
+    """As on Windows before Python 3.12."""
+    text, least = BODIES["in C"]
+    program = "import os\ndel os.set_blocking\n" + PROGRAM.format(body=text)
+    process = subprocess.Popen(
+        [sys.executable, "-c", program, str(tmp_path / "mine")], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == b"begun\n"
+    time.sleep(0.2)
+    begun = time.monotonic()
+    process.send_signal(signal.SIGTERM)
+    _, said = process.communicate(timeout=20.0)
+    assert (process.returncode, said) == (128 + signal.SIGTERM, b"planfly: interrupted\n")
+    assert least <= time.monotonic() - begun < 2.0

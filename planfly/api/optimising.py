@@ -1,0 +1,193 @@
+"""The planner's estimation of distribution algorithms alone: any black box within bounds, by ask and tell."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from planner.optimisers.differential_evolution import DifferentialEvolution
+from planner.optimisers.emna import Emna
+from planner.optimisers.preference import NO_GOAL, Level, ranks
+from planner.optimisers.umda import Umda
+
+Floats = NDArray[np.float64]
+
+# "umda": independent Gaussians, the paper's; "emna": one Gaussian of full covariance; "differential": differential
+# evolution, which is no EDA and stands beside them for comparison.
+Model = Literal["umda", "emna", "differential"]
+_MODELS = {"umda": Umda, "emna": Emna, "differential": DifferentialEvolution}
+
+
+@dataclass(frozen=True, slots=True)
+class BestFound:
+    """A point and what it is worth.
+
+    x: (d,).  values: (m,) of the objectives.  violations: (v,) of the constraints, 0 where met; empty without any.
+    """
+
+    x: Floats
+    values: Floats
+    violations: Floats
+
+    @property
+    def value(self) -> float:
+        """Of the first objective."""
+        return float(self.values[0])
+
+    @property
+    def feasible(self) -> bool:
+        """Whether all constraints are met."""
+        return not (self.violations > 0.0).any()
+
+
+class Optimiser:
+    """A search within a box: `ask` gives points, `tell` takes what they are worth; made by `planfly.optimise`."""
+
+    def __init__(
+        self,
+        lower: Floats,
+        upper: Floats,
+        model: Model,
+        population: int,
+        rng: np.random.Generator,
+        initial: Floats | None,
+    ) -> None:
+        self._scores: Floats = np.empty((0, 0))
+        self._points: Floats = np.empty((0, lower.size))
+        self._levels: tuple[Level, ...] = ()
+        self._violations = 0
+        self._most = population
+        self._search = _MODELS[model](
+            lower, upper, lambda scores: ranks(scores, self._levels), population, rng, initial=initial
+        )
+        self.evaluations = 0
+
+    def ask(self) -> Floats:
+        """Points (n, d) in the box that want values: the whole population first, then half of it at a time."""
+        return np.array(self._search.ask())
+
+    def tell(self, values: ArrayLike, violations: ArrayLike | None = None) -> None:
+        """Take what the points asked for are worth, and draw the next from the better half.
+
+        values: (n,), less is better, or (n, m) for m objectives, between which Pareto dominance decides.
+        violations: (n,) or (n, v), how far each constraint is violated, 0 or less where it is met; less violation
+        counts before values.  What is not a number counts as worst.
+        Raises ValueError for another number of rows than was asked for, or of columns than before.
+        """
+        asked = self._search.ask()
+        told = _columns("values", values, len(asked))
+        broken = np.empty((len(asked), 0)) if violations is None else _columns("violations", violations, len(asked))
+        if not told.shape[1]:
+            raise ValueError("values: no columns: one an objective is expected")
+        scores = np.concatenate([np.maximum(broken, 0.0), told], axis=1)
+        if self._levels and (scores.shape[1] != self._scores.shape[1] or broken.shape[1] != self._violations):
+            raise ValueError("values, violations: other numbers of columns than before")
+        if not self._levels:
+            self._violations = broken.shape[1]
+            self._levels = _levels(broken.shape[1], told.shape[1])
+            self._scores = np.empty((0, scores.shape[1]))
+        self.evaluations += len(asked)
+        self._keep(asked, scores)
+        self._search.tell(scores)
+
+    def _keep(self, points: Floats, scores: Floats) -> None:
+        """Keep what nothing that was told of is preferred to, the least first objective first."""
+        every, known = np.concatenate([self._points, points]), np.concatenate([self._scores, scores])
+        first = np.flatnonzero(ranks(known, self._levels) == 0)
+        order = first[np.argsort(known[first, self._violations], kind="stable")][: self._most]
+        self._points, self._scores = every[order], known[order]
+
+    @property
+    def best(self) -> BestFound:
+        """The best point told of; of several objectives the one of `front` that is best in the first.
+
+        Raises ValueError before the first `tell`.
+        """
+        return self.front[0]
+
+    @property
+    def front(self) -> tuple[BestFound, ...]:
+        """The points that nothing told of is preferred to, as many as the population at most."""
+        if not self._levels:
+            raise ValueError("nothing was told yet: ask() and tell() come first")
+        v = self._violations
+        return tuple(
+            BestFound(x.copy(), row[v:].copy(), row[:v].copy())
+            for x, row in zip(self._points, self._scores, strict=True)
+        )
+
+    def minimise(self, objective: Callable[[Floats], ArrayLike], generations: int = 100) -> BestFound:
+        """Ask and tell so many times of an objective that takes points (n, d) and gives values (n,); the best found."""
+        for _ in range(generations):
+            self.tell(objective(self.ask()))
+        return self.best
+
+    def __repr__(self) -> str:
+        name, found = type(self._search).__name__, f", best {self.best.value:.6g}" if self._levels else ""
+        return f"<Optimiser {name}: {self._points.shape[1]} variables, {self.evaluations:,} evaluations{found}>"
+
+
+def optimise(
+    lower: ArrayLike,
+    upper: ArrayLike,
+    *,
+    model: Model = "umda",
+    population: int = 100,
+    seed: int | np.random.Generator = 1,
+    initial: ArrayLike | None = None,
+) -> Optimiser:
+    """The planner's estimation of distribution algorithm alone, for any black box within bounds, by ask and tell.
+
+    lower, upper: (d,) box.
+    model: "umda", the paper's univariate Gaussians; "emna", one Gaussian of full covariance; "differential",
+    differential evolution beside them.
+    population: even number of points, 4 at least; half of them are drawn anew in each generation.
+    seed: a whole number, or a generator of random numbers.
+    initial: (population, d) first points; None for uniform.
+    Raises ValueError for a box that is none, and for another population.
+
+    A bowl's bottom at (1, 2), and the least on the side of a line that it does not lie on, 0.5 at (0.5, 1.5):
+
+    >>> import planfly
+    >>> search = planfly.optimise([-5, -5], [5, 5], seed=1)
+    >>> for generation in range(40):
+    ...     x, y = search.ask().T
+    ...     search.tell((x - 1) ** 2 + (y - 2) ** 2)
+    >>> search.best.x.round(3).tolist()
+    [1.0, 2.0]
+    >>> search = planfly.optimise([-5, -5], [5, 5], model="emna", seed=1)
+    >>> for generation in range(60):
+    ...     x, y = search.ask().T
+    ...     search.tell((x - 1) ** 2 + (y - 2) ** 2, violations=x + y - 2)
+    >>> search.best.feasible, round(search.best.value, 1)
+    (True, 0.5)
+    """
+    low, high = np.array(lower, dtype=np.float64), np.array(upper, dtype=np.float64)
+    if low.ndim != 1 or low.shape != high.shape or not low.size:
+        raise ValueError(f"lower, upper: shapes {low.shape} and {high.shape}: two of (d,) are expected")
+    if not (np.isfinite(low) & np.isfinite(high) & (low < high)).all():
+        raise ValueError("lower, upper: finite numbers, lower below upper, are expected")
+    if model not in _MODELS:
+        raise ValueError(f"model: {model!r}: allowed {', '.join(_MODELS)}")
+    if population < 4 or population % 2:
+        raise ValueError(f"population: {population}: an even number from 4 is expected")
+    first = None if initial is None else np.array(initial, dtype=np.float64)
+    if first is not None and (first.shape != (population, low.size) or not np.isfinite(first).all()):
+        raise ValueError(f"initial: shape {first.shape}: finite numbers of ({population}, {low.size}) are expected")
+    return Optimiser(low, high, model, population, np.random.default_rng(seed), first)
+
+
+def _levels(violations: int, objectives: int) -> tuple[Level, ...]:
+    """Constraints, each with the goal 0, before objectives without goals."""
+    values = Level(tuple(range(violations, violations + objectives)), (NO_GOAL,) * objectives)
+    return (Level(tuple(range(violations)), (0.0,) * violations), values) if violations else (values,)
+
+
+def _columns(name: str, given: ArrayLike, rows: int) -> Floats:
+    table = np.array(given, dtype=np.float64)
+    table = table[:, np.newaxis] if table.ndim == 1 else table
+    if table.ndim != 2 or len(table) != rows:
+        raise ValueError(f"{name}: shape {np.shape(given)}: {rows} rows are expected, one for each point asked for")
+    return np.where(np.isnan(table), np.inf, table)

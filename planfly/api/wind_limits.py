@@ -1,0 +1,54 @@
+"""The largest wind from each direction in which a mission flies."""
+
+from pathlib import Path
+
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds
+from planfly.campaigns.flights.campaign_base import open_campaign
+from planfly.campaigns.report.wind_files import write_winds
+from planfly.campaigns.spread.spread_file import default_spread, read_spread
+
+
+def winds(
+    target: str | Path,
+    *,
+    prove: float = 0.99,
+    directions: int = 16,
+    most: float = 20.0,
+    flights: int = 5000,
+    confidence: float = 0.95,
+    spread: str | Path | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    out: str | Path | None = None,
+) -> WindsFound:
+    """The largest wind from each direction in which a mission flies with a probability, by flights put where they tell.
+
+    target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
+    prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all directions.
+    confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
+    out: a folder for ``winds.html``, ``winds.png`` and ``winds.json``; None writes none.
+
+    A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
+    Raises ValueError for numbers that are none, and a `planfly.PlanflyError` for bad input.
+
+    >>> winds("paper-07", directions=3)
+    Traceback (most recent call last):
+    ...
+    ValueError: directions: 3: 4 to 72 is expected
+    """
+    for name, value, low, high in (
+        ("prove", prove, 0.5, 0.9999999), ("confidence", confidence, 0.5, 0.9999999), ("directions", directions, 4, 72),
+        ("most", most, 1.0, 40.0), ("flights", flights, 1, 10_000_000),
+    ):  # fmt: skip
+        if not low <= value <= high:
+            raise ValueError(f"{name}: {value:g}: {low:g} to {high:g} is expected")
+    goal = WindsGoal(prove, confidence, directions, most, flights)
+    chosen = default_spread() if spread is None else read_spread(Path(spread))
+    base = open_campaign(str(target), chosen.without(ASKED), seed=seed)
+    found = find_winds(base, goal, Workers(workers, scheduler))
+    if out is not None:
+        Path(out).mkdir(parents=True, exist_ok=True)
+        write_winds(Path(out), base, found, f"planfly winds {target} --seed {base.seed}")
+    return found

@@ -1,0 +1,75 @@
+"""The packages beside planfly that it is made of, and another's module that hides one of them."""
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+PACKAGES = ("aircraft", "flight", "logs", "planner", "world")
+# As the command line ends for bad usage.
+_BAD_USAGE = 2
+
+
+class Hidden(NamedTuple):
+    """A package of ours that Python would not find.  found: the file of its name that it finds.  own: ours."""
+
+    found: str
+    own: str
+
+
+def hidden_package(home: Path) -> Hidden | None:
+    """The first package of ours that another's module of its name hides; None where all are found.  Imports nothing.
+
+    home: the folder that planfly and its packages lie in.
+
+    >>> hidden_package(Path(__file__).parents[1]) is None
+    True
+    >>> hidden_package(Path("/elsewhere")).own
+    '/elsewhere/aircraft/__init__.py'
+    """
+    for name in PACKAGES:
+        found, own = _file_of(name), home / name / "__init__.py"
+        if found is not None and found != str(own) and not _same_file(found, own):
+            return Hidden(found, str(own))
+    return None
+
+
+def _file_of(name: str) -> str | None:
+    if name in sys.modules:
+        return getattr(sys.modules[name], "__file__", None)
+    spec = find_spec(name)
+    return None if spec is None else spec.origin
+
+
+def _same_file(found: str, own: Path) -> bool:
+    try:
+        return own.samefile(found)
+    except OSError:
+        return False
+
+
+def refuse_hidden_packages() -> None:
+    """Say in one line which file hides a package of ours, before an import deep inside meets it.
+
+    Raises ImportError; the command line ends with exit code 2 instead.
+
+    >>> refuse_hidden_packages()
+    """
+    hidden = hidden_package(Path(__file__).parents[1])
+    if hidden is None:
+        return
+    line = (
+        f"{hidden.found}: hides {hidden.own}, which planfly is made of: rename it, or keep its folder off Python's path"
+        " (python -P leaves the current one out)"
+    )
+    if _is_command():
+        sys.stderr.write(f"planfly: {line}\n")
+        raise SystemExit(_BAD_USAGE)
+    raise ImportError(line, name="planfly", path=hidden.found)
+
+
+def _is_command() -> bool:
+    """Whether Python was started for the command line: as ``planfly``, or as ``python -m planfly``."""
+    # While it looks for the module, Python says -m in its place; an embedded one may say nothing.
+    program = next(iter(getattr(sys, "argv", ())), "")
+    return Path(program).stem == "planfly" or (program == "-m" and "planfly" in sys.orig_argv)

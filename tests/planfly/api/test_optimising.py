@@ -1,0 +1,173 @@
+"""The planner's algorithm alone: known bottoms by plain sums, and the planner's own steps for the same seed."""
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+import planfly
+from planfly.airframe import load_airframe
+from planfly.api.optimising import Model
+from planner.plan import Violation
+from planner.search import path_generations
+from planner.search.plan_path import plan_path
+from planner.search.score_table import KILL, LENGTH
+from planner.search.search_state import Search
+from world.scenario import load_scenario
+from world.scenario_variants import with_planner
+
+EDAS: tuple[Model, ...] = ("umda", "emna")
+
+
+@pytest.mark.parametrize("model", [*EDAS, "differential"])
+def test_the_bottom_of_a_bowl_is_found(model: Model) -> None:
+    bottom = np.linspace(-1.0, 2.0, 5)
+    search = planfly.optimise(np.full(5, -3.0), np.full(5, 5.0), model=model, seed=3)
+    best = search.minimise(lambda points: ((points - bottom) ** 2).sum(axis=1) + 7.0, 120)
+    np.testing.assert_allclose(best.x, bottom, atol=0.02)
+    assert best.value == pytest.approx(7.0, abs=1e-3)
+    assert best.feasible
+    assert search.evaluations == 100 + 119 * 50
+
+
+@pytest.mark.parametrize("model", EDAS)
+def test_a_bottom_that_a_constraint_forbids_gives_way_to_its_edge(model: Model) -> None:
+    # x^2 + y^2 with x at least 1: the bottom of what is left is (1, 0), worth 1.
+    search = planfly.optimise([-4, -4], [4, 4], model=model, seed=3)
+    for _ in range(60):
+        x, y = search.ask().T
+        search.tell(x**2 + y**2, violations=1.0 - x)
+    assert search.best.feasible
+    # A Gaussian narrows beside an edge before it gets to it.
+    assert 1.0 <= search.best.value < 1.1
+    assert 1.0 <= search.best.x[0] < 1.05
+
+
+def test_less_violation_counts_before_value_and_a_met_constraint_not_at_all() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4, initial=[[0.1], [0.2], [0.3], [0.4]])
+    # The second is cheapest and violates; the third and the fourth meet it, the fourth with more to spare.
+    search.tell([5.0, 1.0, 3.0, 4.0], violations=[0.0, 0.1, -1.0, -9.0])
+    assert search.best.x.tolist() == [0.3]
+    assert (search.best.value, search.best.violations.tolist()) == (3.0, [0.0])
+
+
+def test_where_nothing_is_feasible_the_least_violation_is_best() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4, initial=[[0.1], [0.2], [0.3], [0.4]])
+    search.tell([1.0, 2.0, 3.0, 4.0], violations=[0.4, 0.3, 0.1, 0.2])
+    assert search.best.x.tolist() == [0.3]
+    assert not search.best.feasible
+
+
+def test_two_objectives_have_a_front() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4, initial=[[0.1], [0.2], [0.3], [0.4]])
+    search.tell([[1.0, 4.0], [2.0, 2.0], [3.0, 3.0], [4.0, 1.0]])
+    # (3, 3) is worse than (2, 2) in both; of the others none is.
+    assert [one.values.tolist() for one in search.front] == [[1.0, 4.0], [2.0, 2.0], [4.0, 1.0]]
+    assert search.best.x.tolist() == [0.1]
+
+
+def test_the_best_is_kept_though_its_generation_is_gone() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4, initial=[[0.1], [0.2], [0.3], [0.4]])
+    search.tell([1.0, 2.0, 3.0, 4.0])
+    for _ in range(5):
+        search.tell(np.full(len(search.ask()), 9.0))
+    assert (search.best.x.tolist(), search.best.value) == ([0.1], 1.0)
+
+
+def test_what_is_no_number_counts_as_worst() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4, initial=[[0.1], [0.2], [0.3], [0.4]])
+    search.tell([np.nan, np.inf, 3.0, np.nan])
+    assert search.best.x.tolist() == [0.3]
+
+
+def test_the_same_seed_gives_the_same_points_and_another_others() -> None:
+    def points(seed: int) -> np.ndarray:
+        search = planfly.optimise([0, 0], [1, 1], seed=seed)
+        search.minimise(lambda rows: rows.sum(axis=1), 5)
+        return search.ask()
+
+    np.testing.assert_array_equal(points(1), points(1))
+    assert not np.array_equal(points(1), points(2))
+
+
+def test_points_given_are_the_callers_own_to_change() -> None:
+    search = planfly.optimise([0.0, 0.0], [1.0, 1.0], seed=1)
+    asked = search.ask()
+    asked[:] = 0.5
+    assert not np.array_equal(search.ask(), asked)
+
+
+def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The paper's UMDA on a problem of its own, and ask and tell of the same scores: the same paths, bit for bit."""
+    told: list[tuple[np.ndarray, np.ndarray]] = []
+    twins: list[planfly.Optimiser] = []
+    evaluate, make = Search.evaluate, path_generations._make_optimiser
+
+    def recorded(search: Search, vectors: np.ndarray) -> np.ndarray:
+        scores = evaluate(search, vectors)
+        told.append((vectors.copy(), scores.copy()))
+        return scores
+
+    def begin(search: Search, rank: object, population: int, initial: None) -> object:
+        told.clear()
+        box = search.encoding
+        twins.append(planfly.optimise(box.lower, box.upper, population=population, seed=copy.deepcopy(search.rng)))
+        return make(search, rank, population, initial)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Search, "evaluate", recorded)
+    monkeypatch.setattr(path_generations, "_make_optimiser", begin)
+    scenario = with_planner(load_scenario("paper-07"), "test", population=40, generations=6)
+    plan_path(scenario, load_airframe(scenario).limits, seed=5, algorithm="umda")
+    generations, (twin,) = told[:7], twins
+    assert [len(vectors) for vectors, _ in generations] == [40, *[20] * 6]
+    for vectors, scores in generations:
+        np.testing.assert_array_equal(twin.ask(), vectors)
+        # Its constraints as the violations, its length and exposure as two objectives.
+        twin.tell(scores[:, [LENGTH, KILL]], violations=scores[:, : len(Violation)])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (([0.0], [1.0, 2.0]), "shapes"),
+        (([[0.0]], [[1.0]]), "shapes"),
+        (([], []), "shapes"),
+        (([0.0], [0.0]), "lower below upper"),
+        (([0.0], [np.inf]), "finite"),
+    ],
+)
+def test_a_box_that_is_none_is_refused(arguments: tuple[list[float], list[float]], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        planfly.optimise(*arguments)
+
+
+@pytest.mark.parametrize(("options", "words"), [
+    ({"population": 2}, "even number from 4"), ({"population": 5}, "even number from 4"),
+    ({"model": "ga"}, "allowed umda, emna, differential"),
+    ({"initial": [[0.5]]}, r"\(100, 1\) are expected"), ({"initial": [[np.nan]] * 100}, "finite"),
+])  # fmt: skip
+def test_options_that_are_none_are_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        planfly.optimise([0.0], [1.0], **options)
+
+
+def test_values_of_another_shape_are_refused() -> None:
+    search = planfly.optimise([0.0], [1.0], population=4)
+    for values in ([1.0, 2.0], 1.0, np.zeros((4, 1, 1)), np.zeros((4, 0))):
+        with pytest.raises(ValueError, match=r"values"):
+            search.tell(values)
+    search.tell(np.zeros(4))
+    with pytest.raises(ValueError, match="than before"):
+        search.tell(np.zeros((2, 2)))
+    with pytest.raises(ValueError, match="than before"):
+        search.tell(np.zeros(2), violations=np.zeros(2))
+
+
+def test_before_anything_is_told_there_is_no_best() -> None:
+    search = planfly.optimise([0.0], [1.0])
+    assert repr(search) == "<Optimiser Umda: 1 variables, 0 evaluations>"
+    with pytest.raises(ValueError, match="nothing was told"):
+        _ = search.best
+    search.minimise(lambda points: points[:, 0] * 0.0 + 2.0, 1)
+    assert repr(search) == "<Optimiser Umda: 1 variables, 100 evaluations, best 2>"
