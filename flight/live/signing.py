@@ -106,6 +106,8 @@ class Signing:
         elif stamp <= last:
             return Refused.REPLAYED
         self._streams[stream] = stamp
+        # A clock that was set back before we started: stations that run on expect us to be later than we were.
+        self.newest = max(self.newest, stamp)
         return None
 
     def sign(self, packed: bytes, wall: float) -> bytes:
