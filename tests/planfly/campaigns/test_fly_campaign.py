@@ -106,6 +106,35 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.skipif(not SOAK, reason="stopped for twelve seconds: in make soak")
+def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
+    """All processes are stopped for longer than a scheduler would wait for a worker's sign of life."""
+    folder, count = tmp_path / "slept", 150
+    folder.mkdir()
+    script = tmp_path / "client.py"
+    script.write_text(_CLIENT)
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "1s",
+    }
+    client = subprocess.Popen(
+        [sys.executable, str(script), str(folder), str(count)], env=environment, start_new_session=True
+    )
+    until, sizes = time.monotonic() + 120.0, set()
+    # It is under way: the table grows.
+    while len(sizes) < 4:
+        assert client.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+        sizes.add(sum(path.stat().st_size for path in folder.glob(f"{DATABASE}*")))
+    os.killpg(client.pid, signal.SIGSTOP)
+    time.sleep(12.0)
+    os.killpg(client.pid, signal.SIGCONT)
+    assert client.wait(120.0) == 0
+    assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
+    assert len(set(read_table(folder / DATABASE)["worker"])) == 2
+
+
 @pytest.mark.skipif(not SOAK, reason="twenty kills of the client: in make soak")
 def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
     folder, count = tmp_path / "killed", 300
