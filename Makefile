@@ -30,10 +30,11 @@ bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
-# Full counts: hours.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of them.
+# Full counts.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
 soak: $(TESTED) clients
+	@$(BIN)/python -m tests.soak
 	rm -f build/soak.json
-	PLANFLY_SOAK=1 $(BIN)/python -m pytest $(TWO)
+	PLANFLY_SOAK=1 $(BIN)/python -m pytest -m soak $(TWO)
 	$(BIN)/python -m tests.mutations --count 200
 
 # The tests with the lowest versions that pyproject.toml allows, in an environment of their own.

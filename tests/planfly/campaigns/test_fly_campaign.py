@@ -17,8 +17,8 @@ from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
 from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, read_table
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, short_base
+from tests.soak import SOAK, note
 
-SOAK = "PLANFLY_SOAK" in os.environ
 pytestmark = pytest.mark.filterwarnings("default")
 
 
@@ -133,6 +133,7 @@ def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
     assert client.wait(120.0) == 0
     assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
     assert len(set(read_table(folder / DATABASE)["worker"])) == 2
+    note("campaign: stopped for 12 s", flights=count, workers_lost=0)
 
 
 @pytest.mark.skipif(not SOAK, reason="twenty kills of the client: in make soak")
@@ -154,6 +155,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
             known = now
     subprocess.run([sys.executable, str(script), str(folder), str(count)], env=environment, check=True)
     assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
+    note("campaign: kill -9 of its client", kills=20, flights=count, lost=0)
 
 
 @pytest.mark.skipif(not SOAK, reason="a scheduler and two workers of their own: in make soak")
