@@ -1,6 +1,9 @@
 """Small text files that a person names: missions, parameters, scenarios."""
 
+import stat
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from world.errors import PlanflyError
 
@@ -16,12 +19,51 @@ def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError])
     world.errors.MissionError: missing.plan: cannot be read: No such file or directory
     """
     try:
-        size = path.stat().st_size
-        if size > most:
-            raise error(f"{path}: {size:,} bytes: a {kind} file has at most {most:,}")
-        return path.read_bytes()
+        return read_at_most(path, most, kind)
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror}") from problem
+    except ValueError as problem:
+        raise error(f"{path}: {problem}") from None
+
+
+def read_at_most(path: Path, most: int, kind: str) -> bytes:
+    """Bytes of a file of this kind, of ``most`` bytes at most.
+
+    Raises OSError, and ValueError for a larger one and for what is none: a named pipe that nobody writes into would be
+    waited for, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
+
+    >>> read_at_most(Path("/dev/zero"), 100, "mission")
+    Traceback (most recent call last):
+    ValueError: not a plain file: a mission file is expected
+    """
+    status = path.stat()
+    if stat.S_ISREG(status.st_mode) and status.st_size > most:
+        raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {most:,}")
+    given = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or given):
+        raise ValueError(f"not a plain file: a {kind} file is expected")
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"more than {most:,} bytes: a {kind} file has no more")
+    return data
+
+
+def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
+    """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do."""
+    return toml_table(read_at_most(path, most, kind).decode("utf-8"))
+
+
+def toml_table(text: str) -> dict[str, Any]:
+    """The table of a TOML text.  Raises ValueError for what is none, and for brackets within brackets without end.
+
+    >>> toml_table("a = 1")
+    {'a': 1}
+    """
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("tables or arrays within one another without end") from None
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:

@@ -1,7 +1,6 @@
 """The gains that fit the guidance to an aircraft, read from ``aircraft/<name>/gains.toml``."""
 
 import math
-import tomllib
 from dataclasses import MISSING, asdict, dataclass, fields
 
 import numpy as np
@@ -9,6 +8,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from world.errors import FlightError
 from world.kernels import Record, record_dtype
+from world.text_files import read_toml
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ def load_gains(aircraft: Aircraft) -> Gains:
     """Read the gains that stand beside an aircraft's model.  Raises FlightError for a missing, unknown or bad entry."""
     file = aircraft.folder / "gains.toml"
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
+        table = read_toml(file, "gains")
     except OSError as error:
         raise FlightError(f"{file}: {error.strerror}: guidance needs gains for {aircraft.name}") from error
     except ValueError as error:

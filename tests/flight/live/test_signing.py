@@ -1,5 +1,6 @@
 """Signing: pymavlink accepts our signatures, and neither a forged frame nor a replayed one is accepted."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -102,3 +103,6 @@ def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:
         read_key(path)
     with pytest.raises(FlightError, match="cannot be read"):
         read_key(tmp_path / "none")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FlightError, match="not a plain file"):
+        read_key(tmp_path / "pipe")
