@@ -1,11 +1,17 @@
 """Small text files that a person names: missions, parameters, scenarios."""
 
+import os
+import re
 import stat
 import tomllib
 from pathlib import Path
 from typing import Any
 
 from world.errors import PlanflyError
+
+# Names with dots between them, as of tables within tables.
+_DOTTED = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
+_MOST_DOTS = 100
 
 
 def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError]) -> bytes:
@@ -49,17 +55,34 @@ def read_at_most(path: Path, most: int, kind: str) -> bytes:
     return data
 
 
+def whole_path(path: Path) -> str:
+    """The absolute path of a file or folder, links followed as far as they lead: one that leads to itself stays.
+
+    >>> whole_path(Path("/usr/../none/"))
+    '/none'
+    """
+    try:
+        return os.path.realpath(path)
+    except ValueError:  # a NUL character
+        return str(path.absolute())
+
+
 def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
     """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do."""
     return toml_table(read_at_most(path, most, kind).decode("utf-8"))
 
 
 def toml_table(text: str) -> dict[str, Any]:
-    """The table of a TOML text.  Raises ValueError for what is none, and for brackets within brackets without end.
+    """The table of a TOML text.
 
-    >>> toml_table("a = 1")
-    {'a': 1}
+    Raises ValueError for what is none, and for brackets or names within one another without end: the parser takes
+    memory by the square of how many there are.
+
+    >>> toml_table("a.b = 1")
+    {'a': {'b': 1}}
     """
+    if any(name[0].count(".") > _MOST_DOTS for name in _DOTTED.finditer(text)):
+        raise ValueError(f"a name of more than {_MOST_DOTS} parts")
     try:
         return tomllib.loads(text)
     except RecursionError:

@@ -26,6 +26,7 @@ def aircraft(args: argparse.Namespace) -> int:
     """List the embedded aircraft, or print and draw the one that is named."""
     from aircraft.catalog import aircraft_names, find_aircraft, load_aircraft, model_hash
     from world.scenario_tables import names_folder
+    from world.text_files import whole_path
 
     if args.name is None:
         for name in aircraft_names():
@@ -33,7 +34,7 @@ def aircraft(args: argparse.Namespace) -> int:
             print(f"{name:<12} {known.title}: {known.mass:.5g} kg, cruises at {known.airspeed:g} m/s")
         return FLYABLE
     try:
-        chosen = find_aircraft(str(Path(args.name).resolve()) if names_folder(args.name) else args.name)
+        chosen = find_aircraft(whole_path(Path(args.name)) if names_folder(args.name) else args.name)
         identity = model_hash(chosen)
     except ValueError as error:
         raise PlanflyError(str(error)) from error

@@ -1,12 +1,13 @@
 """Files just within their size and just beyond it, missing ones, and bytes that are no text."""
 
 import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 from world.errors import MissionError, PlanflyError, ScenarioError
-from world.text_files import read_at_most, read_small_file, read_toml, utf8_text
+from world.text_files import read_at_most, read_small_file, read_toml, toml_table, utf8_text, whole_path
 
 
 @pytest.mark.parametrize(("size", "ok"), [(0, True), (1000, True), (1001, False)])
@@ -48,11 +49,40 @@ def test_a_pipe_of_the_shell_is_read_to_its_end(size: int, ok: bool) -> None:
         os.close(ours)
 
 
+def test_a_name_of_many_parts_takes_no_memory_by_its_square() -> None:
+    assert toml_table(".".join("a" * 101) + " = 1")["a"]
+    for text in (
+        ".".join("a" * 20_000) + " = 1",
+        "[" + " . ".join("a" * 20_000) + "]",
+        "x = {" + "a." * 20_000 + "a=1}",
+    ):
+        tracemalloc.start()
+        with pytest.raises(ValueError, match="more than 100 parts"):
+            toml_table(text)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+        tracemalloc.stop()
+    # Text and numbers are no names.
+    assert toml_table(f'a = [{"1.5, " * 1000}]\nb = "{"x" * 100_000}"\nc = "{"one. two, " * 1000}"')["b"]
+
+
+@pytest.mark.parametrize("name", ["loop", "a\0b"])
+def test_a_path_that_leads_nowhere_is_whole_anyhow(name: str, tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "link").symlink_to(tmp_path / "there")
+    assert whole_path(tmp_path / name) == str(tmp_path / name)
+    assert whole_path(tmp_path / "link") == str(tmp_path / "there")
+
+
 def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
     file = tmp_path / "a.toml"
     file.write_text("a = [1]\n", encoding="utf-8")
     assert read_toml(file, "gains") == {"a": [1]}
-    for text, said in (("a = " + "[" * 100_000, "without end"), ("a = " + "9" * 10_000, "digits"), ("a", "Expected")):
+    for text, said in (
+        ("a = " + "[" * 100_000, "without end"),
+        ("a = " + "9" * 10_000, "digits"),
+        ("a", "Expected"),
+        ("a." * 101 + "a = 1", "100 parts"),
+    ):
         file.write_text(text, encoding="utf-8")
         with pytest.raises(ValueError, match=said):
             read_toml(file, "gains")

@@ -171,6 +171,18 @@ def test_a_target_that_is_a_link_stays_one(folder: Path) -> None:
     assert caught.value.filename == str(folder / "lost.json")
 
 
+@pytest.mark.parametrize(
+    "argv", [("--params", "loop"), ("--aircraft", "./loop"), ("--scenario", "loop"), ("--json", "loop")]
+)
+def test_a_link_that_leads_to_itself(argv: tuple[str, str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "loop").symlink_to(folder / "loop")
+    assert main(["check", "m.waypoints", *argv]) == (1 if argv[0] == "--json" else 2)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert "loop" in said[0]
+    assert (folder / "loop").is_symlink()
+
+
 def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The second is refused while the first writes; afterwards the folder is free."""
     (folder / "out").mkdir()
