@@ -21,7 +21,7 @@ from tests.clients import ROOT
 from tests.logs.made_flight import make_setup, make_track, record
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK, note, scaled
-from tests.soak.hostile_files import DAMAGE
+from tests.soak.hostile_files import DAMAGE, JSON_VALUES, hostile
 
 # Exit codes of a command that has read what it was given, or refused it.
 ANSWERS = (0, 2, 3, 4)
@@ -101,6 +101,17 @@ def test_hostile_files_are_judged_or_refused(kind: str, tmp_path: Path) -> None:
     assert crashes == []
     assert [(line["seed"], line["code"], line["said"][:300], line["trace"][-600:]) for line in wrong] == []
     assert any(line["code"] == 2 for line in found) or count < 5
+
+
+def test_a_number_makes_the_same_file_whatever_was_made_before(tmp_path: Path) -> None:
+    make_valid(tmp_path)
+    for kind, name in (("plan", "m.plan"), ("wpl", "m.waypoints"), ("mcap", "m.mcap")):
+        valid = (tmp_path / name).read_bytes()
+        first = hostile(kind, valid, 60)
+        for seed in range(60):
+            hostile(kind, valid, seed)
+        assert hostile(kind, valid, 60) == first
+        assert JSON_VALUES[-6:] == ([], {}, [[]], [None] * 7, {"a": {"a": {}}}, [0] * 5000)
 
 
 def _lines(said: str) -> int:
