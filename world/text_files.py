@@ -68,7 +68,12 @@ def whole_path(path: Path) -> str:
 
 
 def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
-    """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do."""
+    """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
+
+    >>> read_toml(Path("/dev/null"), "gains")
+    Traceback (most recent call last):
+    ValueError: not a plain file: a gains file is expected
+    """
     return toml_table(read_at_most(path, most, kind).decode("utf-8"))
 
 
