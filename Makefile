@@ -9,11 +9,14 @@ TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
 	tests/flight/live tests/logs/recording tests/logs/verdict
+# What pyproject.toml names.
+DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
+	platformdirs|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
 READY := $(VENV)/.ready
 TESTED := $(VENV)/.ready-test
 
-# make low: the tests with the lowest versions supported
-.PHONY: demo test bench soak low dev setup clients clean
+# make low, make newest: the tests with the lowest versions supported, and with the newest there are
+.PHONY: demo test bench soak low newest dev setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
@@ -23,25 +26,32 @@ test: $(TESTED) clients
 	$(BIN)/ruff format --check .
 # Compiled once, while types are checked: each of pytest's processes would compile for itself.
 	$(BIN)/python -m tests.kernels >/dev/null & compiled=$$!; $(BIN)/mypy && wait $$compiled
-	$(BIN)/python -m pip list 2>/dev/null | grep -i -E "^(jsbsim|llvmlite|mcap|numba|numpy|pydantic|scipy) "
+	@echo "tested with the versions of constraints.txt:"
+	@$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
 	$(BIN)/python -m pytest $(TWO)
 
 bench: $(TESTED)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
-# Full counts: hours.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of them.
+# Full counts.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
 soak: $(TESTED) clients
+	@$(BIN)/python -m tests.soak
 	rm -f build/soak.json
-	PLANFLY_SOAK=1 $(BIN)/python -m pytest $(TWO)
+	PLANFLY_SOAK=1 $(BIN)/python -m pytest -m soak $(TWO)
 	$(BIN)/python -m tests.mutations --count 200
 
-# The tests with the lowest versions that pyproject.toml allows, in an environment of their own.
-low:
-	$(PYTHON) -m venv build/low
-	build/low/bin/python -m pip install --quiet --constraint constraints-low.txt --editable . hypothesis pytest pytest-xdist
-	build/low/bin/python -m pip list | grep -i -E "numba|numpy|jsbsim|mcap|pydantic"
-	build/low/bin/python -m pytest $(TWO) $(LOW)
+# The tests with the lowest versions that pyproject.toml allows, and with the newest that the registry has, each in an
+# environment of its own.  The lowest numba needs Python 3.11 or 3.12: make low PYTHON=python3.11
+LOWEST := --constraint constraints-low.txt
+low: SET := $(LOWEST)
+newest: SET := --upgrade
+low newest:
+	$(PYTHON) -m venv build/$@
+	build/$@/bin/python -m pip install --quiet $(SET) --editable . hypothesis pytest pytest-xdist
+	@echo "tested with the $(if $(filter low,$@),lowest,newest) versions:"
+	@build/$@/bin/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
+	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(TWO) $(LOW)
 
 dev: $(TESTED)
 

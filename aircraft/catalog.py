@@ -2,7 +2,6 @@
 
 import hashlib
 import math
-import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
@@ -11,8 +10,10 @@ from typing import Any
 
 from aircraft.jsbsim_model import OURS, Model, read_model
 from world.scenario_tables import names_folder
-from world.text_files import did_you_mean
+from world.text_files import did_you_mean, read_at_most, read_toml
 
+# An aircraft's XML file; JSBSim's own largest is 200 kB.
+MOST_MODEL_BYTES = 32 * 2**20
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
 
@@ -152,7 +153,7 @@ def read_aircraft(folder: Path) -> Aircraft:
     """
     file = folder / f"{folder.name}.toml"
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
+        table = read_toml(file, "aircraft")
     except OSError as error:
         raise ValueError(f"{file}: {error.strerror}") from None
     except ValueError as error:  # a TOML or a UTF-8 error
@@ -219,7 +220,7 @@ def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) ->
     # The stamps only tell the cache when a file has changed.
     digest = hashlib.sha256()
     for file in files:
-        data = file.read_bytes()
+        data = read_at_most(file, MOST_MODEL_BYTES, "model")
         digest.update(f"{file.name}\n{len(data)}\n".encode())
         digest.update(data)
     return digest.hexdigest()

@@ -60,6 +60,8 @@ def is_log(path: Path) -> bool:
 
     Raises PlanflyError for a file that cannot be read.
     """
+    if path.exists() and not path.is_file():
+        return path.suffix.lower() == ".mcap"
     try:
         with path.open("rb") as file:
             head = file.read(len(MCAP_MAGIC))

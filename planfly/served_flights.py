@@ -4,6 +4,7 @@ import contextlib
 import math
 import signal
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -183,11 +184,11 @@ class ServedLog:
         self._recorder.write(block)
         self._recorder.flush()
 
-    def finish(self, ended: str) -> FlightJudged:
-        """Judge the flight and close the log."""
+    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+        """Judge the flight and close the log; hurry: as of `planfly.flights_beside.judge_with_flights_beside`."""
         track = join_tracks(self._blocks)
         if ended == "completed":
-            verdict, beside = judge_with_flights_beside(self._setup, self._aircraft, track, ended)
+            verdict, beside = judge_with_flights_beside(self._setup, self._aircraft, track, ended, hurry)
         else:
             verdict, beside = judge_flight(self._setup, track, ended), None
         end = float(track.time[-1]) if len(track) else 0.0

@@ -1,6 +1,7 @@
 """A flight's log that an interruption leaves whole, with the rows so far, or not at all."""
 
 import contextlib
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
@@ -46,7 +47,8 @@ class WholeLog:
         self._rows = 0
         self._open = False
         self._held = contextlib.ExitStack()
-        existed = path.exists()
+        # Of a link that leads nowhere too nothing is removed.
+        existed = path.exists() or path.is_symlink()
         try:
             with uninterrupted(), self._named_errors():
                 path.touch()
@@ -82,7 +84,7 @@ class WholeLog:
                 self._recorder.finish(self.ended)
             else:
                 self._recorder.abandon()
-                self._path.unlink(missing_ok=True)
+                Path(os.path.realpath(self._path)).unlink(missing_ok=True)
 
     def write(self, rows: Rows) -> None:
         """Record rows as a flight hands them on."""

@@ -16,11 +16,14 @@ from world.scenario import Scenario, from_spec
 from world.scenario_file import first_fault
 from world.scenario_variants import fixed_ends
 from world.terrain import Terrain
+from world.text_files import read_small_file
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 PLAN_SCHEMA = "planfly.plan/1"
+# Ten thousand waypoints among as many threats are 4 MB.
+MOST_BYTES = 64 * 2**20
 
 
 class Violation(IntEnum):
@@ -298,9 +301,7 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
     Raises MissionError or the scenario's errors.
     """
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}", file=path) from error
+        text = read_small_file(path, MOST_BYTES, "plan", MissionError).decode("utf-8")
     except UnicodeDecodeError as error:
         raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})", file=path) from error
     return parse_plan(text, str(path), base=path.parent, terrain=terrain)

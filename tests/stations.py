@@ -146,7 +146,7 @@ class UdpStation:
         self.socket.bind(("127.0.0.1", port))
         self.socket.settimeout(0.01)
         self.to = ("127.0.0.1", vehicle)
-        self.mav, self._parser = mavlink.MAVLink(None, system, 190), mavlink.MAVLink(None)
+        self.mav, self.parser = mavlink.MAVLink(None, system, 190), mavlink.MAVLink(None)
         self.log: list[Any] = []
         self._beat = -math.inf
 
@@ -168,7 +168,7 @@ class UdpStation:
             data = self.socket.recv(4096)
         except (TimeoutError, ConnectionRefusedError):
             return []
-        found = self._parser.parse_buffer(data) or []
+        found = self.parser.parse_buffer(data) or []
         self.log += found
         return list(found)
 

@@ -1,6 +1,7 @@
 """Files that are written whole or not at all, folders that do not outlive their use, targets kept to one process."""
 
 import contextlib
+import errno
 import os
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -31,7 +32,7 @@ def write_whole(path: Path, data: str | bytes) -> None:
     """
     content = data.encode("utf-8") if isinstance(data, str) else data
     try:
-        target = path.resolve() if path.is_symlink() else path
+        target = _led_to(path) if path.is_symlink() else path
         # Cut by bytes, of which a name may have 255: letters may be up to four.
         name = target.name.encode()[:200].decode("utf-8", "ignore")
         temporary = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
@@ -67,6 +68,13 @@ def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
             temporary.rename(path)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _led_to(link: Path) -> Path:
+    try:
+        return link.resolve()
+    except RuntimeError:
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
 
 
 @contextlib.contextmanager

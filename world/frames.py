@@ -7,7 +7,7 @@ level, kept apart from the map so that Earth curvature never leaks into altitude
 import itertools
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -63,8 +63,7 @@ def to_map(origin: GeoOrigin, lat_deg: ArrayLike, lon_deg: ArrayLike) -> tuple[F
     >>> east.round(1).tolist(), north.round(1).tolist()
     ([774.6, 0.0], [0.0, 1111.5])
     """
-    east, north = _aeqd(origin)(np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64))
-    return np.asarray(east), np.asarray(north)
+    return transform_points(_aeqd(origin), np.asarray(lon_deg, dtype=np.float64), np.asarray(lat_deg, dtype=np.float64))
 
 
 def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats, Floats]:
@@ -74,8 +73,24 @@ def to_geo(origin: GeoOrigin, east: ArrayLike, north: ArrayLike) -> tuple[Floats
     >>> float(lat.round(6)), float(lon.round(6))
     (46.089967, 8.0)
     """
-    lon, lat = _aeqd(origin)(np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64), inverse=True)
-    return np.asarray(lat), np.asarray(lon)
+    inverse = partial(_aeqd(origin), inverse=True)
+    lon, lat = transform_points(inverse, np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64))
+    return lat, lon
+
+
+def transform_points(transform: Callable[..., Any], x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Both coordinates of points, of the same shape, through a transformation of pyproj.
+
+    pyproj takes an array of one point for a point, and loses its shape, with NumPy before 2.4, which warns of it.
+
+    >>> transform_points(lambda x, y: (x + 1.0, y), np.array([1.0]), np.array([2.0]))
+    (array([2.]), array([2.]))
+    """
+    if x.shape == y.shape and x.size == 1:
+        first, second = transform(x.item(), y.item())
+        return np.full(x.shape, first), np.full(x.shape, second)
+    first, second = transform(x, y)
+    return np.asarray(first), np.asarray(second)
 
 
 def crs_transformer(crs: str) -> "Transformer":

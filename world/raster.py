@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from world.errors import TerrainError
-from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map
+from world.frames import GeoOrigin, crs_transformer, fit_polymap, height_unit, to_geo, to_map, transform_points
 from world.raster_file import (
     MOST_PIXELS,
     RasterFile,
@@ -279,7 +279,7 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
     middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan
 
     def to_source(lon: Floats, lat: Floats) -> tuple[Floats, Floats]:
-        x, y = transformer.transform(lon, lat)
+        x, y = transform_points(transformer.transform, np.asarray(lon), np.asarray(lat))
         if not math.isnan(middle):
             x = longitude_near(np.asarray(x), middle)
         col, row = _applied(inverse, np.asarray(x), np.asarray(y))

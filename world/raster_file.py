@@ -139,5 +139,7 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
             heights = np.asarray(data["elevation"])
             return heights, [float(np.asarray(data[key]).item()) for key in edges]
     # RuntimeError and NotImplementedError: an encrypted entry, an unknown compression.
+    except MemoryError:
+        raise TerrainError(f"{name}: elevation: claims more than fits into memory") from None
     except (OSError, ValueError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
         raise TerrainError(f"{name}: not a readable .npz elevation file: {one_line(error)}") from error

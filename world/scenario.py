@@ -29,7 +29,7 @@ from world.scenario_tables import (
     names_folder,
 )
 from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
-from world.text_files import did_you_mean
+from world.text_files import did_you_mean, whole_path
 from world.threats import Threats
 from world.wind import Wind
 
@@ -213,9 +213,9 @@ def _with_whole_paths(flight: FlightTable, base: Path | None) -> FlightTable:
     """The table with the folder of its aircraft and its file of parameters as absolute paths."""
     changes = {}
     if names_folder(flight.aircraft):
-        changes["aircraft"] = str(Path(base or "", flight.aircraft).resolve())
+        changes["aircraft"] = whole_path(Path(base or "", flight.aircraft))
     if flight.params is not None:
-        changes["params"] = str(Path(base or "", flight.params).resolve())
+        changes["params"] = whole_path(Path(base or "", flight.params))
     return flight.model_copy(update=changes)
 
 
@@ -242,7 +242,7 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
     if table.sha256 not in (None, raster.sha256):
         raise ScenarioError.at(source, "terrain.path", path, "the file has changed since (its SHA-256 differs)")
     if path not in EMBEDDED:
-        path = str(Path(base or "", path).resolve())
+        path = whole_path(Path(base or "", path))
     return raster, TerrainTable(kind="dem", path=path, vertical_error_m=table.vertical_error_m, sha256=raster.sha256)
 
 

@@ -2,7 +2,6 @@
 
 import json
 import math
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, get_args
@@ -11,7 +10,7 @@ from pydantic import BaseModel, ValidationError
 
 from world.errors import ScenarioError
 from world.scenario_tables import ScenarioFile
-from world.text_files import did_you_mean, read_small_file
+from world.text_files import did_you_mean, read_small_file, toml_table
 
 Table = TypeVar("Table", bound=BaseModel)
 
@@ -25,9 +24,9 @@ def parse_scenario(text: str, source: str) -> ScenarioFile:
     Raises ScenarioError with one line: file, key, value and what is allowed.
     """
     try:
-        data = tomllib.loads(text)
+        data = toml_table(text)
     # Beside its own TOMLDecodeError: a number of thousands of digits, and brackets within brackets without end.
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise ScenarioError(f"{source}: not valid TOML: {_line(error)}", file=source) from error
     terrain = data.get("terrain")
     if isinstance(terrain, dict) and terrain.get("kind") == "none":

@@ -1,10 +1,18 @@
 """Small text files that a person names: missions, parameters, scenarios."""
 
+import os
+import re
+import stat
+import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from world.errors import PlanflyError
+
+# Names with dots between them, as of tables within tables.
+_DOTTED = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
+_MOST_DOTS = 100
 
 
 class TextLine(NamedTuple):
@@ -32,12 +40,73 @@ def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError])
     world.errors.MissionError: missing.plan: cannot be read: No such file or directory
     """
     try:
-        size = path.stat().st_size
-        if size > most:
-            raise error(f"{path}: {size:,} bytes: a {kind} file has at most {most:,}", file=path)
-        return path.read_bytes()
+        return read_at_most(path, most, kind)
     except OSError as problem:
         raise error(f"{path}: cannot be read: {problem.strerror}", file=path) from problem
+    except ValueError as problem:
+        raise error(f"{path}: {problem}", file=path) from None
+
+
+def read_at_most(path: Path, most: int, kind: str) -> bytes:
+    """Bytes of a file of this kind, of ``most`` bytes at most.
+
+    Raises OSError, and ValueError for a larger one and for what is none: a named pipe that nobody writes into would be
+    waited for, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
+
+    >>> read_at_most(Path("/dev/zero"), 100, "mission")
+    Traceback (most recent call last):
+    ValueError: not a plain file: a mission file is expected
+    """
+    status = path.stat()
+    if stat.S_ISREG(status.st_mode) and status.st_size > most:
+        raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {most:,}")
+    given = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or given):
+        raise ValueError(f"not a plain file: a {kind} file is expected")
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"more than {most:,} bytes: a {kind} file has no more")
+    return data
+
+
+def whole_path(path: Path) -> str:
+    """The absolute path of a file or folder, links followed as far as they lead: one that leads to itself stays.
+
+    >>> whole_path(Path("/usr/../none/"))
+    '/none'
+    """
+    try:
+        return os.path.realpath(path)
+    except ValueError:  # a NUL character
+        return str(path.absolute())
+
+
+def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
+    """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
+
+    >>> read_toml(Path("/dev/null"), "gains")
+    Traceback (most recent call last):
+    ValueError: not a plain file: a gains file is expected
+    """
+    return toml_table(read_at_most(path, most, kind).decode("utf-8"))
+
+
+def toml_table(text: str) -> dict[str, Any]:
+    """The table of a TOML text.
+
+    Raises ValueError for what is none, and for brackets or names within one another without end: the parser takes
+    memory by the square of how many there are.
+
+    >>> toml_table("a.b = 1")
+    {'a': {'b': 1}}
+    """
+    if any(name[0].count(".") > _MOST_DOTS for name in _DOTTED.finditer(text)):
+        raise ValueError(f"a name of more than {_MOST_DOTS} parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("tables or arrays within one another without end") from None
 
 
 def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:

@@ -9,7 +9,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from xml.parsers import expat
 
+from aircraft.catalog import MOST_MODEL_BYTES
 from world.errors import FlightError
+from world.text_files import read_at_most
 
 # Elements whose text names a property that must exist when the model runs.
 _READERS = frozenset({"p", "property", "independentVar", "input"})
@@ -53,12 +55,14 @@ class _Reader:
 
     def read(self) -> None:
         try:
-            self.data = self.file.read_bytes()
+            self.data = read_at_most(self.file, MOST_MODEL_BYTES, "model")
             self._parser.Parse(self.data, True)
         except OSError as error:
             raise FlightError(
                 f"{self.file}: the aircraft model cannot be read: {error.strerror}", file=self.file
             ) from None
+        except ValueError as error:
+            raise FlightError(f"{self.file}: {error}", file=self.file) from None
         except expat.ExpatError as error:
             raise FlightError(f"{self.file}: not well-formed XML: {error}", file=self.file) from None
 

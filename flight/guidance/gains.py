@@ -1,7 +1,6 @@
 """The gains that fit the guidance to an aircraft, read from ``aircraft/<name>/gains.toml``."""
 
 import math
-import tomllib
 from dataclasses import MISSING, asdict, dataclass, fields
 
 import numpy as np
@@ -9,7 +8,7 @@ import numpy as np
 from aircraft.catalog import Aircraft
 from world.errors import FlightError
 from world.kernels import Record, record_dtype
-from world.text_files import did_you_mean
+from world.text_files import did_you_mean, read_toml
 
 GAINS_FILE = "gains.toml"
 
@@ -147,7 +146,7 @@ def load_gains(aircraft: Aircraft) -> Gains:
     """
     file = aircraft.folder / GAINS_FILE
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
+        table = read_toml(file, "gains")
     except OSError as error:
         raise FlightError(f"{file}: {error.strerror}: guidance needs gains for {aircraft.name}", file=file) from error
     except ValueError as error:

@@ -1,6 +1,5 @@
 """What a live vehicle sends without being asked: heartbeats, telemetry, texts, parameters that stream."""
 
-import time
 from collections.abc import Callable
 from typing import Any
 
@@ -32,7 +31,7 @@ class Downlink:
         self._show = show
         self._pause = pause
         self._texts = 0
-        self._next_heartbeat = time.monotonic()
+        self._next_heartbeat = link.clock()
 
     def send_text(self, text: str, severity: int = INFO) -> None:
         """Send a text to every station, and show it at the terminal."""
@@ -49,7 +48,7 @@ class Downlink:
 
     def heartbeat_now(self) -> None:
         """Send the next heartbeat at once: its contents have changed."""
-        self._next_heartbeat = time.monotonic()
+        self._next_heartbeat = self._link.clock()
 
     def wait(self, now: float, patience: float) -> float:
         """Return the time until something is due, s, at most ``patience``."""

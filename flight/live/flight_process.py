@@ -20,6 +20,8 @@ ours; nothing that a station sends is ever unpickled.
 
 import pickle
 import time
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Protocol
@@ -116,8 +118,8 @@ class LogSink(Protocol):
     def write(self, block: Track) -> None:
         """Append rows and hand them to the operating system."""
 
-    def finish(self, ended: str) -> FlightJudged:
-        """Judge the flight and close the log."""
+    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+        """Judge the flight and close the log; hurry: whether the process is to end, asked wherever it takes long."""
 
     def abandon(self) -> None:
         """Close the log of a flight that could not go on."""
@@ -156,14 +158,15 @@ def serve_flights(connection: Connection, factory: FlightFactory) -> None:
     >>> serve_flights(flying_end, factory=None)  # an order to quit asks nothing of the factory
     """
     prepared: PreparedFlight | None = None
+    orders = _Orders(connection)
     try:
         while True:
-            order = connection.recv()
+            order = orders.next()
             if isinstance(order, JudgeMission):
                 prepared, judged = factory.prepare(order)
                 send_event(connection, judged)
             elif isinstance(order, StartFlight) and prepared is not None:
-                if not _fly(connection, prepared, factory):
+                if not _fly(connection, orders, prepared, factory):
                     return
             elif isinstance(order, EndFlight) and order.quit:
                 return
@@ -192,7 +195,37 @@ def read_event(data: bytes) -> Snapshot | Event:
     return found
 
 
-def _fly(connection: Connection, prepared: PreparedFlight, factory: FlightFactory) -> bool:
+class _Orders:
+    """Orders in the order in which they came."""
+
+    def __init__(self, connection: Connection) -> None:
+        self._connection = connection
+        self._early: deque[object] = deque()
+
+    def next(self) -> object:
+        """The next order, waited for.  Raises EOFError where the link is gone."""
+        return self._early.popleft() if self._early else self._connection.recv()
+
+    def waiting(self) -> object:
+        """The next order if one is there; None where none is."""
+        if not self._early and not self._connection.poll():
+            return None
+        try:
+            return self.next()
+        except EOFError:
+            return EndFlight(quit=True)
+
+    def ending(self) -> bool:
+        """Whether the process is to end, by an order that has come or because the link is gone; none is taken out."""
+        try:
+            while self._connection.poll():
+                self._early.append(self._connection.recv())
+        except (EOFError, BrokenPipeError, ConnectionResetError):
+            return True
+        return any(isinstance(order, EndFlight) and order.quit for order in self._early)
+
+
+def _fly(connection: Connection, orders: _Orders, prepared: PreparedFlight, factory: FlightFactory) -> bool:
     """Fly in step with the clock; False when the process is to end."""
     try:
         flight = Flight(prepared.setup, factory.aircraft, local_map=prepared.local_map)
@@ -203,10 +236,10 @@ def _fly(connection: Connection, prepared: PreparedFlight, factory: FlightFactor
         return True
     snapshots = SnapshotMaker(prepared.setup, prepared.local_map)
     try:
-        ended, go_on = _in_step(connection, flight, snapshots, log, factory.speed)
+        ended, go_on = _in_step(connection, orders, flight, snapshots, log, factory.speed)
         if go_on:
             send_event(connection, FlightEnded(ended))
-        judged = log.finish(ended)
+        judged = log.finish(ended, orders.ending)
     except OSError as error:
         log.abandon()
         # A pipe that broke ends the process; a full disk ends the flight.
@@ -221,7 +254,7 @@ def _fly(connection: Connection, prepared: PreparedFlight, factory: FlightFactor
 
 
 def _in_step(
-    connection: Connection, flight: Flight, snapshots: SnapshotMaker, log: LogSink, speed: float
+    connection: Connection, orders: _Orders, flight: Flight, snapshots: SnapshotMaker, log: LogSink, speed: float
 ) -> tuple[str, bool]:
     """Step the flight by the clock: how it ended, and whether the process goes on."""
     clock = time.monotonic
@@ -242,11 +275,10 @@ def _in_step(
             if len(rows):
                 pending.append(rows)
                 connection.send_bytes(_PACKED + snapshots.snapshot(rows[-1]).pack())
-        if connection.poll():
-            order = _order(connection)
-            if isinstance(order, EndFlight):
-                ended = ended or (SHUT_DOWN if order.quit else STOPPED)
-                go_on = not order.quit
+        order = orders.waiting()
+        if isinstance(order, EndFlight):
+            ended = ended or (SHUT_DOWN if order.quit else STOPPED)
+            go_on = not order.quit
         if pending and (ended or now - flushed >= FLUSH_PERIOD):
             log.write(as_track(join_rows(pending)))
             pending.clear()
@@ -256,10 +288,3 @@ def _in_step(
             time.sleep(max(0.0, begun + beat / SNAPSHOT_RATE - clock()))
             beat = max(beat, int((clock() - begun) * SNAPSHOT_RATE))
     return ended, go_on
-
-
-def _order(connection: Connection) -> object:
-    try:
-        return connection.recv()
-    except EOFError:
-        return EndFlight(quit=True)

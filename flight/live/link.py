@@ -15,6 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.mavlink_frames import LARGEST, Decoder, split_frames
 from flight.live.mission_server import Station
+from flight.live.running_clock import RunningClock
 from flight.live.signing import Refused, Signing
 from flight.live.telemetry import PERIODS
 from world.errors import FlightError
@@ -117,17 +118,21 @@ def is_loopback(host: str) -> bool:
 
 
 class Link:
-    """The socket and its peers.  ``clock`` is monotonic, ``wall`` counts s since 1970."""
+    """The socket and its peers.
+
+    clock: by which peers fall silent and messages are due, also for whoever uses the link; it never goes back, and
+    stands still while the process does.  wall: s since 1970, of signatures.
+    """
 
     def __init__(
-        self, access: Access, clock: Callable[[], float] = time.monotonic, wall: Callable[[], float] = time.time
+        self, access: Access, clock: Callable[[], float] | None = None, wall: Callable[[], float] = time.time
     ) -> None:
         """Open the socket.  Raises FlightError where that is not possible."""
         check_access(access)
         self.access = access
         self.peers: dict[Address, Peer] = {}
         self.dropped = Dropped()
-        self._clock, self._wall = clock, wall
+        self.clock, self._wall = clock or RunningClock(), wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
         self._hello = {address: mavlink.MAVLink(None, SYSTEM, COMPONENT) for address in access.to}
@@ -206,7 +211,7 @@ class Link:
         dropped.streams += reason is Refused.STREAMS
 
     def _heard(self, source: Address, system: int, component: int) -> Peer | None:
-        now = self._clock()
+        now = self.clock()
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.heard < SILENCE}
         peer = self.peers.get(source)
         if peer is None:
@@ -231,7 +236,7 @@ class Link:
 
     def forget_silent(self) -> None:
         """Drop the peers that have been silent for `SILENCE`."""
-        now = self._clock()
+        now = self.clock()
         for key in [key for key, peer in self.peers.items() if now - peer.heard >= SILENCE]:
             del self.peers[key]
 

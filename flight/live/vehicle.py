@@ -85,7 +85,7 @@ class Vehicle:
         self._ready = False
         self._parameters = parameters
         self._show = show
-        self._clock = time.monotonic
+        self._clock = link.clock
         self._born = self._clock()
         # Which mission is judged or flown: the item at each waypoint, and what to add to it for the station's number.
         self._number = 0

@@ -2,9 +2,9 @@
 
 import socket
 import struct
-import time
 from collections.abc import Callable
 
+from flight.live.running_clock import RunningClock
 from flight.real_autopilot.json_physics import ServoPacket, parse_servo_packet
 from world.errors import FlightError
 
@@ -39,6 +39,8 @@ class PhysicsPort:
         self._frame = -1
         self._last = b""
         self._answered = 0.0
+        # A sleeping laptop is no silence.
+        self._clock = RunningClock()
         self._connected = False
 
     def close(self) -> None:
@@ -61,9 +63,9 @@ class PhysicsPort:
                 if packet.frame < self._frame:
                     raise FlightError(f"began anew in the air: frame {packet.frame} after frame {self._frame}")
                 # What was asked while the answer was on its way has had it.
-                if time.monotonic() - self._answered > _ON_ITS_WAY:
+                if self._clock() - self._answered > _ON_ITS_WAY:
                     self._send(self._last)
-            now = time.monotonic()
+            now = self._clock()
             waiting_since = waiting_since or now
             self.watch()
             if now - waiting_since > SILENCE:
@@ -77,7 +79,7 @@ class PhysicsPort:
     def answer(self, data: bytes) -> None:
         """Tell the autopilot of the aircraft after the frame received last."""
         self._last = data
-        self._answered = time.monotonic()
+        self._answered = self._clock()
         self._send(data)
 
     def _next_datagram(self) -> bytes:

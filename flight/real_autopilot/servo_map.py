@@ -1,7 +1,6 @@
 """Which servo output of an autopilot moves what on an aircraft, and how far: its folder's `ardupilot.toml`."""
 
 import math
-import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,6 +9,7 @@ from typing import Any
 from aircraft.catalog import Aircraft
 from flight.dynamics.state import Commands
 from world.errors import FlightError
+from world.text_files import read_toml
 
 SERVO_FILE = "ardupilot.toml"
 # What each control is to ArduPilot: SERVOn_FUNCTION (its parameter reference).
@@ -96,7 +96,7 @@ def load_servo_map(aircraft: Aircraft) -> ServoMap:
     """
     file = aircraft.folder / SERVO_FILE
     try:
-        table = tomllib.loads(file.read_text(encoding="utf-8"))
+        table = read_toml(file, "servos")
     except OSError as error:
         raise FlightError(
             f"{file}: {error.strerror}: a real autopilot needs to know which servo moves what on {aircraft.name}",

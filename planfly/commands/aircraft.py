@@ -79,11 +79,12 @@ def _find(name: str) -> "tuple[Aircraft, str]":
     """The aircraft of a name or in a folder, and the hash of its model.  Raises PlanflyError."""
     from aircraft.catalog import find_aircraft, model_hash
     from world.scenario_tables import names_folder
+    from world.text_files import whole_path
 
     if names_folder(name) and not Path(name).exists():
         raise PlanflyError(f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it")
     try:
-        chosen = find_aircraft(str(Path(name).resolve()) if names_folder(name) else name)
+        chosen = find_aircraft(whole_path(Path(name)) if names_folder(name) else name)
         return chosen, model_hash(chosen)
     except ValueError as error:
         raise PlanflyError(str(error)) from error

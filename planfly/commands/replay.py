@@ -82,27 +82,29 @@ def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
 
 def _print_timeline(log: FlightLog, start: float, end: float, speed: float | None) -> None:
     """Print the timeline, at ``speed`` times real time or at once."""
+    from flight.live.running_clock import RunningClock
     from logs.replay.timeline import entry_lines, timeline
 
-    began = time.monotonic()
+    played = RunningClock()
     for entry in timeline(log):
         if start <= entry.time <= end:
-            if speed:
-                time.sleep(max(0.0, (entry.time - start) / speed - (time.monotonic() - began)))
+            while speed and (ahead := (entry.time - start) / speed - played()) > 0.0:
+                time.sleep(min(ahead, 1.0 / _RATE))
             print("\n".join(entry_lines(entry)), flush=bool(speed))
 
 
 def _show_instruments(log: FlightLog, start: float, end: float, speed: float) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
+    from flight.live.running_clock import RunningClock
     from logs.replay.instruments import make_instruments
 
     instruments = make_instruments(log)
-    began = time.monotonic()
+    played = RunningClock()
     now = start
     print(_ENTER, end="")
     try:
         while now < end:
-            now = min(end, start + speed * (time.monotonic() - began))
+            now = min(end, start + speed * played())
             size = shutil.get_terminal_size()
             lines = instruments.frame(now, width=size.columns)[: max(1, size.lines - 2)]
             lines.append(f"x {speed:g}, Ctrl-C stops")

@@ -8,6 +8,7 @@ from pathlib import Path
 from planfly.flight_limits import FlightLimits
 from world.scenario import Scenario
 from world.scenario_variants import with_flight, with_wind
+from world.text_files import whole_path
 
 
 def flight_entries(args: argparse.Namespace) -> dict[str, str | float | None]:
@@ -21,7 +22,7 @@ def flight_entries(args: argparse.Namespace) -> dict[str, str | float | None]:
         "guidance": getattr(args, "guidance", None),
         "nav": getattr(args, "nav", None),
         # Whatever folder the scenario is in.
-        "params": None if params is None else str(Path(params).resolve()),
+        "params": None if params is None else whole_path(Path(params)),
     }
 
 

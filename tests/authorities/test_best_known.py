@@ -3,7 +3,6 @@
 import itertools
 import json
 import math
-import os
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -15,14 +14,14 @@ from numpy.typing import NDArray
 from planner.search.plan_path import plan_path
 from tests.bench.task import make_task
 from tests.instances import CEILING, CLIMB_DEG, DIVE_DEG, MAP, ground
+from tests.soak import note, scaled
 from world.scenario import Scenario, load_scenario
 
 Floats = NDArray[np.float64]
 
 KNOWN: dict[str, dict[str, Any]] = json.loads(Path(__file__).with_name("best_known.json").read_text(encoding="utf-8"))
 NAMES = ("hard-07", "hard-15", "hard-30", "hard-60")
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
-SEEDS = range(1, 16) if SOAK else range(1, 4)
+SEEDS = range(1, 1 + scaled(15, 3))
 # Length over best known that default plans may have: median and worst of the runs.
 MEDIAN, WORST = 1.002, 1.01
 
@@ -105,6 +104,10 @@ def default_ratios(name: str) -> list[float]:
         assert plan.safe, (seed, plan.certificate.problems)
         assert faults(task.scenario, plan.waypoints) == []
         ratios.append(float(plan.objectives[0]) / KNOWN[name]["length_ratio"])
+    note(
+        f"planner: default plans of {name} over the best known",
+        plans=len(ratios), median=round(float(np.median(ratios)), 4), worst=round(max(ratios), 4),
+    )  # fmt: skip
     return ratios
 
 

@@ -1,5 +1,6 @@
 """A climb over a hill that the aircraft clears and ArduPlane does not, for it follows a slope three seconds late."""
 
+import itertools
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -74,11 +75,31 @@ def test_a_served_flight_tells_stations_which_parameter_decides(
     judged, _ = flown
     served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
     served.write(judged.track)
-    told = served.finish(judged.ended)
+    told = served.finish(judged.ended, lambda: False)
     deciding = judged.verdict.deciding
     assert deciding is not None
     assert not told.flyable
     assert deciding_text(deciding) in [text.text for text in told.texts]
+
+
+@pytest.mark.parametrize("patience", [0, 400])
+def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
+    patience: int, flown: tuple[JudgedFlight, Path], tmp_path: Path
+) -> None:
+    """At once, and after the airframe's flight of some 280 s: nothing is lost but what was not known yet."""
+    judged, _ = flown
+    asked = itertools.count()
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
+    served.write(judged.track)
+    told = served.finish(judged.ended, lambda: next(asked) >= patience)
+    assert not told.flyable
+    assert next(asked) == patience + 1
+    log = read_log(tmp_path / "flight-001.mcap")
+    assert log.complete
+    assert log.recorded_verdict is not None
+    assert log.recorded_verdict["flyable"] is False
+    assert judged.beside is not None
+    assert log.beside == (None if patience == 0 else replace(judged.beside, deciding=None))
 
 
 def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:

@@ -114,7 +114,7 @@ def test_a_log_takes_the_next_free_number_and_holds_the_flight(options: ServeOpt
     track = replace(made, leg=np.zeros_like(made.leg))
     log.write(track.rows(0, 30))
     log.write(track.rows(30, 60))
-    judged = log.finish("stopped")
+    judged = log.finish("stopped", lambda: False)
     assert judged.texts[-1] == (f"log {options.logs / 'flight-002.mcap'}", INFO)
     read = read_log(options.logs / "flight-002.mcap")
     assert (read.ended, len(read.track)) == ("stopped", 60)

@@ -71,3 +71,18 @@ def test_an_error_leaves_the_log_unfinished(tmp_path: Path) -> None:
         log.write(track_rows(FLOWN.track))
         raise LogError("full")
     assert not read_log(path).complete
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_target_that_is_a_link_is_never_removed(there: bool, tmp_path: Path) -> None:
+    """One that leads to itself cannot be written; what an interruption leaves goes, not the link."""
+    link = tmp_path / "link.mcap"
+    link.symlink_to(tmp_path / ("real.mcap" if there else "link.mcap"))
+    if there:
+        with pytest.raises(Interrupted), WholeLog(link, FLOWN.setup):
+            interrupt(2)
+        assert not (tmp_path / "real.mcap").exists()
+    else:
+        with pytest.raises(OSError, match="symbolic links"):
+            WholeLog(link, FLOWN.setup)
+    assert link.is_symlink()

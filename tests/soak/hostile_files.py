@@ -94,7 +94,8 @@ def _damaged_json(text: str, rng: random.Random) -> bytes:
         holder, key = rng.choice(places)
         how = rng.randrange(6)
         if how <= 2:
-            holder[key] = rng.choice(JSON_VALUES)
+            # A copy: what is put into it later is this file's.
+            holder[key] = copy.deepcopy(rng.choice(JSON_VALUES))
         elif how == 3 and holder is not whole:
             del holder[key]
         elif how == 4:

@@ -105,3 +105,15 @@ def test_polynomial_goes_through_the_rows_of_a_log_bit_for_bit() -> None:
     assert np.array_equal(again.rows(), rows)
     x, y = np.random.default_rng(8).uniform(0.0, 800.0, (2, 50))
     assert np.array_equal(np.stack(again(x, y)), np.stack(copy(x, y)))
+
+
+@pytest.mark.parametrize("shape", [(), (1,), (1, 1), (2,), (2, 3)])
+def test_a_shape_comes_back_whatever_it_is(shape: tuple[int, ...]) -> None:
+    """One point in an array is an array of one point, and the same numbers."""
+    origin = GeoOrigin(46.0, 8.0)
+    lat, lon = to_geo(origin, np.full(shape, 100.0), np.full(shape, 200.0))
+    east, north = to_map(origin, lat, lon)
+    assert lat.shape == lon.shape == east.shape == north.shape == shape
+    many = to_geo(origin, np.full(3, 100.0), np.full(3, 200.0))
+    assert set(lat.ravel().tolist()) == {float(many[0][0])}
+    assert set(lon.ravel().tolist()) == {float(many[1][0])}

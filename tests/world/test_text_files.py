@@ -1,11 +1,21 @@
 """Files just within their size and just beyond it, missing ones, and bytes that are no text."""
 
+import os
+import tracemalloc
 from pathlib import Path
 
 import pytest
 
 from world.errors import MissionError, PlanflyError, ScenarioError
-from world.text_files import did_you_mean, read_small_file, utf8_text
+from world.text_files import (
+    did_you_mean,
+    read_at_most,
+    read_small_file,
+    read_toml,
+    toml_table,
+    utf8_text,
+    whole_path,
+)
 
 
 @pytest.mark.parametrize(("size", "ok"), [(0, True), (1000, True), (1001, False)])
@@ -18,6 +28,75 @@ def test_a_file_is_read_up_to_its_largest_size(tmp_path: Path, size: int, ok: bo
     with pytest.raises(MissionError) as caught:
         read_small_file(file, 1000, "mission", MissionError)
     assert str(caught.value) == f"{file}: 1,001 bytes: a mission file has at most 1,000"
+
+
+@pytest.mark.parametrize("name", ["pipe", "/dev/zero", "link"])
+def test_a_pipe_and_a_device_are_refused_at_once(tmp_path: Path, name: str) -> None:
+    """Nobody writes into the pipe, and the device has no end."""
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("/dev/zero")
+    path = tmp_path / name
+    with pytest.raises(MissionError) as caught:
+        read_small_file(path, 1000, "mission", MissionError)
+    assert str(caught.value) == f"{path}: not a plain file: a mission file is expected"
+
+
+@pytest.mark.parametrize(("size", "ok"), [(1000, True), (1001, False)])
+def test_a_pipe_of_the_shell_is_read_to_its_end(size: int, ok: bool) -> None:
+    ours, theirs = os.pipe()
+    os.write(theirs, b"x" * size)
+    os.close(theirs)
+    try:
+        path = Path(f"/dev/fd/{ours}")
+        if ok:
+            assert read_at_most(path, 1000, "mission") == b"x" * size
+            return
+        with pytest.raises(ValueError, match="more than 1,000 bytes: a mission file has no more"):
+            read_at_most(path, 1000, "mission")
+    finally:
+        os.close(ours)
+
+
+def test_a_name_of_many_parts_takes_no_memory_by_its_square() -> None:
+    assert toml_table(".".join("a" * 101) + " = 1")["a"]
+    for text in (
+        ".".join("a" * 20_000) + " = 1",
+        "[" + " . ".join("a" * 20_000) + "]",
+        "x = {" + "a." * 20_000 + "a=1}",
+    ):
+        tracemalloc.start()
+        with pytest.raises(ValueError, match="more than 100 parts"):
+            toml_table(text)
+        assert tracemalloc.get_traced_memory()[1] < 2**24
+        tracemalloc.stop()
+    # Text and numbers are no names.
+    assert toml_table(f'a = [{"1.5, " * 1000}]\nb = "{"x" * 100_000}"\nc = "{"one. two, " * 1000}"')["b"]
+
+
+@pytest.mark.parametrize("name", ["loop", "a\0b"])
+def test_a_path_that_leads_nowhere_is_whole_anyhow(name: str, tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    (tmp_path / "link").symlink_to(tmp_path / "there")
+    assert whole_path(tmp_path / name) == str(tmp_path / name)
+    assert whole_path(tmp_path / "link") == str(tmp_path / "there")
+
+
+def test_toml_is_a_table_or_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text("a = [1]\n", encoding="utf-8")
+    assert read_toml(file, "gains") == {"a": [1]}
+    for text, said in (
+        ("a = " + "[" * 100_000, "without end"),
+        ("a = " + "9" * 10_000, "digits"),
+        ("a", "Expected"),
+        ("a." * 101 + "a = 1", "100 parts"),
+    ):
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=said):
+            read_toml(file, "gains")
+    file.write_text("a = 1000000", encoding="utf-8")
+    with pytest.raises(ValueError, match="11 bytes: a gains file has at most 10"):
+        read_toml(file, "gains", most=10)
 
 
 @pytest.mark.parametrize("error", [MissionError, ScenarioError])

@@ -45,7 +45,7 @@ def connected(workers: Workers) -> Iterator[Any]:
     cluster_types: Any = distributed
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
-    settings = {
+    settings: dict[str, Any] = {
         "distributed.scheduler.allowed-failures": ALLOWED_FAILURES,
         "distributed.worker.memory.terminate": False,
         "distributed.worker.memory.pause": False,
@@ -53,6 +53,9 @@ def connected(workers: Workers) -> Iterator[Any]:
         "distributed.worker.memory.target": False,
         "logging": {"distributed": "critical", "tornado": "critical", "asyncio": "critical"},
     }
+    if workers.scheduler is None:
+        # A worker of this machine is watched by its own parent, and a laptop's sleep is no death.
+        settings["distributed.scheduler.worker-ttl"] = None
     with dask.config.set(settings):
         if workers.scheduler is not None:
             address = checked_address(workers.scheduler)

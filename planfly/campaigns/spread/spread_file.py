@@ -10,7 +10,6 @@ A table a quantity, named as in `planfly.campaigns.spread.quantities`; `distribu
 """
 
 import math
-import tomllib
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
@@ -19,7 +18,7 @@ from typing import Any
 
 from planfly.campaigns.spread.quantities import BY_NAME, NAMES, Quantity
 from world.errors import PlanflyError
-from world.text_files import read_small_file, utf8_text
+from world.text_files import read_small_file, toml_table, utf8_text
 
 # Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
 INSIDE = 0.99
@@ -123,8 +122,8 @@ def parse_spread(text: str, name: str) -> FlightSpread:
     planfly.campaigns.spread.spread_file.SpreadError: mine.toml: mass: norm(loc=9, scale=0.1): 0.0 % ... 0.5..2 ...
     """
     try:
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        tables = toml_table(text)
+    except ValueError as error:
         raise SpreadError(f"{name}: {' '.join(str(error).split())}") from None
     unknown = [key for key in tables if key not in BY_NAME]
     if unknown:

@@ -8,6 +8,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from typing import Any
 
+from flight.live.running_clock import RunningClock
 from logs.recording.messages import LogChannel, LogMessage, log_channels, log_messages
 from logs.recording.state_channel import EPOCH_NS
 from planfly.terminal.link_options import Stopped, stop_signals
@@ -51,9 +52,9 @@ def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
 
 
 def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> None:
-    begun = time.monotonic()
+    waited = RunningClock()
     while not broadcast.listeners and not stopped():
-        if timeout is not None and time.monotonic() - begun > timeout:
+        if timeout is not None and waited() > timeout:
             raise FlightError(f"--foxglove: nobody has subscribed within {timeout:g} s")
         time.sleep(_POLL)
 
@@ -61,12 +62,12 @@ def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> N
 def _play(
     broadcast: "_Broadcast", server: Any, messages: Iterator[LogMessage], end_ns: int, speed: float, stopped: Stopped
 ) -> None:
-    begun, first, newest = time.monotonic(), None, 0
+    played, first, newest = RunningClock(), None, 0
     for message in messages:
         if message.log_time > end_ns:
             break
         first = message.log_time if first is None else first
-        while (ahead := (message.log_time - first) / 1e9 / speed - (time.monotonic() - begun)) > 0.0 and not stopped():
+        while (ahead := (message.log_time - first) / 1e9 / speed - played()) > 0.0 and not stopped():
             broadcast.catch_up()
             time.sleep(min(ahead, _POLL))
         if stopped():

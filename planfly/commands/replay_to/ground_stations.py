@@ -38,12 +38,12 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
             player.wait(wait, stopped)
             if not link.peers:
                 raise FlightError(f"--to {args.to}: no ground station has answered within {wait:g} s")
-            begun, k = time.monotonic(), 0
+            begun, k = link.clock(), 0
             player.announce(f"replay of {args.log} at {args.speed or 1.0:g}x")
             while k < len(rows) - 1 and not stopped():
                 k = min(
                     len(rows) - 1,
-                    int(np.searchsorted(track.time, (time.monotonic() - begun) * (args.speed or 1.0), side="right")),
+                    int(np.searchsorted(track.time, (link.clock() - begun) * (args.speed or 1.0), side="right")),
                 )
                 snapshot = snapshots.snapshot(rows[k])
                 if snapshot.finite:
@@ -64,7 +64,7 @@ class _Player:
 
     def __init__(self, link: Link, status: Status) -> None:
         self._link, self._status = link, status
-        self._born = time.monotonic()
+        self._born = link.clock()
         self._hello = 0.0
         self._texts = 0
 
@@ -78,19 +78,19 @@ class _Player:
 
     def wait(self, timeout: float, stopped: Stopped) -> None:
         """Call stations until one answers, or ``timeout`` seconds are over."""
-        end = time.monotonic() + timeout
-        while not self._link.peers and time.monotonic() < end and not stopped():
+        end = self._link.clock() + timeout
+        while not self._link.peers and self._link.clock() < end and not stopped():
             self.step(0.05)
 
     def rest(self, seconds: float, stopped: Stopped) -> None:
         """Go on sending the last snapshot."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end and not stopped():
+        end = self._link.clock() + seconds
+        while self._link.clock() < end and not stopped():
             self.step(0.02)
 
     def step(self, pause: float) -> None:
         """Read what stations send, send them what is due, and pause, s."""
-        now = time.monotonic()
+        now = self._link.clock()
         self._status.boot, self._status.wall = now - self._born, time.time()
         self._link.receive()
         if now >= self._hello:

@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live import downlink
 from flight.live.downlink import Downlink
 from flight.live.link import Peer
 from flight.live.parameters import PARAMETERS_PER_SECOND, Parameter, Parameters
@@ -46,6 +45,7 @@ class Sending:
 
     def __init__(self, clock: Clock, stations: int = 2, parameters: int = 5) -> None:
         self.link: Any = FakeLink()
+        self.link.clock = clock
         for port in range(1, stations + 1):
             peer = Peer(("127.0.0.1", port), 255, 190, 0.0, mavlink.MAVLink(None, 1, 1), {NAME: 0.1}, {NAME: clock.now})
             self.link.peers[peer.address] = peer
@@ -61,10 +61,9 @@ class Sending:
 
 
 @pytest.fixture
-def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+def clock() -> Clock:
     made = Clock()
     made.now = 1000.0
-    monkeypatch.setattr(downlink.time, "monotonic", made)
     return made
 
 

@@ -1,5 +1,7 @@
 """The process that flies: orders in, events out, and a log that is closed however the flight ends."""
 
+import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from multiprocessing import Pipe
 from threading import Thread
@@ -33,6 +35,8 @@ class MemoryLog:
 
     full: bool = False
     rows: int = 0
+    # How often it asks whether to hurry before it closes.
+    patience: int = 0
     closed: list[str] = field(default_factory=list)
 
     def write(self, block: Track) -> None:
@@ -40,7 +44,11 @@ class MemoryLog:
             raise OSError(28, "No space left on device")
         self.rows += len(block)
 
-    def finish(self, ended: str) -> FlightJudged:
+    def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
+        for _ in range(self.patience):
+            if hurry():
+                break
+            time.sleep(0.01)
         self.closed.append(ended)
         return FlightJudged(ended == "completed", ())
 
@@ -112,6 +120,37 @@ def test_a_full_disk_ends_the_flight_and_not_the_process() -> None:
     assert isinstance(judged, FlightJudged)
     assert "cannot be written" in judged.texts[0].text
     assert log.closed == ["abandoned"]
+
+
+@pytest.mark.parametrize("gone", [False, True])
+def test_a_judgement_is_hurried_when_the_process_is_to_end(gone: bool) -> None:
+    """By an order behind another that waits, or by a link that is gone; nothing else hurries it."""
+    ours, theirs = Pipe()
+    log = MemoryLog(patience=3000)
+    factory = OneSetup(setup_of(wp(0, 0), wp(0, 500)), log, speed=500.0)
+    thread = Thread(target=serve_flights, args=(theirs, factory))
+    thread.start()
+    ours.send(JudgeMission(Mission(None, ()), 7))
+    ours.send(StartFlight())
+    while not isinstance(read_event(ours.recv_bytes()), FlightEnded):
+        pass
+    ours.send(JudgeMission(Mission(None, ()), 8))
+    time.sleep(0.1)
+    assert log.closed == []
+    if gone:
+        ours.close()
+    else:
+        ours.send(EndFlight(quit=True))
+    begun = time.monotonic()
+    thread.join(20.0)
+    assert time.monotonic() - begun < 5.0
+    assert log.closed == ["completed"]
+    if not gone:
+        # What waited is answered in its turn, before the end.
+        assert isinstance(read_event(ours.recv_bytes()), FlightJudged)
+        assert read_event(ours.recv_bytes()) == MissionJudged(8, True, True, ())
+        ours.close()
+    theirs.close()
 
 
 @pytest.mark.parametrize("order", [EndFlight(quit=True), None])

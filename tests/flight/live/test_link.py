@@ -5,8 +5,9 @@ import socket
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.link import MOST_PEERS, SILENCE, Access, Link
-from flight.live.signing import Signing
+from flight.live.link import MOST_PEERS, SILENCE, Access, Dropped, Link
+from flight.live.running_clock import RunningClock
+from flight.live.signing import EPOCH, Signing
 from tests.flight.live.fake_vehicle import HEARTBEAT, KEY, LOCAL, WALL, Clock, packed
 from world.errors import FlightError
 
@@ -32,9 +33,51 @@ def test_the_table_of_stations_is_bounded_and_forgets(link: Link) -> None:
     for port in range(1000):
         link.take(packed(HEARTBEAT), ("127.0.0.1", port))
     assert len(link.peers) == MOST_PEERS
-    link._clock.now += SILENCE + 1.0
+    link.clock.now += SILENCE + 1.0
     link.take(packed(HEARTBEAT), ("127.0.0.1", 5000))
     assert list(link.peers) == [("127.0.0.1", 5000)]
+
+
+def test_a_sleeping_laptop_loses_no_station_and_none_of_its_wishes() -> None:
+    """Asleep for an hour, as one that runs on the same laptop was: what it had asked for still holds."""
+    real = Clock()
+    made = Link(LOCAL, RunningClock(real))
+    try:
+        made.take(packed(HEARTBEAT), ("127.0.0.1", 5))
+        made.peers["127.0.0.1", 5].periods["ATTITUDE"] = 0.02
+        real.now += 3600.0
+        made.forget_silent()
+        assert made.peers["127.0.0.1", 5].periods["ATTITUDE"] == 0.02
+        # Awake and silent it is forgotten as ever.
+        for _ in range(int(SILENCE)):
+            real.now += 1.0
+            made.forget_silent()
+        assert made.peers == {}
+    finally:
+        made.close()
+
+
+def test_a_clock_set_back_cuts_no_signed_link() -> None:
+    """An hour back and a day on: pymavlink takes each of our frames, and we each of its."""
+    station = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    station.bind(("127.0.0.1", 0))
+    station.settimeout(1.0)
+    theirs = mavlink.MAVLink(None, 255, 190)
+    theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
+    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - EPOCH) * 1e5)
+    wall = Clock()
+    made = Link(Access(("127.0.0.1", 0), (station.getsockname(),), key=KEY), Clock(), wall)
+    try:
+        for n, change in enumerate((0.0, 0.02, -3600.0, -3599.0, 86_400.0, 0.0)):
+            wall.now = WALL + change
+            assert len(made.take(HEARTBEAT.pack(theirs), station.getsockname())) == 1
+            made.send_heartbeat(HEARTBEAT)
+            message = theirs.decode(bytearray(station.recv(300)))
+            assert (message.get_type(), message.get_signed(), message.get_seq()) == ("HEARTBEAT", True, n)
+        assert made.dropped == Dropped()
+    finally:
+        made.close()
+        station.close()
 
 
 def test_a_station_gets_one_count_of_frames(link: Link) -> None:

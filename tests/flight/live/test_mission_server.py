@@ -1,7 +1,5 @@
 """The mission protocol, without sockets: whole or nothing, one station at a time, on any link."""
 
-import os
-
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -15,10 +13,9 @@ from flight.live.mission_server import (
     MissionServer,
     Station,
 )
-from tests.soak import note
+from tests.soak import scaled, tally
 from tests.stations import Medium, Uploader, decode, item, many_items
 
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
 ONE, TWO = Station("one", 255, 190), Station("two", 254, 190)
 
 
@@ -39,7 +36,7 @@ def test_a_thousand_items_arrive_as_they_were_sent() -> None:
     assert server.changed == {MissionType.MISSION}
 
 
-@pytest.mark.parametrize("seed", range(20 if SOAK else 2))
+@pytest.mark.parametrize("seed", range(scaled(20, 2)))
 def test_a_thousand_items_survive_a_bad_link(seed: int) -> None:
     """30 % lost, doubled and reordered each way: all or, until then, nothing."""
     server, items, old = MissionServer(), many_items(1000, mark=seed), many_items(5, mark=99)
@@ -55,7 +52,7 @@ def test_a_thousand_items_survive_a_bad_link(seed: int) -> None:
     assert one.result == mavlink.MAV_MISSION_ACCEPTED
     assert held(server) == wanted(items)
     assert medium.sent > 4000
-    note(f"upload of 1000 items at 30 % loss, seed {seed}", sent=medium.sent, whole=1)
+    tally("uploads of 1,000 items at 30 % loss each way", uploads=1, whole=1, datagrams=medium.sent)
 
 
 @pytest.mark.parametrize("seed", range(100))

@@ -1,5 +1,6 @@
 """Signing: pymavlink accepts our signatures, and neither a forged frame nor a replayed one is accepted."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,25 @@ def test_pymavlink_accepts_our_signatures_and_we_its() -> None:
     assert ours.refuses(frame, WALL) is None
     assert ours.refuses(frame, WALL), "a replayed frame"
     assert ours.refuses(split_frames(packed(HEARTBEAT))[0], WALL), "an unsigned frame"
+
+
+def test_a_vehicle_started_anew_after_its_clock_was_set_back_is_heard() -> None:
+    """pymavlink, which ran on, drops its first frame as old; then it goes on from the station's time."""
+    theirs = mavlink.MAVLink(None, 255, 190)
+    theirs.signing.secret_key, theirs.signing.sign_outgoing = KEY, True
+    theirs.signing.link_id, theirs.signing.timestamp = 1, int((WALL - EPOCH) * 1e5)
+    assert theirs.decode(bytearray(Signing(KEY).sign(packed(HEARTBEAT, 1), WALL + 10.0))).get_signed()
+    anew, back = Signing(KEY), WALL - 3600.0
+    with pytest.raises(mavlink.MAVError, match="signature"):
+        theirs.decode(bytearray(anew.sign(packed(HEARTBEAT, 1), back)))
+    (heard,) = split_frames(HEARTBEAT.pack(theirs))
+    assert anew.refuses(heard, back) is None
+    assert theirs.decode(bytearray(anew.sign(packed(HEARTBEAT, 1), back))).get_signed()
+    # What is forged moves nothing.
+    (forged,) = split_frames(Signing(bytes(32)).sign(packed(HEARTBEAT), WALL + 1e8))
+    before = anew.newest
+    assert anew.refuses(forged, back) is Refused.FORGED
+    assert anew.newest == before
 
 
 def test_a_forged_timestamp_locks_nobody_out() -> None:
@@ -83,6 +103,9 @@ def test_keys_that_others_could_read_are_refused(tmp_path: Path) -> None:
         read_key(path)
     with pytest.raises(FlightError, match="cannot be read"):
         read_key(tmp_path / "none")
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(FlightError, match="not a plain file"):
+        read_key(tmp_path / "pipe")
 
 
 def test_where_users_have_no_numbers_a_key_is_read_whatever_its_mode(

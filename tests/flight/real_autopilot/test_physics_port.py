@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from flight.live import running_clock
 from flight.real_autopilot import physics_port
 from flight.real_autopilot.physics_port import PhysicsPort
 from world.errors import FlightError
@@ -79,6 +80,28 @@ def test_silence_ends_the_wait_and_not_sooner(port: PhysicsPort, monkeypatch: py
     with pytest.raises(FlightError, match="silent for 1 s; ended"):
         port.receive()
     assert 0.6 < time.monotonic() - started < 2.0
+
+
+def test_a_sleeping_laptop_is_no_silence(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its clock leaps by an hour in the middle of a wait: the program, which slept too, is still waited for."""
+    leap = 0.0
+    real = time.monotonic
+    monkeypatch.setattr(running_clock.time, "monotonic", lambda: real() + leap)
+    monkeypatch.setattr(physics_port, "SILENCE", 1.6)
+    looks = 0
+
+    def watch() -> None:
+        nonlocal leap, looks
+        looks += 1
+        leap = 3600.0 if looks >= 2 else 0.0
+
+    fresh = PhysicsPort()
+    fresh.watch = watch
+    with pytest.raises(FlightError, match="silent"):
+        fresh.receive()
+    fresh.close()
+    # A look is a quarter of a second, and the leap counts as one second at most.
+    assert looks >= 4
 
 
 def test_the_same_question_without_end_is_no_understanding(

@@ -1,23 +1,21 @@
 """What the envelope predicts against what flights show (`tests.bench.limits`); every case with PLANFLY_SOAK=1."""
 
 import math
-import os
 
 import pytest
 
 from tests.bench.limits import Limit, calm_limits, wind_limits
-
-WHOLE = bool(os.environ.get("PLANFLY_SOAK"))
+from tests.soak import SOAK
 
 
 @pytest.fixture(scope="module")
 def calm() -> list[Limit]:
-    return calm_limits(whole=WHOLE)
+    return calm_limits(whole=SOAK)
 
 
 @pytest.fixture(scope="module")
 def windy() -> list[Limit]:
-    return wind_limits(whole=WHOLE)
+    return wind_limits(whole=SOAK)
 
 
 def test_calm_slopes(calm: list[Limit]) -> None:

@@ -1,13 +1,10 @@
 """How closely flights follow their path, at a small count; at full count with PLANFLY_SOAK=1."""
 
-import os
-
 import numpy as np
 import pytest
 
 from tests.bench import flight as bench
-
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+from tests.soak import SOAK
 
 
 def test_calm() -> None:

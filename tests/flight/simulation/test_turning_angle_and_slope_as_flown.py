@@ -1,10 +1,7 @@
 """Turning angle and slope as flown against the plan, on random feasible missions; 100 with PLANFLY_SOAK=1."""
 
-import os
-
 from tests.bench.angles import angles
-
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
+from tests.soak import SOAK
 
 
 def test_flown_angles_are_the_planned_ones() -> None:

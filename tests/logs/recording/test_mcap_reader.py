@@ -1,6 +1,5 @@
 """A container that is cut, damaged, hostile or none is never taken for what was recorded."""
 
-import os
 import struct
 import tracemalloc
 import zlib
@@ -16,10 +15,8 @@ from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from tests.logs.log_copies import prefix_of, same
 from tests.logs.recording.containers.framing import framed
-from tests.soak import note, scaled
+from tests.soak import SOAK, note, scaled
 from world.errors import LogError
-
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
 
 
 def _cuts(size: int, last: int) -> Iterator[int]:

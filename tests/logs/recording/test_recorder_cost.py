@@ -1,6 +1,5 @@
 """Recording, checking and reporting stay within their bounds of time and bytes; `make bench` prints the figures."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -10,9 +9,9 @@ from logs.recording.reader import read_log
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_plan, make_setup
 from tests.bench.chain import in_child, long_flight, recording
+from tests.soak import SOAK
 from world.scenario import load_scenario
 
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
 # Of some 12 minutes each.
 LAPS = 5 if SOAK else 2
 

@@ -3,17 +3,15 @@
 200 of them with PLANFLY_SOAK=1, two of each feature and side otherwise.
 """
 
-import os
-
 import pytest
 
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.fenced_missions import FEATURES, MARGIN, fenced_mission
 from tests.logs.verdict.judging import judge
+from tests.soak import scaled
 from tests.synthetic import fly_path
 
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
-NUMBERS = range(200) if SOAK else range(4 * len(FEATURES))
+NUMBERS = range(scaled(200, 4 * len(FEATURES)))
 
 
 @pytest.mark.parametrize("number", NUMBERS)

@@ -1,7 +1,6 @@
 """Every suggestion of a failed finding, taken, passes: on random missions beyond one limit, judged and flown."""
 
 import math
-import os
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +14,9 @@ from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.places import Suggestion
 from tests.logs.verdict.judging import bare, of
 from tests.missions import KINDS, MadeMission, infeasible
+from tests.soak import scaled
 
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
-JUDGED = range(100) if SOAK else range(3 * len(KINDS))
-FLOWN = range(100) if SOAK else range(len(KINDS))
+JUDGED, FLOWN = range(scaled(100, 3 * len(KINDS))), range(scaled(100, len(KINDS)))
 
 Floats = NDArray[np.float64]
 

@@ -3,8 +3,6 @@
 100 and 100 of either with PLANFLY_SOAK=1, the first few otherwise.
 """
 
-import os
-
 import pytest
 
 from flight.simulation.simulate import simulate
@@ -12,11 +10,10 @@ from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.logs.verdict.judging import bare
 from tests.missions import KINDS, MadeMission, feasible, infeasible
+from tests.soak import SOAK, scaled
 
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
 MARGINS = (0.2, 0.1) if SOAK else (0.2,)
-BEYOND = range(100) if SOAK else range(2 * len(KINDS))
-INSIDE = range(100) if SOAK else range(8)
+BEYOND, INSIDE = range(scaled(100, 2 * len(KINDS))), range(scaled(100, 8))
 
 
 def levels(made: MadeMission) -> dict[str, Verdict]:

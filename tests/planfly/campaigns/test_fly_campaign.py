@@ -21,8 +21,8 @@ from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
 from planfly.campaigns.storage.store import DATABASE, NOT_THE_SAME, StoreError, read_table
 from tests.planfly.campaigns.made_campaigns import all_fly, made_flight, short_base, slow_flight
+from tests.soak import SOAK, note
 
-SOAK = "PLANFLY_SOAK" in os.environ
 pytestmark = pytest.mark.filterwarnings("default")
 
 
@@ -110,6 +110,36 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.skipif(not SOAK, reason="stopped for twelve seconds: in make soak")
+def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
+    """All processes are stopped for longer than a scheduler would wait for a worker's sign of life."""
+    folder, count = tmp_path / "slept", 150
+    folder.mkdir()
+    script = tmp_path / "client.py"
+    script.write_text(_CLIENT)
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join(sys.path),
+        "DASK_DISTRIBUTED__SCHEDULER__WORKER_TTL": "1s",
+    }
+    client = subprocess.Popen(
+        [sys.executable, str(script), str(folder), str(count)], env=environment, start_new_session=True
+    )
+    until, sizes = time.monotonic() + 120.0, set()
+    # It is under way: the table grows.
+    while len(sizes) < 4:
+        assert client.poll() is None
+        assert time.monotonic() < until
+        time.sleep(0.05)
+        sizes.add(sum(path.stat().st_size for path in folder.glob(f"{DATABASE}*")))
+    os.killpg(client.pid, signal.SIGSTOP)
+    time.sleep(12.0)
+    os.killpg(client.pid, signal.SIGCONT)
+    assert client.wait(120.0) == 0
+    assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
+    assert len(set(read_table(folder / DATABASE)["worker"])) == 2
+    note("campaign: stopped for 12 s", flights=count, workers_lost=0)
+
+
 def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
     kills, count = (20, 300) if SOAK else (1, 60)
     folder = tmp_path / "killed"
@@ -132,6 +162,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
             known = now
     subprocess.run([sys.executable, str(script), str(folder), str(count)], env=environment, check=True)
     assert table(folder) == expected(short_base(folder), tmp_path / "one", count)
+    note("campaign: kill -9 of its client", kills=kills, flights=count, lost=0)
 
 
 def _wait_until(there: Callable[[], bool], seconds: float = 60.0) -> None:
@@ -170,6 +201,7 @@ def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> 
             killer.join()
     assert len(killed) == kills
     assert table(tmp_path) == expected(base, tmp_path / "one", count)
+    note("campaign: kill -9 of its workers", kills=kills, flights=count, lost=0)
 
 
 def test_a_real_scheduler_gives_the_same_table(base: CampaignBase, tmp_path: Path) -> None:

@@ -15,10 +15,11 @@ from logs.verdict.findings import RULES
 from planfly.cli import main
 from planfly.terminal.targets import RUN_FILES
 from tests.planfly.conftest import FIELD
+from tests.soak import scaled
 
 ROOT = Path(__file__).parents[3]
 SAME = ("plan.json", "mission.waypoints", "mission.plan", "flight.mcap", "verdict.json")
-SEEDS = range(1, 101) if os.environ.get("PLANFLY_SOAK") else range(1, 5)
+SEEDS = range(1, 1 + scaled(100, 4))
 
 
 def planfly(*argv: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:

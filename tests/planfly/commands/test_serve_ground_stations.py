@@ -6,7 +6,6 @@ says why.
 
 import importlib.util
 import json
-import os
 import queue
 import random
 import re
@@ -23,10 +22,10 @@ import pytest
 from logs.recording.reader import read_log
 from tests.clients import need as client
 from tests.planfly.conftest import Served
+from tests.soak import SOAK
 
 pytestmark = pytest.mark.client
 
-SOAK = bool(os.environ.get("PLANFLY_SOAK"))
 SCRIPT = Path(__file__).parents[2] / "clients" / "mavsdk_session.py"
 PROXY = Path(__file__).parents[2] / "clients" / "lossy_proxy.py"
 LAT, LON = 460_000_000, 80_000_000

@@ -1,15 +1,18 @@
 """Hostile files, each met by a process of its own: refused in a second and 200 MiB, nothing written or fetched."""
 
+import io
 import json
 import os
 import struct
 import subprocess
 import sys
+import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import rasterio
 import zstandard
@@ -121,6 +124,15 @@ def vrt(path: Path) -> None:
     )
 
 
+def claiming_npz(path: Path) -> None:
+    """Heights that claim 4 TiB and hold 4 kB."""
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": "<f4", "fortran_order": False, "shape": (2**20, 2**20)})
+    np.savez(path, xmin=8.0, xmax=8.2, ymin=46.0, ymax=46.2)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("elevation.npy", header.getvalue() + bytes(4000))
+
+
 MISSION = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.05\t8.05\t500\t1\n" + "".join(
     f"{k}\t0\t0\t16\t0\t0\t0\t0\t{46.05 + 0.01 * k:.3f}\t8.05\t700\t1\n" for k in (1, 2)
 )
@@ -131,6 +143,7 @@ MISSION = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.05\t8.05\t500\t1\n" + "".joi
     [
         ("bomb.tif", lambda path: sparse_tiff(path, 200_000)),
         ("block.tif", lambda path: sparse_tiff(path, 30_000, blockysize=30_000, compress="deflate")),
+        ("claims.npz", claiming_npz),
         ("other.tif", vrt),
         ("other.vrt", vrt),
         ("http://127.0.0.1:9/x.tif", None),

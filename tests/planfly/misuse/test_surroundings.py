@@ -1,6 +1,7 @@
 """What a machine may do to a command: each a line of its own, no traceback, and nothing half-written."""
 
 import contextlib
+import faulthandler
 import os
 import resource
 import shutil
@@ -169,6 +170,43 @@ def test_a_target_that_is_a_link_stays_one(folder: Path) -> None:
     with pytest.raises(FileNotFoundError) as caught:
         write_whole(folder / "lost.json", "{}")
     assert caught.value.filename == str(folder / "lost.json")
+
+
+@pytest.mark.parametrize(
+    "argv", [("--params", "loop"), ("--aircraft", "./loop"), ("--scenario", "loop"), ("--json", "loop")]
+)
+def test_a_link_that_leads_to_itself(argv: tuple[str, str], folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "loop").symlink_to(folder / "loop")
+    assert main(["check", "m.waypoints", *argv]) == (1 if argv[0] == "--json" else 2)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert "loop" in said[0]
+    assert (folder / "loop").is_symlink()
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ("check", "pipe.waypoints"), ("check", "pipe.mcap"), ("check", "pipe.gpx"), ("plan", "pipe.toml"),
+        ("check", "m.waypoints", "--params", "pipe.parm"), ("check", "m.waypoints", "--fence", "pipe.waypoints"),
+        ("check", "m.waypoints", "--terrain", "pipe.tif"), ("check", "m.waypoints", "--aircraft", "./pipe"),
+    ],
+)  # fmt: skip
+def test_a_pipe_that_nobody_writes_into_is_not_waited_for(
+    argv: tuple[str, ...], folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = next(part for part in argv if "pipe" in part)
+    (folder / "pipe").mkdir()
+    os.mkfifo(folder / ("pipe/pipe.toml" if name == "./pipe" else name))
+    # It would be for ever.
+    faulthandler.dump_traceback_later(60.0, exit=True, file=sys.__stderr__)
+    try:
+        assert main([*argv]) == 2
+    finally:
+        faulthandler.cancel_dump_traceback_later()
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert "pipe" in said[0]
 
 
 def test_two_runs_into_one_folder(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

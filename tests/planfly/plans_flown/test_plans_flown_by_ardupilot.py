@@ -10,11 +10,11 @@ from planfly.airframe import load_airframe
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
 from tests.clients import ROOT, need
+from tests.soak import SOAK, scaled
 
-SOAK = os.environ.get("PLANFLY_SOAK") == "1"
 # On each terrain with the law, and once with the program itself.
-NUMBERS = range(100) if SOAK else (0, 4, 11)
-REAL_NUMBERS = range(100) if SOAK else (7,)
+NUMBERS = range(scaled(100, 0)) if SOAK else (0, 4, 11)
+REAL_NUMBERS = range(scaled(100, 0)) if SOAK else (7,)
 
 
 def fly(number: int, autopilot: Path | None) -> None:

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-SOAK = os.environ.get("PLANFLY_SOAK") == "1"
+from tests.soak import SOAK
+
 ROOT = Path(__file__).parents[3]
 SCRIPT = """
 import hashlib, sys

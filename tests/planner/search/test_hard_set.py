@@ -1,7 +1,6 @@
 """The hard set and fresh random instances: every run safe, and each plan checked again at 1 m by other code."""
 
 import math
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -13,12 +12,12 @@ from planner.plan import Plan
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
 from tests.instances import CLIMB_DEG, DIVE_DEG, ground, random_scenario
+from tests.soak import note, scaled
 from world.scenario import Scenario, from_spec, load_scenario
 from world.scenario_file import parse_scenario
 
-SOAK = os.environ.get("PLANFLY_SOAK") == "1"
-RUNS = range(1, 16) if SOAK else range(1, 3)
-INSTANCES = range(1, 51) if SOAK else range(1, 6)
+RUNS = range(1, 1 + scaled(15, 2))
+INSTANCES = range(1, 1 + scaled(50, 5))
 
 
 def check_at_one_metre(plan: Plan) -> None:
@@ -55,6 +54,7 @@ def test_hard_set_is_safe_in_every_run(threats: str, make_limits: Callable[[Scen
         assert plan.evaluations <= table.population + table.generations * (table.population // 2)
         lengths.append(float(plan.objectives[0]))
     assert max(lengths) <= 1.03 * min(lengths)
+    note(f"planner: hard-{threats}", runs=len(lengths), safe=len(lengths), spread=round(max(lengths) / min(lengths), 4))
 
 
 @pytest.mark.parametrize("seed", INSTANCES)

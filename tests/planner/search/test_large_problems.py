@@ -1,6 +1,5 @@
 """Many threats, much ground, long paths: planned within bounds of memory and evaluations."""
 
-import os
 import resource
 import time
 from collections.abc import Callable
@@ -12,9 +11,9 @@ import pytest
 
 from aircraft.path_limits import Limits
 from planner.search.plan_path import plan_path
+from tests.soak import SOAK, note
 from world.scenario import Scenario, from_spec
 
-SOAK = os.environ.get("PLANFLY_SOAK") == "1"
 THREATS, SIDE, WAYPOINTS, POPULATION = (10_000, 10_000, 200, 5000) if SOAK else (2000, 1200, 60, 400)
 
 
@@ -72,6 +71,11 @@ def test_a_large_problem_is_planned(
     assert scenario.terrain is not None
     assert scenario.terrain.heights.dtype == np.float32
     plan = plan_path(scenario, make_limits(scenario), seed=1, algorithm=algorithm)
+    note(
+        f"planner: large problem, {algorithm}",
+        threats=THREATS, pixels=SIDE**2, waypoints=WAYPOINTS, population=POPULATION, feasible=int(plan.feasible),
+        cpu_s=round(time.process_time() - began), peak_mb=round(peak() / 1e6),
+    )  # fmt: skip
     if SOAK:
         with capsys.disabled():
             print(

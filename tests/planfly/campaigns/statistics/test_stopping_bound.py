@@ -1,7 +1,6 @@
 """The bound that holds at every number of flights: against the definition, and 1,000 campaigns of known probability."""
 
 import math
-import os
 
 import numpy as np
 import pytest
@@ -9,8 +8,7 @@ from scipy.special import betaln
 
 from planfly.campaigns.statistics.proportions import Tally
 from planfly.campaigns.statistics.stopping_bound import StoppingBound
-
-SOAK = "PLANFLY_SOAK" in os.environ
+from tests.soak import SOAK, note
 
 
 @pytest.mark.parametrize(("target", "flights"), [(0.9, 29), (0.95, 59), (0.99, 299)])
@@ -82,6 +80,7 @@ def test_it_covers_at_all_stopping_times_and_prove_errs_in_at_most_a_twentieth(p
         if decided.size:
             reached = success[decided[0]] / when[decided[0]] > 0.99
             erred += bool(reached) != (p >= 0.99)
+    note(f"campaign: bound at p = {p}", campaigns=campaigns, flights_each=most, not_covered=left, erred=erred)
     assert left <= 0.05 * campaigns
     assert erred <= 0.05 * campaigns
 

@@ -14,7 +14,7 @@ from planfly.cli import main
 from tests.logs.field_logs.damaged_copies import damaged
 from tests.logs.field_logs.written_logs import BEGAN, dataflash, gpx, igc, kml, px4, telemetry
 from tests.planfly.commands.field_logs.field_log_files import example_plan
-from tests.soak import scaled
+from tests.soak import note, scaled
 
 Output = pytest.CaptureFixture[str]
 WRITERS: dict[str, Callable[[Path], Path]] = {
@@ -79,3 +79,5 @@ def test_damaged_copies_are_refused_or_told(tmp_path: Path, capsys: Output, name
         assert (code == 3) == source.damage.lossy, seed
         assert untold(name, flown.track.time, source, out) == "", (seed, out)
     assert set(codes) & {0, 3, 4}, "none was read"
+    refused = codes.count(2)
+    note(f"field logs: damaged {name}", copies=len(codes), refused=refused, judged=len(codes) - refused, silent=0)

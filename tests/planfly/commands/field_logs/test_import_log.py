@@ -1,6 +1,5 @@
 """`planfly import` and `planfly check LOG`: every format, refusals, and what the other commands make of the result."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,8 +10,8 @@ from logs.recording.reader import read_log
 from planfly.cli import main
 from tests.logs.field_logs.written_logs import dataflash, gpx, igc, kml, px4, telemetry
 from tests.planfly.commands.field_logs.field_log_files import FLIGHTS, example_plan
+from tests.soak import SOAK
 
-SOAK = os.environ.get("PLANFLY_SOAK") == "1"
 WRITERS: dict[str, Callable[[Path], Path]] = {
     "a.BIN": dataflash,
     "a.tlog": telemetry,

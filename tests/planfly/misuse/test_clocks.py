@@ -1,0 +1,119 @@
+"""A laptop that sleeps, and a wall clock that is set back: what goes on by the clock goes on where it was."""
+
+import itertools
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from logs.recording.reader import read_log
+from tests.flight.live.fake_vehicle import KEY
+from tests.logs.made_flight import make_setup, make_track, record
+from tests.planfly.conftest import Served
+from tests.stations import UdpStation, item
+
+LAT, LON = 460_000_000, 80_000_000
+ROUTE = [
+    item(0, LAT, LON, 0.0),
+    item(1, LAT, LON, 100.0),
+    item(2, LAT, LON + 33_333, 100.0, frame=3),
+    item(3, LAT, LON + 300_000, 100.0),
+]
+# A wall clock that is an hour back as soon as a file is there.
+SET_BACK = """
+import os, time
+real = time.time
+time.time = lambda: real() - (3600.0 if os.path.exists({flag!r}) else 0.0)
+"""
+
+
+def test_a_served_flight_goes_on_where_it_was(serve: Callable[..., Served]) -> None:
+    """All of its processes are stopped for 3 s, as a sleep stops them: the flight is 3 s late, and lacks no row."""
+    vehicle = serve("--scenario", "field.toml")
+    with UdpStation(vehicle.port) as station:
+        assert station.upload(ROUTE) == 0
+        station.fly()
+        begun = station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
+        started = time.monotonic()
+        before = station.listen(0.7)
+        os.killpg(vehicle.process.pid, signal.SIGSTOP)
+        time.sleep(3.0)
+        while station.receive():
+            pass
+        os.killpg(vehicle.process.pid, signal.SIGCONT)
+        after = station.listen(1.5)
+        real = time.monotonic() - started
+        assert station.command(512, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION) == mavlink.MAV_RESULT_ACCEPTED
+    assert vehicle.stop() == 0
+    east = [m.lon for m in (begun, *before, *after) if m.get_type() == "GLOBAL_POSITION_INT"]
+    # 25 m/s and a light wind for as long as it flew: never 3 s in one leap.
+    steps = np.diff(east) * 1e-7 * 111_320.0 * np.cos(np.deg2rad(46.0))
+    assert steps.max() < 40.0
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert np.allclose(np.diff(log.track.time), 1.0 / 60.0, atol=1e-6)
+    assert 1.0 < log.end_time < real - 3.0 + 1.5, "half a second is made up for at most"
+
+
+def test_a_replay_goes_on_where_it_was(tmp_path: Path) -> None:
+    """20 s in 5 s, stopped for 3 s: what comes next is not what would have come meanwhile."""
+    record(tmp_path / "f.mcap", make_setup(), make_track(20.0))
+    replay = subprocess.Popen(
+        [sys.executable, "-m", "planfly", "replay", "f.mcap", "--speed", "4"],
+        cwd=tmp_path, env=os.environ | {"PYTHONUNBUFFERED": "1"}, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert replay.stdout is not None
+    assert replay.stdout.readline().strip()
+    begun = time.monotonic()
+    replay.send_signal(signal.SIGSTOP)
+    time.sleep(3.0)
+    replay.send_signal(signal.SIGCONT)
+    # An end is the last thing that is printed; the first look after the stop may take a second of the 5.
+    while "s  end " not in replay.stdout.readline():
+        pass
+    assert time.monotonic() - begun > 3.0 + 5.0 - 1.2
+    replay.stdout.close()
+    assert replay.wait() == 0
+
+
+def test_a_served_flight_survives_a_clock_set_back(
+    serve: Callable[..., Served], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An hour back, in flight, on a signed link: the station hears all of it, and the log knows nothing of it."""
+    (tmp_path / "key").write_text(KEY.hex(), encoding="ascii")
+    (tmp_path / "key").chmod(0o600)
+    flag = tmp_path / "back"
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site" / "sitecustomize.py").write_text(SET_BACK.format(flag=str(flag)), encoding="utf-8")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path / "site"), *filter(None, sys.path)]))
+    vehicle = serve("--scenario", "field.toml", "--speed", "10", "--sign-key", "key")
+    with UdpStation(vehicle.port) as station:
+        station.mav.signing.secret_key, station.mav.signing.sign_outgoing = KEY, True
+        station.mav.signing.timestamp = round((time.time() - 1_420_070_400.0) * 1e5)
+        station.parser.signing.secret_key = KEY
+        assert station.upload(ROUTE) == 0
+        station.fly()
+        station.until(lambda m: m.get_type() == "GLOBAL_POSITION_INT" and m.vy > 0)
+        flag.touch()
+        after = station.listen(1.0)
+        station.send(mavlink.MAVLink_command_long_message(1, 1, 512, 0, mavlink.MAVLINK_MSG_ID_SYSTEM_TIME, *[0.0] * 6))
+        told = station.until(lambda m: m.get_type() == "SYSTEM_TIME")
+        assert told.get_signed()
+        assert told.time_unix_usec / 1e6 == pytest.approx(time.time() - 3600.0, abs=60.0)
+        assert station.command(400, 0, 21196) == mavlink.MAV_RESULT_ACCEPTED
+        station.until(lambda m: m.get_type() == "STATUSTEXT" and "log" in m.text)
+    assert vehicle.stop() == 0
+    assert sum(m.get_type() == "ATTITUDE" for m in after) > 20
+    boots = [m.time_boot_ms for m in after if m.get_type() == "ATTITUDE"]
+    assert all(early <= late for early, late in itertools.pairwise(boots))
+    assert not any("old" in line or "replayed" in line for line in vehicle.lines if line.startswith("frames dropped"))
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert log.complete
+    assert np.allclose(np.diff(log.track.time), 1.0 / 60.0, atol=1e-6)
