@@ -36,6 +36,9 @@ def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.Ca
     assert main(["export", str(plan_file), *map(str, targets)]) == 0
     printed = capsys.readouterr()
     assert "a fence has no height" in printed.err
+    # A map is named by the scenario, not by where its file lies.
+    assert ElementTree.parse(targets[4]).getroot().findtext(f"{KML}Document/{KML}name") == "jacksboro"
+    assert gpxpy.parse(targets[5].read_text()).name == "jacksboro"
     assert printed.out.count("\n") == len(targets)
     waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
     assert waypoints.items == plan.items
