@@ -10,7 +10,7 @@ from flight.mission.zone_fences import zone_fences
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from logs.recording.reader import FlightLog, read_log
 from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
-from planfly.fence_of_plan import fence_of_plan
+from logs.verdict.fence_of_plan import fence_of_plan
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import is_log, open_mission
 from planfly.terminal.exit_codes import FLYABLE, LOSS
@@ -22,6 +22,8 @@ from world.errors import MissionError
 from world.scenario import Scenario
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
+# What a flight log alone can be written as.
+LOGS = (".csv", ".parquet", ".tlog", ".ulg")
 _HOLDS = {"fence": "fence items", "rally": "rally points"}
 
 
@@ -48,7 +50,7 @@ def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; 3 for a log that is cut short."""
     path, targets = Path(args.plan), [Path(name) for name in args.files]
     for target in targets:
-        if target.suffix.lower() not in MAPS:
+        if target.suffix.lower() not in (*MAPS, *LOGS):
             _refuse_unknown(target)
         refuse_existing(target, args.overwrite, path)
     maps = any(target.suffix.lower() in MAPS for target in targets)
@@ -58,12 +60,13 @@ def export(args: argparse.Namespace) -> int:
             raise MissionError(f"{path}: --fence: a log is exported with the fence that it was flown with")
         source = _read_log(path)
     else:
+        _refuse_flown(path, targets)
         source = _read_mission(path, maps, fences)
     texts = [(target, *_text(source, target)) for target in targets]
     print_warnings([*source.mission.warnings, *source.notes])
     for target, text, content in texts:
         write_whole(target, text)
-        print(f"{'map' if target.suffix.lower() in MAPS else 'mission':<9} {target} ({content})")
+        print(f"{_kind(target):<9} {target} ({content})")
     if source.log is not None and not source.log.complete:
         warn_of_loss(source.log)
         return LOSS
@@ -74,8 +77,36 @@ def _refuse_unknown(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
-        allowed = ", ".join([*KINDS, *MAPS])
+        allowed = ", ".join([*KINDS, *MAPS, *LOGS])
         raise MissionError(f"{target}: suffix {target.suffix!r}: allowed {allowed}") from None
+
+
+def _refuse_flown(path: Path, targets: list[Path]) -> None:
+    """Refuse to write of a plan or a mission what is about a flight."""
+    for target in targets:
+        if target.suffix.lower() in LOGS:
+            raise MissionError(f"{target}: {target.suffix} is written of a flight log (.mcap), and {path} is none")
+
+
+def _kind(target: Path) -> str:
+    suffix = target.suffix.lower()
+    return "map" if suffix in MAPS else "flight" if suffix in LOGS else "mission"
+
+
+def _flown(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
+    """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
+    content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
+    if suffix == ".tlog":
+        from logs.exports.telemetry_file import telemetry_bytes
+
+        return telemetry_bytes(log), content
+    if suffix == ".ulg":
+        from logs.exports.px4_file import px4_log_bytes
+
+        return px4_log_bytes(log), content
+    from logs.exports.flight_table import csv_text, parquet_bytes
+
+    return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), content
 
 
 def _read_log(path: Path) -> _Source:
@@ -108,9 +139,11 @@ def _with_zones(source: _Source, scenario: Scenario) -> _Source:
     return replace(source, mission=fenced, notes=tuple(notes))
 
 
-def _text(source: _Source, target: Path) -> tuple[str, str]:
+def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
     """Text of a target, and what it holds."""
     suffix, mission = target.suffix.lower(), source.mission
+    if suffix in LOGS and source.log is not None:
+        return _flown(source.log, suffix)
     if suffix in MAPS:
         held = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
         return MAPS[suffix](source.name, list(source.lines.values()), source.zones), " and ".join(held)

@@ -141,14 +141,18 @@ def _add_run_and_plan(command: _Command) -> None:
 def _add_export_and_fly(command: _Command) -> None:
     export = command(
         "export",
-        "write a plan, mission or log by suffix: .waypoints, .plan, .fence, .rally, .kml, .gpx",
+        "write a plan, mission or log in the form that a suffix names",
         "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
     )  # fmt: skip
     export.add_argument(
         "plan", metavar="PLAN.json|MISSION|LOG.mcap", help="a plan that planfly made, a mission file, or a flight log"
     )
     export.add_argument(
-        "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx;"
+        " of a log also .csv, .parquet (extra planfly[parquet]), .tlog (MAVLink), .ulg (PX4)",
     )
     fence_option(export)
     overwrite_option(export)
