@@ -41,6 +41,10 @@ def to_message(
     """MISSION_ITEM_INT of an item: x and y are rounded to 1e-7 degrees, never truncated.
 
     seq: None keeps the item's own number.  mission_type: None takes the one of its command.
+
+    >>> message = to_message(MissionItem(3, 16, 0, (0.0,) * 4, 46.0, 8.0, 500.0))
+    >>> message.get_type(), message.seq, message.x
+    ('MISSION_ITEM_INT', 3, 460000000)
     """
     from pymavlink.dialects.v20 import common
 

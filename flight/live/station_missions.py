@@ -39,7 +39,13 @@ def _is_home(item: MissionItem) -> bool:
 
 
 def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
-    """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets."""
+    """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets.
+
+    >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> items, fences, rally = listed(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
+    >>> [item.seq for item in items], fences, rally
+    ([0, 1, 2], (), ())
+    """
     home = mission.home
     first = MissionItem(0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, 0.0, 0.0, 0.0)
     if home is not None:

@@ -53,6 +53,10 @@ def parquet_bytes(log: FlightLog) -> bytes:
     """The table as a Parquet file, in the types of the log, with the scenario's name and origin as metadata.
 
     Raises PlanflyError where pyarrow is not installed.
+
+    >>> from logs.recording.example_log import example_log
+    >>> parquet_bytes(example_log())[:4]
+    b'PAR1'
     """
     try:
         import pyarrow as pa

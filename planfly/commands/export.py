@@ -10,7 +10,7 @@ from flight.mission.zone_fences import zone_fences
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from logs.recording.reader import FlightLog, read_log
 from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
-from logs.verdict.fence_of_plan import fence_of_plan
+from planfly.fence_of_plan import fence_of_plan
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import is_log, open_mission
 from planfly.terminal.exit_codes import FLYABLE, LOSS

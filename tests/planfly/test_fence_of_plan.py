@@ -7,7 +7,7 @@ import pytest
 
 from flight.mission.fences import fence_shapes
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.fence_of_plan import fence_of_plan
+from planfly.fence_of_plan import fence_of_plan
 from logs.verdict.judge_flight import judge_geometry
 from tests.mission_lines import setup_of, wp
 

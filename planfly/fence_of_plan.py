@@ -4,10 +4,7 @@ from flight.mission.fence_zones import fence_zones
 from flight.mission.fences import with_fences
 from flight.mission.items import Mission, MissionItem
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.measures.path_moves import planned_moves
-from logs.verdict.measures.route_demands import route_demands
-from logs.verdict.measures.zone_visits import path_zones
-from world.airspace.zone_kernels import zone_records
+from logs.verdict.rules.fence_rule import is_entered
 
 
 def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
@@ -21,11 +18,8 @@ def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     >>> [item.command for item in mission.fences]  # the area; the example has no missiles
     [5001, 5001, 5001, 5001]
     """
-    scenario = setup.scenario
-    moves = planned_moves(route_demands(setup, envelope=False))
 
     def passes(shape: tuple[MissionItem, ...]) -> bool:
-        records = zone_records(fence_zones(shape, scenario.origin))
-        return bool((path_zones(moves, records, None)["depth"] > 0.0).any())
+        return any(is_entered(setup, zone) for zone in fence_zones(shape, setup.scenario.origin))
 
-    return with_fences(setup.mission, scenario, passes)
+    return with_fences(setup.mission, setup.scenario, passes)
