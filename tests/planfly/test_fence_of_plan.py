@@ -7,8 +7,8 @@ import pytest
 
 from flight.mission.fences import fence_shapes
 from flight.simulation.flight_setup import FlightSetup
-from planfly.fence_of_plan import fence_of_plan
 from logs.verdict.judge_flight import judge_geometry
+from planfly.fence_of_plan import fence_of_plan
 from tests.mission_lines import setup_of, wp
 
 # North 1500 m, then east: the fly-by arc of 90 degrees cuts the corner by some 50 m.

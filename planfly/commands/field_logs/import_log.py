@@ -31,8 +31,9 @@ def _write(target: Path, flight: ImportedFlight) -> None:
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         path = Path(folder) / target.name
         with Recorder(path, flight.setup) as recorder:
-            recorder.write(flight.track)
+            # Before the rows, so that each stands in the log where it happened.
             for event in flight.events:
                 recorder.event(event.time, event.text, event.level)
+            recorder.write(flight.track)
             recorder.finish(flight.ended, flight.verdict)
         path.replace(target)
