@@ -61,12 +61,8 @@ def test_names_stand_above_the_ground() -> None:
     assert [text.text for text in entity.texts] == list(threats.names)
     for text in entity.texts:
         place = text.pose.position
-        around = [
-            float(terrain.height(place.x + dx, place.y + dy))
-            for dx in range(-200, 201, 50)
-            for dy in range(-200, 201, 50)
-        ]
-        assert place.z > max(around)
+        east, north = np.meshgrid(place.x + np.arange(-200.0, 201.0, 50.0), place.y + np.arange(-200.0, 201.0, 50.0))
+        assert place.z > terrain.height(east, north).max()
     free = SceneUpdate.FromString(threats_scene(EPOCH_NS, threats, None)).entities[0]
     assert [text.pose.position.z for text in free.texts] == [pytest.approx(up + 40.0) for up in threats.position[:, 2]]
 

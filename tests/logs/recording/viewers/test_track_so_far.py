@@ -1,5 +1,7 @@
 """The track so far stays small, begins and ends where it does, and keeps to what was flown."""
 
+import itertools
+
 import numpy as np
 import pytest
 from shapely import LineString, Point
@@ -33,6 +35,6 @@ def test_thinning_keeps_ends_and_the_count(wanted: int) -> None:
 
 def test_points_on_straight_ways_go_first() -> None:
     square = np.array([[0.0, 0.0], [9.0, 0.0], [9.0, 9.0], [0.0, 9.0]])
-    way = np.concatenate([np.linspace(a, b, 10, endpoint=False) for a, b in zip(square[:-1], square[1:], strict=True)])
+    way = np.concatenate([np.linspace(a, b, 10, endpoint=False) for a, b in itertools.pairwise(square)])
     points = np.column_stack([np.vstack([way, square[-1:]]), np.zeros(31)])
     assert thinned(points, 4)[:, :2].tolist() == square.tolist()
