@@ -245,7 +245,11 @@ def _add_replay_and_recover(command: _Command) -> None:
     replay.add_argument(
         "--movie", metavar="FILE|DIR", help="draw it: FILE.gif, FILE.mp4 (needs ffmpeg), or DIR for PNG frames"
     )
-    replay.add_argument("--foxglove", action="store_true", help="play it to Foxglove on this machine over WebSocket")
+    replay.add_argument(
+        "--foxglove", action="store_true",
+        help="play it to Foxglove on this machine over WebSocket; needs the extra planfly[foxglove], and a viewer that"
+        " speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
+    )  # fmt: skip
     replay.add_argument("--port", metavar="N", type=port, default=8765, help="of --foxglove (8765; 0: a free one)")
     overwrite_option(replay)
     recover = command(

@@ -47,7 +47,9 @@ def model_corners() -> Singles:
 
 def aircraft_glb() -> bytes:
     """The model as a `.glb` file: one unit wide, in glTF's axes (right-handed, y up), each part with its colour."""
-    pieces, views, accessors, primitives, materials = b"", [], [], [], []
+    pieces = b""
+    views: list[dict[str, Any]] = []
+    accessors, primitives, materials = [], [], []
     for triangles, colour in _PARTS:
         forward_left_up = np.array(triangles, dtype=np.float32).reshape(-1, 3)
         points = np.stack([forward_left_up[:, 0], forward_left_up[:, 2], -forward_left_up[:, 1]], axis=1)

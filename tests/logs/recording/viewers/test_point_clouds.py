@@ -50,6 +50,7 @@ def test_rerun_has_something_to_open_a_3d_view_with(shown: dict[str, list[dict[s
     (aircraft,) = shown["/points/aircraft"]
     assert frame(aircraft) == "aircraft"
     assert np.ptp(points(aircraft)[:, 1]) == pytest.approx(100.0, abs=0.2)
+    assert "half way up" in [text for row in shown["/log"] for text in row["TextLog:text"]]
     poses = shown["/tf"]
     assert len(poses) > 30
     assert (poses[0]["Transform3D:parent_frame"], poses[0]["Transform3D:child_frame"]) == (["map"], ["aircraft"])
