@@ -1,7 +1,7 @@
 """``planfly replay --foxglove``: a log played to Foxglove over a WebSocket that only this machine reaches.
 
-The server is foxglove-sdk's: it speaks the WebSocket subprotocol `foxglove.sdk.v1` alone, and refuses a viewer that asks
-for its older name `foxglove.websocket.v1`.
+The server is foxglove-sdk's: it speaks the WebSocket subprotocol `foxglove.sdk.v1` alone, and refuses a viewer that
+asks for its older name `foxglove.websocket.v1`.
 """
 
 import argparse
