@@ -285,6 +285,7 @@ def test_an_upload_of_float_items_is_taken_and_said_to_be_inexact() -> None:
     first, second = server.lists[MissionType.MISSION]
     # 46.25 and 8 are floats; of -46.3 the nearest is -46.299999237...
     assert (first.x, first.y, second.x, first.params) == (462_500_000, 80_000_000, -462_999_992, (0.0, 12.0, 0.0, 0.0))
+    assert (first.lon_deg, second.lat_deg) == (8.0, -46.2999992), "on the grid of 1e-7 degrees"
     send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), ONE, 5.0)
     assert send(server, float_item(0, 90.5), ONE, 5.0)[0].message.type == mavlink.MAV_MISSION_INVALID_PARAM5_X
 

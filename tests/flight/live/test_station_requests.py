@@ -3,7 +3,7 @@
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.flight_process import JudgeMission
+from flight.live.flight_process import FlightEnded, JudgeMission, StartFlight, send_event
 from flight.live.mavlink_items import MissionType
 from tests.flight.live.fake_vehicle import HEARTBEAT, FakeVehicle, command
 from tests.stations import item
@@ -88,6 +88,20 @@ def test_a_mission_starts_at_the_item_that_a_station_sets(fake: FakeVehicle) -> 
     fake.send(command(224, 2.0))
     fake.turn()
     fake.upload(ITEMS)
+    assert [one.seq for one in fake.orders[-1].mission.items] == [1, 2, 3, 4]
+
+
+def test_after_a_flight_from_an_item_the_whole_mission_is_flown_again(fake: FakeVehicle) -> None:
+    fake.upload(ITEMS)
+    fake.send(command(224, 3.0))
+    fake.turn()
+    fake.send(command(400, 1.0), command(176, 1.0, 10.0))
+    assert fake.vehicle.arming.flying
+    assert isinstance(fake.orders[-1], StartFlight)
+    send_event(fake.flight, FlightEnded("completed"))
+    fake.vehicle.step(0.1)
+    fake.turn()
+    fake.turn()
     assert [one.seq for one in fake.orders[-1].mission.items] == [1, 2, 3, 4]
 
 

@@ -114,3 +114,11 @@ def test_a_scenario_without_zones_says_nothing_of_them() -> None:
     plan = planned()
     mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: False)
     assert (len(mission.fences), notes) == (4, ())
+
+
+def test_what_is_to_be_stayed_in_is_never_left_out() -> None:
+    """Whatever is said to be passed: only exclusions are."""
+    plan = planned(**TABLES)
+    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: True)
+    assert [item.command for item in mission.fences] == [5001] * 8
+    assert any("above or below: mast;" in note for note in notes)
