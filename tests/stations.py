@@ -139,16 +139,16 @@ class Medium:
 
 
 class UdpStation:
-    """A ground station over UDP that sends a heartbeat each second while it waits."""
+    """A ground station over UDP that sends a heartbeat each second while it waits, unless it is ``mute``."""
 
-    def __init__(self, vehicle: int, system: int = 255, port: int = 0) -> None:
+    def __init__(self, vehicle: int, system: int = 255, port: int = 0, *, mute: bool = False) -> None:
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", port))
         self.socket.settimeout(0.01)
         self.to = ("127.0.0.1", vehicle)
         self.mav, self.parser = mavlink.MAVLink(None, system, 190), mavlink.MAVLink(None)
         self.log: list[Any] = []
-        self._beat = -math.inf
+        self._beat = math.inf if mute else -math.inf
 
     def __enter__(self) -> "UdpStation":
         return self

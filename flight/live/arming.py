@@ -11,6 +11,7 @@ from flight.live.telemetry import ACTIVE, AUTO, COMPLETE, LOITER, MANUAL, MODE_N
 _FORCED = (21196, 2989)
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED
 IN_PROGRESS, UNSUPPORTED = mavlink.MAV_RESULT_IN_PROGRESS, mavlink.MAV_RESULT_UNSUPPORTED
+REJECTED = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,9 @@ class ArmingState:
         if reason:
             return CommandResult(DENIED, f"arming denied: {reason}")
         self.armed = True
-        return CommandResult(ACCEPTED, "" if self.mode == AUTO else "armed: AUTO starts the mission")
+        if self.mode == AUTO:
+            return CommandResult(ACCEPTED)
+        return CommandResult(ACCEPTED, "armed: AUTO starts the mission" if self.judged else "armed: no mission yet")
 
     def set_mode(self, mode: int) -> CommandResult:
         """Change to one of ArduPlane's modes."""
@@ -141,4 +144,4 @@ class ArmingState:
         return ""
 
 
-__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "UNSUPPORTED", "ArmingState", "CommandResult"]
+__all__ = ["ACCEPTED", "DENIED", "IN_PROGRESS", "LOITER", "REJECTED", "UNSUPPORTED", "ArmingState", "CommandResult"]

@@ -1,7 +1,8 @@
 """The vehicle's link: one UDP socket, and the stations that it talks to.
 
-A station gets more than heartbeats only after it has sent a valid HEARTBEAT, from an address that is allowed, and
-signed where a key is set.  The table of stations is bounded; one that falls silent leaves it.
+A station gets more than heartbeats only after it has sent a valid HEARTBEAT, or on this machine whatever is addressed
+to the vehicle, from an address that is allowed, and signed where a key is set.  The table of stations is bounded; one
+that falls silent leaves it.
 """
 
 import ipaddress
@@ -26,6 +27,8 @@ SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
 MOST_PEERS = 16
 # A station that has sent no heartbeat for so long is gone, s.
 SILENCE = 15.0
+# Strangers that the log names.
+_MOST_NAMED = 16
 # Datagrams handled before telemetry has its turn again.
 _MOST_AT_ONCE = 200
 
@@ -59,8 +62,8 @@ class Dropped:
 
     address: from an address that is not allowed, datagrams.  unsigned, forged: without a signature, and with one that
     the key did not make.  replayed: signed by the key, and no newer than one before it in its stream.  old: the first
-    of a stream, and from more than a minute ago.  streams: of more streams than are kept.  stranger: from nobody that
-    has sent a HEARTBEAT.  others: to another system, or from ours.
+    of a stream, and from more than a minute ago.  streams: of more streams than are kept.  stranger: from another
+    machine, and nobody that has sent a HEARTBEAT.  others: to another system, or from ours.
     """
 
     address: int = 0
@@ -135,6 +138,8 @@ class Link:
         self.clock, self._wall = clock or RunningClock(), wall
         self._signing = Signing(access.key) if access.key is not None else None
         self._decoder = Decoder()
+        self._strangers: set[str] = set()
+        self._notices: list[str] = []
         self._hello = {address: mavlink.MAVLink(None, SYSTEM, COMPONENT) for address in access.to}
         family = socket.AF_INET6 if ":" in access.bind[0] else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
@@ -191,15 +196,33 @@ class Link:
             if message is None:
                 continue
             peer = self.peers.get(source)
-            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            if frame.number == mavlink.MAVLINK_MSG_ID_HEARTBEAT or self._is_asked_here(message, source):
                 peer = self._heard(source, frame.system, frame.component)
             if peer is None:
                 self.dropped.stranger += 1
+                self._name_stranger(message, source[0])
             elif not self._for_us(message):
                 self.dropped.others += 1
             else:
                 peer.system, peer.component = frame.system, frame.component
                 found.append((message, peer))
+        return found
+
+    def _is_asked_here(self, message: Any, source: Address) -> bool:
+        """Whether somebody on this machine, who need not send heartbeats, addresses the vehicle."""
+        return is_loopback(source[0]) and getattr(message, "target_system", 0) == SYSTEM and self._for_us(message)
+
+    def _name_stranger(self, message: Any, host: str) -> None:
+        """Have it said once that an address is not answered, and why."""
+        if host in self._strangers or len(self._strangers) >= _MOST_NAMED or not self._for_us(message):
+            return
+        self._strangers.add(host)
+        full = "" if len(self.peers) < MOST_PEERS else f", and {MOST_PEERS} stations are served already"
+        self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
+
+    def notices(self) -> list[str]:
+        """What is to be said, since the last call, of who is not answered."""
+        found, self._notices = self._notices, []
         return found
 
     def _count(self, reason: Refused) -> None:

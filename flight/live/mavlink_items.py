@@ -1,14 +1,14 @@
-"""Mission items on the wire: MISSION_ITEM_INT made and parsed (MAVLink mission protocol).
+"""Mission items on the wire: MISSION_ITEM_INT made and parsed, MISSION_ITEM parsed (MAVLink mission protocol).
 
-Only the INT form: the float MISSION_ITEM moves a waypoint by up to 0.3 m.  pymavlink is imported when a message is
-made, so that reading files does not wait for it.
+Made in the INT form alone: the float MISSION_ITEM moves a waypoint by up to 0.5 m.  pymavlink is imported when a
+message is made, so that reading files does not wait for it.
 """
 
 import math
 from enum import IntEnum
 from typing import Any
 
-from flight.mission.items import FENCES, Command, MissionItem, is_located, item_problem
+from flight.mission.items import FENCES, Command, MissionItem, is_located, item_problem, on_grid
 from world.errors import MissionError
 
 _INT32_MAX = 2**31 - 1
@@ -41,6 +41,10 @@ def to_message(
     """MISSION_ITEM_INT of an item: x and y are rounded to 1e-7 degrees, never truncated.
 
     seq: None keeps the item's own number.  mission_type: None takes the one of its command.
+
+    >>> message = to_message(MissionItem(3, 16, 0, (0.0,) * 4, 46.0, 8.0, 500.0))
+    >>> message.get_type(), message.seq, message.x
+    ('MISSION_ITEM_INT', 3, 460000000)
     """
     from pymavlink.dialects.v20 import common
 
@@ -61,13 +65,18 @@ def to_message(
 
 
 def from_message(message: Any, source: str) -> MissionItem:
-    """Item of a MISSION_ITEM_INT message; ``source`` names the sender in messages.
+    """Item of a MISSION_ITEM_INT or MISSION_ITEM message; ``source`` names the sender in messages.
 
-    INT32_MAX in x or y is NaN (MAVLink's "unset").  Raises MissionError, one line: item, field, value, what is allowed.
+    INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude go to the nearest
+    1e-7 degrees.  Raises MissionError, one line: item, field, value, what is allowed.
     """
     command, frame = int(message.command), int(message.frame)
-    scale = 1e7 if is_located(command, frame) else 1.0
-    lat, lon = (math.nan if value == _INT32_MAX else value / scale for value in (message.x, message.y))
+    located = is_located(command, frame)
+    if message.get_type() == "MISSION_ITEM":
+        lat, lon = (on_grid(value) if located else value + 0.0 for value in (message.x, message.y))
+    else:
+        scale = 1e7 if located else 1.0
+        lat, lon = (math.nan if value == _INT32_MAX else value / scale for value in (message.x, message.y))
     params = tuple(float(value) for value in (message.param1, message.param2, message.param3, message.param4))
     p1, p2, p3, p4 = (value + 0.0 for value in params)
     item = MissionItem(

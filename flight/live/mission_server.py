@@ -26,9 +26,15 @@ RETRY, SLOWEST_RETRY = 0.05, 0.4
 CONFIRMATIONS, CONFIRM = 4, 0.4
 # A last item that comes twice within this time is a duplicate and gets no ACK again: that would end the next upload, s.
 ACK_AGAIN = 0.3
+# So many requests for a first item that nobody answers are followed by those of before MISSION_REQUEST_INT.
+_OLD_REQUESTS = 4
 # After this silence another station may take over; after the longer one the upload is given up, s.
 LOCK, UPLOAD_TIMEOUT = 1.0, 8.0
 
+# `current` of an item that is no mission's but a place to fly to now, or a height to take.
+_GUIDED = (2, 3)
+_NO_GUIDED = "go-to refused: this vehicle flies its mission alone; upload the way as a mission"
+_FLOATS = "the upload came as MISSION_ITEM, whose positions are floats: up to 0.5 m off; MISSION_ITEM_INT is exact"
 _FENCE_RETURN = 5000
 _ALLOWED = {
     MissionType.FENCE: FENCES | {_FENCE_RETURN},
@@ -61,6 +67,7 @@ class _Upload:
 
     heard: when it last sent something; first_asked, asked: when the item that is due was first and last asked for, s of
     the caller's clock.  wait: how long to wait for it, s.  repeated: whether any request had to be sent again.
+    asked_in_vain: how often the first item was, before any came.  floats: whether items come as MISSION_ITEM.
     """
 
     station: Station
@@ -70,6 +77,8 @@ class _Upload:
     first_asked: float
     wait: float = RETRY
     repeated: bool = False
+    asked_in_vain: int = 0
+    floats: bool = False
     items: list[MissionItem] = field(default_factory=list)
 
 
@@ -105,7 +114,7 @@ class MissionServer:
 
     def handle(self, message: Any, station: Station, now: float) -> list[MissionReply]:
         """Answer a message of the protocol; any other gets nothing.  ``now``: s, any clock that never goes back."""
-        if message.get_type() in _HANDLERS and message.get_type() != "MISSION_ITEM_INT":
+        if message.get_type() in _HANDLERS and message.get_type() not in _ITEMS:
             self._moved_on(station)
         try:
             kind = MissionType(getattr(message, "mission_type", 0))
@@ -131,6 +140,7 @@ class MissionServer:
             elif now - upload.asked >= upload.wait:
                 upload.wait = min(2.0 * upload.wait, SLOWEST_RETRY)
                 upload.repeated = True
+                upload.asked_in_vain += not upload.items
                 replies.append(self._request(upload, kind, now))
         for kind, done in self._finished.items():
             if done.left > 0 and now - done.asked >= CONFIRM:
@@ -157,6 +167,8 @@ class MissionServer:
 
     def _item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         upload = self._uploads.get(kind)
+        if message.current in _GUIDED and (upload is None or upload.station != station):
+            return [self._ack(station, mavlink.MAV_MISSION_UNSUPPORTED, kind, _NO_GUIDED)]
         if upload is None or upload.station != station:
             done = self._finished.get(kind)
             known = done is not None and (done.station, done.count) == (station, message.seq + 1)
@@ -177,6 +189,7 @@ class MissionServer:
         if wrong:
             return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, wrong)]
         upload.items.append(item)
+        upload.floats = message.get_type() == "MISSION_ITEM"
         upload.wait = min(max(RETRY, 1.5 * (now - upload.first_asked)), SLOWEST_RETRY)
         upload.first_asked = now
         if len(upload.items) < upload.count:
@@ -185,14 +198,8 @@ class MissionServer:
         self.lists[kind] = tuple(upload.items)
         self.changed.add(kind)
         self._finished[kind] = _Finished(station, upload.count, now, now, CONFIRMATIONS if upload.repeated else 0)
-        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind)]
-
-    def _float_item(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
-        upload = self._uploads.get(kind)
-        if upload is None or upload.station != station:
-            return []
-        text = "MISSION_ITEM carries positions as floats, up to 0.3 m off: MISSION_ITEM_INT is expected"
-        return [self._fail(upload, kind, mavlink.MAV_MISSION_UNSUPPORTED, text)]
+        floats = message.get_type() == "MISSION_ITEM"
+        return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, kind, _FLOATS if floats else "")]
 
     def _list(self, _message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
         count = len(self.lists[kind])
@@ -231,11 +238,16 @@ class MissionServer:
                 self.changed.add(kind)
         return [self._ack(station, mavlink.MAV_MISSION_ACCEPTED, named)]
 
-    def _stopped(self, message: Any, station: Station, kind: MissionType, _now: float) -> list[MissionReply]:
+    def _stopped(self, message: Any, station: Station, kind: MissionType, now: float) -> list[MissionReply]:
         """Let a station that gives up (MISSION_ACK with an error) free the lock."""
         upload = self._uploads.get(kind)
-        if upload is not None and upload.station == station and message.type != mavlink.MAV_MISSION_ACCEPTED:
-            del self._uploads[kind]
+        if upload is None or upload.station != station or message.type == mavlink.MAV_MISSION_ACCEPTED:
+            return []
+        if message.type == mavlink.MAV_MISSION_UNSUPPORTED and upload.asked_in_vain >= _OLD_REQUESTS:
+            # It knows MISSION_REQUEST_INT alone, and did not get those.
+            upload.asked_in_vain = 0
+            return [self._request(upload, kind, now)]
+        del self._uploads[kind]
         return []
 
     def _moved_on(self, station: Station) -> None:
@@ -258,6 +270,8 @@ class MissionServer:
 
     def _request(self, upload: _Upload, kind: MissionType, now: float) -> MissionReply:
         upload.asked = now
+        if upload.asked_in_vain >= _OLD_REQUESTS or upload.floats:
+            return _request(upload.station, len(upload.items), kind, mavlink.MAVLink_mission_request_message)
         return _request(upload.station, len(upload.items), kind)
 
     def _fail(self, upload: _Upload, kind: MissionType, result: int, text: str) -> MissionReply:
@@ -269,9 +283,10 @@ class MissionServer:
         return MissionReply(station, message, text)
 
 
-def _request(station: Station, seq: int, kind: MissionType) -> MissionReply:
-    message = mavlink.MAVLink_mission_request_int_message(station.system, station.component, seq, int(kind))
-    return MissionReply(station, message)
+def _request(
+    station: Station, seq: int, kind: MissionType, form: Any = mavlink.MAVLink_mission_request_int_message
+) -> MissionReply:
+    return MissionReply(station, form(station.system, station.component, seq, int(kind)))
 
 
 def _misplaced(item: MissionItem, kind: MissionType) -> str:
@@ -282,17 +297,19 @@ def _misplaced(item: MissionItem, kind: MissionType) -> str:
 
 def _result_of(message: Any) -> int:
     """MAV_MISSION_RESULT for an item that `from_message` refused: which number it was about."""
-    if abs(message.x) > 900_000_000:
+    degree = 1.0 if message.get_type() == "MISSION_ITEM" else 1e7
+    if abs(message.x) > 90.0 * degree:
         return int(mavlink.MAV_MISSION_INVALID_PARAM5_X)
-    if abs(message.y) > 1_800_000_000:
+    if abs(message.y) > 180.0 * degree:
         return int(mavlink.MAV_MISSION_INVALID_PARAM6_Y)
     return int(mavlink.MAV_MISSION_INVALID)
 
 
+_ITEMS = ("MISSION_ITEM_INT", "MISSION_ITEM")
 _HANDLERS = {
     "MISSION_COUNT": MissionServer._count,
     "MISSION_ITEM_INT": MissionServer._item,
-    "MISSION_ITEM": MissionServer._float_item,
+    "MISSION_ITEM": MissionServer._item,
     "MISSION_REQUEST_LIST": MissionServer._list,
     "MISSION_REQUEST_INT": MissionServer._wanted,
     "MISSION_REQUEST": MissionServer._wanted,

@@ -39,7 +39,13 @@ def _is_home(item: MissionItem) -> bool:
 
 
 def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
-    """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets."""
+    """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets.
+
+    >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> items, fences, rally = listed(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
+    >>> [item.seq for item in items], fences, rally
+    ([0, 1, 2], (), ())
+    """
     home = mission.home
     first = MissionItem(0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, 0.0, 0.0, 0.0)
     if home is not None:
@@ -56,3 +62,31 @@ def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
         tuple(replace(item, seq=k) for k, item in enumerate(mission.fences)),
         tuple(replace(item, seq=k) for k, item in enumerate(mission.rally)),
     )
+
+
+def start_problem(mission: Mission, first: int) -> str:
+    """Why a mission cannot be flown from the item of this seq on; "" if it can.
+
+    >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
+    >>> start_problem(way, 2), start_problem(way, 3)
+    ('', 'from there on no leg is left to fly')
+    """
+    if not mission.items or not 0 <= first <= mission.items[-1].seq:
+        return "the mission has no such item"
+    places = [item for item in mission.items if item.seq >= first and item.has_position]
+    return "" if first <= mission.items[0].seq or len(places) > 1 else "from there on no leg is left to fly"
+
+
+def flown_from(mission: Mission, first: int) -> Mission:
+    """Mission from the item of this seq on, at the speed that the items before it have set; its numbers are kept.
+
+    >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    >>> way = Mission(None, (place, speed, replace(place, seq=3), replace(place, seq=4)))
+    >>> [item.seq for item in flown_from(way, 4).items], flown_from(way, 1) == way
+    ([2, 4], True)
+    """
+    before = [item for item in mission.items if item.seq < first]
+    speeds = [item for item in before if item.command == Command.DO_CHANGE_SPEED][-1:]
+    return replace(mission, items=(*speeds, *(item for item in mission.items if item.seq >= first)))

@@ -44,11 +44,15 @@ class _Waiting:
 
 @dataclass(slots=True)
 class Requests:
-    """Answers requests with messages for the station, and texts for all of them."""
+    """Answers requests with messages for the station, and texts for all of them.
+
+    start_at: has the next flight start at an item, by the station's number.
+    """
 
     arming: ArmingState
     parameters: Parameters
     status: Status
+    start_at: Callable[[int], CommandResult]
     _waiting: list[_Waiting] = field(default_factory=list)
 
     def handle(self, message: Any, peer: Peer, now: float) -> list[Response]:
@@ -90,8 +94,8 @@ class Requests:
         if number == mavlink.MAV_CMD_DO_PAUSE_CONTINUE:
             return self.arming.pause(message.param1 == 1)
         if number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT:
-            return self._set_current(_whole(message.param1))
-        return CommandResult(UNSUPPORTED)
+            return self.start_at(_whole(message.param1))
+        return CommandResult(UNSUPPORTED, _NOT_FLOWN.get(number, ""))
 
     def _message_command(self, number: int, message: Any, peer: Peer, now: float) -> tuple[CommandResult, list[Any]]:
         named = _MESSAGE_COMMANDS[number]
@@ -136,16 +140,17 @@ class Requests:
         number = mavlink.MAVLINK_MSG_ID_SET_MODE
         return self._answered(peer, message.get_srcSystem(), message.get_srcComponent(), number, reply)
 
-    def _mission_set_current(self, message: Any, peer: Peer, _now: float) -> list[Response]:
-        reply = self._set_current(int(message.seq))
-        found: list[Response] = [StatusText(reply.text, WARNING)] if reply.text else []
-        return [*found, PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
+    def _mission_set_current(self, message: Any, peer: Peer, now: float) -> list[Response]:
+        reply = self.start_at(int(message.seq))
+        if reply.result == ACCEPTED:
+            return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
+        # The message has no refusal, and MAVSDK asks again, without end, at each MISSION_CURRENT of another item: it
+        # gives up when it gets none for as long as it tries.
+        peer.due["MISSION_CURRENT"] = now + _QUIET
+        return [StatusText(reply.text, WARNING)]
 
-    def _set_current(self, seq: int) -> CommandResult:
-        """Accept the first item, which is where every flight starts."""
-        if self.arming.judged is not None and not self.arming.flying and seq in (0, 1):
-            return CommandResult(ACCEPTED)
-        return CommandResult(DENIED, f"item {seq}: a mission is flown from its first item to its last")
+    def _go_to(self, _message: Any, _peer: Peer, _now: float) -> list[Response]:
+        return [StatusText(_NO_GUIDED, WARNING)]
 
     def _list_parameters(self, _message: Any, peer: Peer, _now: float) -> list[Response]:
         peer.parameter = 0.0
@@ -181,7 +186,7 @@ class Requests:
         ack = mavlink.MAVLink_command_ack_message(number, reply.result, 0, 0, system, component)
         replies: list[Response] = [PeerMessage(peer, ack)]
         if reply.text:
-            replies.append(StatusText(reply.text, WARNING if reply.result == DENIED else INFO))
+            replies.append(StatusText(reply.text, INFO if reply.result in (ACCEPTED, IN_PROGRESS) else WARNING))
         return replies
 
 
@@ -190,6 +195,20 @@ def _whole(value: float) -> int:
     return int(value) if math.isfinite(value) and 0 <= value < 2**24 else -1
 
 
+# After a refused MISSION_SET_CURRENT a station gets no MISSION_CURRENT for this time, s.
+_QUIET = 3.0
+_NO_GUIDED = "go-to refused: this vehicle flies its mission alone; upload the way as a mission"
+# Commands to an aircraft that this one, which flies a mission as it was judged, is not flown by; and what to do.
+_NOT_FLOWN: dict[int, str] = {
+    mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL refused: a forced disarm ends the flight; a mission may end with RTL",
+    mavlink.MAV_CMD_DO_REPOSITION: _NO_GUIDED,
+    mavlink.MAV_CMD_DO_ORBIT: "orbit refused: put a loiter into the mission",
+    mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "height change refused: put the height into the mission",
+    mavlink.MAV_CMD_NAV_TAKEOFF: "take-off refused: put NAV_TAKEOFF into the mission and start it",
+    mavlink.MAV_CMD_NAV_LAND: "landing refused: put NAV_LAND into the mission and start it",
+    mavlink.MAV_CMD_DO_SET_HOME: "home refused: it is item 0 of the mission",
+}
 _ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 # Commands about messages; those that ask for one message by their own number name it.
 _MESSAGE_COMMANDS: dict[int, int | None] = {
@@ -204,6 +223,8 @@ _HANDLERS: dict[str, Callable[[Requests, Any, Peer, float], list[Response]]] = {
     "COMMAND_INT": Requests._command,
     "SET_MODE": Requests._set_mode,
     "MISSION_SET_CURRENT": Requests._mission_set_current,
+    "SET_POSITION_TARGET_GLOBAL_INT": Requests._go_to,
+    "SET_POSITION_TARGET_LOCAL_NED": Requests._go_to,
     "REQUEST_DATA_STREAM": Requests._streams,
     "PARAM_REQUEST_LIST": Requests._list_parameters,
     "PARAM_REQUEST_READ": Requests._read_parameter,

@@ -7,9 +7,7 @@ from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
-from flight.live.arming import ArmingState
+from flight.live.arming import ACCEPTED, DENIED, REJECTED, ArmingState, CommandResult
 from flight.live.downlink import Downlink, ShowText
 from flight.live.flight_process import (
     EndFlight,
@@ -25,13 +23,14 @@ from flight.live.flight_process import (
 )
 from flight.live.link import Link, Peer
 from flight.live.mavlink_items import MissionType
+from flight.live.mission_progress import MissionProgress
 from flight.live.mission_server import MissionServer, Station
 from flight.live.parameters import Parameters
 from flight.live.snapshot import Snapshot
-from flight.live.station_missions import listed, uploaded
+from flight.live.station_missions import flown_from, listed, start_problem, uploaded
 from flight.live.station_requests import Requests, Response
 from flight.live.status_text import CRITICAL, INFO, WARNING, StatusText
-from flight.live.telemetry import ACTIVE, COMPLETE, Status, telemetry_message
+from flight.live.telemetry import Status
 from flight.mission.items import Home, Mission, MissionItem
 
 # Longest wait for the network or the flight, s.
@@ -76,7 +75,7 @@ class Vehicle:
         self.arming = ArmingState()
         self.status = Status(standby.snapshot, standby.home, battery=battery)
         self.down = Downlink(link, self.status, parameters, show, _NAP)
-        self.requests = Requests(self.arming, parameters, self.status)
+        self.requests = Requests(self.arming, parameters, self.status, self._start_at)
         self._standby = standby
         self._spawn = spawn
         # In a row, without being ready in between.
@@ -87,12 +86,13 @@ class Vehicle:
         self._show = show
         self._clock = link.clock
         self._born = self._clock()
-        # Which mission is judged or flown: the item at each waypoint, and what to add to it for the station's number.
+        # Which mission is judged or flown.
         self._number = 0
         self._outstanding = self._brief = False
+        # The upload in which the item that the next flight starts at was chosen.
+        self._chosen_in: tuple[MissionItem, ...] = ()
         self._last_text, self._last_text_at = "", 0.0
-        self._shift = 0
-        self._leg = -1
+        self._progress = MissionProgress(self.server, self.arming, self.status, self.down)
 
     def load(self, mission: Mission) -> None:
         """Take a mission from a file, as if a station had uploaded it."""
@@ -133,6 +133,8 @@ class Vehicle:
         if self.link in readable:
             for message, peer in self.link.receive():
                 self._from_station(message, peer, now)
+            for notice in self.link.notices():
+                self._show(notice)
         for reply in self.server.tick(now):
             self._send_reply(reply.station, reply.message, reply.text)
         self._changes()
@@ -177,7 +179,7 @@ class Vehicle:
             self._order(EndFlight())
         if self.arming.starts:
             self.arming.flight_started()
-            self._leg = -1
+            self._progress.started()
             self.down.send_text("mission started")
             self._order(StartFlight())
         self._refresh()
@@ -199,13 +201,31 @@ class Vehicle:
             self._pass_on(self.requests.verdict_came())
             self._refresh()
             return
-        mission, self._shift = uploaded(self.server.lists, self._standby.home)
+        if self.server.lists[MissionType.MISSION] is not self._chosen_in:
+            self._progress.first = 0
+        mission, self._progress.shift = uploaded(self.server.lists, self._standby.home)
+        mission = flown_from(mission, self._progress.first - self._progress.shift)
         # A fence or rally points that are changed need not repeat the texts about the mission.
         self._brief = MissionType.MISSION not in changed and (self._brief or not self.arming.judging)
         self.arming.mission_uploaded()
         self._outstanding = True
         self._order(JudgeMission(mission, self._number))
         self._refresh()
+
+    def _start_at(self, seq: int) -> CommandResult:
+        """Have the next flight start at an item, by the station's number: it is judged as what is flown."""
+        if self.arming.flying:
+            return CommandResult(REJECTED, f"item {seq} refused: in flight the mission is flown as it stands")
+        mission, shift = uploaded(self.server.lists, self._standby.home)
+        problem = start_problem(mission, seq - shift)
+        if problem:
+            return CommandResult(DENIED, f"item {seq} refused: {problem}")
+        first = 0 if seq - shift <= mission.items[0].seq else seq
+        if first != self._progress.first:
+            self._progress.first, self._chosen_in = first, self.server.lists[MissionType.MISSION]
+            self.server.changed.add(MissionType.MISSION)
+            self._changes()
+        return CommandResult(ACCEPTED)
 
     def _order(self, order: Order) -> None:
         try:
@@ -238,7 +258,7 @@ class Vehicle:
         if isinstance(event, Snapshot):
             if event.finite:
                 self.status.snapshot = event
-                self._progress(int(event.leg))
+                self._progress.on_leg(int(event.leg))
         elif isinstance(event, MissionJudged):
             self._judged(event)
         elif isinstance(event, FlightEnded):
@@ -266,44 +286,22 @@ class Vehicle:
             self.down.send_text(disarmed, WARNING)
         if judged.start is not None and judged.home is not None:
             self.status.snapshot, self.status.home = judged.start, judged.home
-        self.status.current = self._item(0)
+        self._progress.at_start()
         self._pass_on(self.requests.verdict_came())
         self._after_command()
 
     def _ended(self, ended: str) -> None:
         completed = ended == "completed"
-        if completed and self.arming.judged is not None:
-            self._reached(len(self.arming.judged.items) - 1)
+        if completed:
+            self._progress.completed()
         self.arming.flight_ended(completed)
         self._refresh()
         self.down.send_text(f"flight {ended}; disarmed", INFO if completed else CRITICAL)
-        self.down.send_to_all(telemetry_message("MISSION_CURRENT", self.status))
-
-    def _progress(self, leg: int) -> None:
-        """Send the waypoints that were reached since the last snapshot."""
-        if leg == self._leg or leg < 0:
-            return
-        for waypoint in range(max(0, self._leg + 1), leg + 1):
-            self._reached(waypoint)
-        self._leg = leg
-        self.status.current = self._item(leg + 1)
-        self.down.send_to_all(telemetry_message("MISSION_CURRENT", self.status))
-
-    def _reached(self, waypoint: int) -> None:
-        items = self._items()
-        if not 0 <= waypoint < len(items) or items[waypoint] < 0:
-            return
-        self.down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
-
-    def _items(self) -> tuple[int, ...]:
-        """Seq of the item at each waypoint of the judged mission, -1 for none."""
-        return () if self.arming.judged is None else self.arming.judged.items
-
-    def _item(self, waypoint: int) -> int:
-        """Station's number of the item at a waypoint, or of the next that is one."""
-        items = self._items()
-        following = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
-        return following[0] + self._shift if following else 0
+        self._progress.send_current()
+        if self._progress.first:
+            # The next flight is of the whole mission again.
+            self._progress.first = 0
+            self.server.changed.add(MissionType.MISSION)
 
     def _refresh(self) -> None:
         arming, status = self.arming, self.status
@@ -312,7 +310,4 @@ class Vehicle:
             self.down.heartbeat_now()
         status.mode, status.armed, status.flying = arming.mode, arming.armed, arming.flying
         status.ready, status.mission_state = arming.armable or arming.armed, arming.mission_state
-        items = self.server.lists[MissionType.MISSION]
-        status.total = max(0, len(items) - 1) if items else 0
-        if arming.mission_state not in (ACTIVE, COMPLETE):
-            status.current = self._item(0) if arming.judged is not None else 0
+        self._progress.refresh()

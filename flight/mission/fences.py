@@ -1,14 +1,15 @@
 """Geofences and rally points: made of a scenario, grouped into shapes, and asked whether a position is allowed."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem
-from flight.mission.zone_fences import fence_item, zone_fences, zones_under
+from flight.mission.zone_fences import fence_item, zone_fences
+from world.airspace.zones import Zone, make_cylinder
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.scenario import Scenario
@@ -17,6 +18,9 @@ Floats = NDArray[np.float64]
 
 POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
 INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
+
+# Shapes that are left out, by their names in a note.
+_NAMED = 12
 
 
 def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list[tuple[MissionItem, ...]]:
@@ -73,17 +77,22 @@ def fence_problem(
     return None
 
 
-def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[str, ...]]:
+# Says whether a mission's path goes through a shape of a fence, given as its items, at any height.
+PassTest = Callable[[tuple[MissionItem, ...]], bool]
+
+
+def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple[Mission, tuple[str, ...]]:
     """Mission with a scenario's area, threats and zones as its fence, its own beside, the ends as rally points; notes.
 
     The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
-    no height: a plan that passes above or below the sphere passes through the cylinder.  Radars are no fence: being
-    detected is not forbidden.  Zones follow as `flight.mission.zone_fences` makes them.  Rally points are the first and
-    last position of the mission, at the mission's height over home.  The notes say, for people, what a fence cannot
-    hold, and what of it the mission itself violates.
+    no height.  Radars are no fence: being detected is not forbidden.  Zones follow as
+    `flight.mission.zone_fences` makes them.  What is to be kept out of and ``passes`` says that the mission passes, as
+    it does above or below it, is left out: an autopilot with such a fence refuses the mission or breaks it off.  Rally
+    points are the first and last position of the mission, at the mission's height over home.  The notes say, for
+    people, what a fence cannot hold, and what was left out for it.
 
     >>> from world.scenario import load_scenario
-    >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"))
+    >>> fenced, notes = with_fences(Mission(None, ()), load_scenario("tight"), lambda shape: False)
     >>> [len(shape) for shape in fence_shapes(fenced.fences)][:4]  # the area's corners, then a circle a missile
     [4, 1, 1, 1]
     >>> notes
@@ -92,23 +101,24 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
     (west, east), (south, north) = scenario.bounds
     corners = np.array([[west, south], [east, south], [east, north], [west, north]])
     fences = [fence_item(scenario.origin, Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, 4.0, point) for point in corners]
-    threats = scenario.threats
-    lost = []
-    for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True):
-        if radius > 0.0:
-            fences.append(fence_item(scenario.origin, Command.NAV_FENCE_CIRCLE_EXCLUSION, float(radius), position[:2]))
-            lost.append(str(name))
-    notes = []
-    if lost:
-        notes.append(
-            f"{len(lost)} missile spheres became exclusion circles: a fence has no height, so that each is a cylinder"
-        )
-    notes += _crossings(mission, fences, scenario.origin)
-    items, more = zone_fences(scenario.zones, scenario.origin)
+    missiles, crossed = _kept(_missile_zones(scenario), scenario.origin, passes)
+    zones, passed = _kept(scenario.zones, scenario.origin, passes)
+    fences += zone_fences(missiles, scenario.origin)[0]
+    items, of_zones = zone_fences(zones, scenario.origin)
     fences += items
-    notes += more
-    if scenario.zones:
-        notes += _passed_zones(mission, scenario)
+    notes = []
+    if missiles:
+        count = "1 missile sphere" if len(missiles) == 1 else f"{len(missiles)} missile spheres"
+        became = "became an exclusion circle" if len(missiles) == 1 else "became exclusion circles"
+        notes.append(f"{count} {became}: a fence has no height, so that each is a cylinder")
+    left_out = [*crossed, *passed]
+    if left_out:
+        names = ", ".join(left_out[:_NAMED]) + (f" and {len(left_out) - _NAMED} more" if len(left_out) > _NAMED else "")
+        notes.append(
+            f"left out of the fence, as the mission passes above or below: {names}; a fence has no height, and an"
+            " autopilot with it in its fence refuses the mission or breaks it off"
+        )
+    notes += of_zones
     if scenario.limits.max_height_m is not None:
         above = f"{scenario.limits.max_height_m:g} m above ground"
         notes.append(f"a fence does not follow the ground: the greatest height of {above} is not in it")
@@ -116,37 +126,25 @@ def with_fences(mission: Mission, scenario: Scenario) -> tuple[Mission, tuple[st
     return replace(mission, fences=every, rally=numbered(_rally(mission))), tuple(notes)
 
 
-def _crossings(mission: Mission, fences: list[MissionItem], origin: GeoOrigin) -> list[str]:
-    """A note if the mission's own legs pass through a circle of its fence."""
-    positions = [item for item in mission.items if item.has_position]
-    if len(positions) < 2:
-        return []
-    east, north = to_map(origin, [item.lat_deg for item in positions], [item.lon_deg for item in positions])
-    start = np.stack([east[:-1], north[:-1]], axis=1)
-    step = np.stack([np.diff(east), np.diff(north)], axis=1)
-    length2 = np.maximum((step**2).sum(axis=1), 1e-9)
-    crossed = 0
-    for item in fences:
-        if item.command == Command.NAV_FENCE_CIRCLE_EXCLUSION:
-            centre = np.array([float(value) for value in to_map(origin, item.lat_deg, item.lon_deg)])
-            share = np.clip(((centre - start) * step).sum(axis=1) / length2, 0.0, 1.0)
-            off = start + share[:, None] * step - centre
-            crossed += bool((np.hypot(off[:, 0], off[:, 1]) <= item.params[0]).any())
-    if not crossed:
-        return []
-    over = f"the mission passes through {crossed} of the exclusion circles, above or below the threat"
-    return [f"{over}: an autopilot with this fence refuses it or breaks off"]
+def _missile_zones(scenario: Scenario) -> list[Zone]:
+    """What each missile reaches on the map."""
+    threats = scenario.threats
+    return [
+        Zone(str(name), "exclusion", make_cylinder(float(position[0]), float(position[1]), float(radius)))
+        for name, position, radius in zip(threats.names, threats.position, threats.kill_radius, strict=True)
+        if radius > 0.0
+    ]
 
 
-def _passed_zones(mission: Mission, scenario: Scenario) -> list[str]:
-    """A note if the mission's own legs cross a zone on the map, above or below it."""
-    positions = [item for item in mission.items if item.has_position]
-    place = to_map(scenario.origin, [item.lat_deg for item in positions], [item.lon_deg for item in positions])
-    passed = zones_under(scenario.zones, np.stack(place, axis=1))
-    if not passed:
-        return []
-    over = f"the mission passes {', '.join(passed[:3])}{'' if len(passed) <= 3 else ' and more'} above or below"
-    return [f"{over}: an autopilot with this fence refuses it or breaks off"]
+def _kept(zones: Sequence[Zone], origin: GeoOrigin, passes: PassTest) -> tuple[list[Zone], list[str]]:
+    """The zones that a mission keeps at every height, and the names of the others."""
+    kept, passed = [], []
+    for zone in zones:
+        if zone.kind == "exclusion" and passes(numbered(zone_fences([zone], origin)[0])):
+            passed.append(zone.name)
+        else:
+            kept.append(zone)
+    return kept, passed
 
 
 def _rally(mission: Mission) -> list[MissionItem]:

@@ -1,13 +1,11 @@
 """A scenario's zones as the fence that they are, and what of them a fence cannot hold."""
 
-import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, MissionItem, on_grid
-from world.airspace.zone_kernels import segment_distance, zone_records
 from world.airspace.zones import Cylinder, Ring, Zone, is_hole
 from world.frames import GeoOrigin, to_geo
 
@@ -87,19 +85,3 @@ def _names(names: list[str]) -> str:
     """Up to three names, and how many more."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
-
-
-def zones_under(zones: Sequence[Zone], points: Floats) -> list[str]:
-    """Names of the exclusions that straight legs between points (p, 2) m cross on the map, whatever their heights.
-
-    >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
-    >>> zones_under([zone], np.array([[-900.0, 400.0], [900.0, 400.0]]))
-    ['mast']
-    """
-    records = zone_records(zones)
-    return [
-        zone.name
-        for z, zone in enumerate(zones)
-        if zone.kind == "exclusion"
-        and any(segment_distance(records, z, *a, *b)[0] == 0.0 for a, b in itertools.pairwise(points))
-    ]

@@ -33,7 +33,7 @@ from flight.mission_files.qgc_complex_items import expand_items
 from world.errors import MissionError
 from world.scenario_file import first_fault
 
-_HOVER_SPEED = 5.0  # QGC's own default; a fixed wing has none
+_HOVER_SPEED = 5  # QGC's own default; a fixed wing has none
 _CRUISE_SPEED = 15.0  # QGC's own default
 _FASTEST = 1000.0  # m/s
 
@@ -217,7 +217,9 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
 def plan_file_text(mission: Mission) -> str:
     """Mission as a `.plan` file; the same mission always gives the same bytes.
 
-    cruiseSpeed is the mission's, or its first DO_CHANGE_SPEED, or QGC's default.
+    cruiseSpeed is the mission's, or its first DO_CHANGE_SPEED, or QGC's default.  It is written in whole m/s, as
+    hoverSpeed is: they are integers in Mission Planner's `MissionFile.Mission`, whose reader refuses "25.0"; QGC takes
+    both for numbers, and sends neither to an aircraft.
     """
     mission = renumbered(mission)
     home = mission.home or Home(0.0, 0.0, 0.0)
@@ -227,7 +229,7 @@ def plan_file_text(mission: Mission) -> str:
         "geoFence": _fence_json(mission.fences),
         "groundStation": "planfly",
         "mission": {
-            "cruiseSpeed": _cruise_speed(mission),
+            "cruiseSpeed": round(_cruise_speed(mission)),
             "firmwareType": 12,
             # 0: mixed.
             "globalPlanAltitudeMode": modes[0] if len(modes) == 1 else 0,
@@ -237,7 +239,10 @@ def plan_file_text(mission: Mission) -> str:
             "vehicleType": 1,
             "version": 2,
         },
-        "rallyPoints": {"points": [[p.lat_deg, p.lon_deg, _or_null(p.alt)] for p in mission.rally], "version": 2},
+        "rallyPoints": {
+            "points": [[p.lat_deg, p.lon_deg, 0.0 if math.isnan(p.alt) else p.alt] for p in mission.rally],
+            "version": 2,
+        },
         "version": 1,
     }
     return json.dumps(data, indent=4, allow_nan=False) + "\n"

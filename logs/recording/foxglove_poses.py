@@ -18,15 +18,19 @@ from logs.recording.protobuf_arrays import (
     tagged_doubles,
 )
 from logs.recording.state_channel import EPOCH_NS
+from logs.recording.viewers.point_clouds import track_cloud
+from logs.recording.viewers.track_so_far import EVERY, TrackSoFar
 from world.frames import GeoOrigin, to_geo
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-TF_TOPIC, FIX_TOPIC, TRACK_TOPIC = "/tf", "/fix", "/scene/track"
+TF_TOPIC, FIX_TOPIC, TRACK_TOPIC, TRACK_POINTS = "/tf", "/fix", "/scene/track", "/points/track"
 
 _SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
 _XYZ, _XYZW, _GEO = "xyz", "xyzw", ("latitude", "longitude", "altitude")
+# The track's points: s between messages at least, and the ratio of their times, so that a long flight's stay few.
+_CLOUD_EVERY, _CLOUD_RATIO = 10.0, 1.05
 # The messages behind their timestamps, in protobuf's encoding.
 _TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
     deterministic=True
@@ -80,10 +84,11 @@ class Poses:
         self._slot = self._second = -1
         self._path: list[Floats] = []  # positions, one a second
         self._tail = np.zeros((0, 3))  # the newest position
-        self._next_track = 10  # s
+        self._so_far = TrackSoFar()
+        self._next_cloud = 0.0  # s
 
     def take(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
-        """Messages for the first good row in each slot, a fix a second, and now and then the track so far.
+        """Messages for the first good row in each slot, a fix a second, and the track so far every `EVERY` seconds.
 
         log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
         """
@@ -104,21 +109,27 @@ class Poses:
         self._second = int(seconds[-1])
         firsts = position[starts]
         yield fix_messages(self._channels[FIX_TOPIC], log_times[starts], self._origin, firsts)
-        # After 10, 20, 40, ... s: viewers that seek show the newest, and the file stays small.
-        for k in np.flatnonzero(log_times[starts] - EPOCH_NS >= self._next_track * SECOND_NS).tolist():
-            log_time = int(log_times[starts[k]])
-            if log_time - EPOCH_NS >= self._next_track * SECOND_NS:
-                self._next_track *= 2
-                yield self._track(log_time, [*self._path, firsts[: k + 1]])
         self._path.append(firsts)
+        for k in np.flatnonzero((log_times[starts] - EPOCH_NS) // SECOND_NS % EVERY == 0).tolist():
+            log_time = int(log_times[starts[k]])
+            with np.errstate(over="ignore", invalid="ignore"):
+                line = np.round(self._so_far.add(firsts[k]) * 16.0) / 16.0
+            yield single_record(self._channels[TRACK_TOPIC], log_time, scene.track_scene(log_time, line))
+            time = (log_time - EPOCH_NS) / SECOND_NS
+            if time >= self._next_cloud:
+                self._next_cloud = max(time + _CLOUD_EVERY, time * _CLOUD_RATIO)
+                yield self._cloud(log_time, [*self._path[:-1], firsts[: k + 1]])
 
-    def whole(self, log_time: int) -> MessageRecords:
-        """The track up to the newest row, at ``log_time`` (ns)."""
-        return self._track(log_time, [*self._path, self._tail])
-
-    def _track(self, log_time: int, parts: list[Floats]) -> MessageRecords:
+    def whole(self, log_time: int) -> Iterator[MessageRecords]:
+        """The track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
+        parts = [*self._path, self._tail]
         path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
-        return single_record(self._channels[TRACK_TOPIC], log_time, path)
+        yield single_record(self._channels[TRACK_TOPIC], log_time, path)
+        yield self._cloud(log_time, parts)
+
+    def _cloud(self, log_time: int, parts: list[Floats]) -> MessageRecords:
+        points = track_cloud(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
+        return single_record(self._channels[TRACK_POINTS], log_time, points)
 
 
 def _changes(values: Ints, before: int) -> Ints:

@@ -4,7 +4,7 @@ Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is
 """
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
@@ -15,6 +15,7 @@ from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
+from foxglove_schemas_protobuf.TextPrimitive_pb2 import TextPrimitive
 from foxglove_schemas_protobuf.TriangleListPrimitive_pb2 import TriangleListPrimitive
 from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
@@ -48,6 +49,8 @@ _DETECTION = (0.95, 0.65, 0.10, 0.15)
 _PLAN = (0.10, 0.35, 0.90, 1.0)
 _TRACK = (0.95, 0.95, 0.95, 1.0)
 _KEEP_OUT, _STAY_IN = (0.75, 0.15, 0.15, 1.0), (0.95, 0.85, 0.30, 1.0)
+# A name stands so far above the ground within this of its place, m.
+_LIFT, _NEAR = 40.0, 300.0
 # Upright lines of one outline of a zone, about.
 MOST_POSTS = 24
 
@@ -77,9 +80,9 @@ def body_rotation(attitude: ArrayLike) -> Floats:
     )
 
 
-def log_message(time_ns: int, text: str, level: str) -> Log:
-    """One event; level: a key of `LEVELS`."""
-    return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name="planfly")
+def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> Log:
+    """One event; level: a key of `LEVELS`.  name: who says it."""
+    return Log(timestamp=timestamp(time_ns), level=LEVELS[level], message=text, name=name)
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
@@ -89,8 +92,8 @@ def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
 
 
-def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
-    """The entity's field of triangles; empty where no ground is known."""
+def _ground(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """(n, m, 3) corners of the mesh, (n, m, 3) their colours, and (n, m) which are known; none of them may be."""
 
     def axis(low: float, high: float) -> Floats:
         return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MOST_VERTICES)))
@@ -99,18 +102,33 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     ground_e, ground_n = np.meshgrid(east, north)
     up = terrain.height(ground_e, ground_n)
     known = np.isfinite(up)
+    low, high = float(np.min(up, where=known, initial=np.inf)), float(np.max(up, where=known, initial=-np.inf))
+    share = np.where(known, (up - low) / max(high - low, 1.0), 0.0)
+    points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1)
+    return points, _LOW + share[..., None] * (_HIGH - _LOW), known
+
+
+def terrain_points(scenario: Scenario) -> tuple[Floats, Floats]:
+    """(n, 3) known corners of the ground's mesh, m, and (n, 3) their colours, 0..1."""
+    if scenario.terrain is None:
+        return np.zeros((0, 3)), np.zeros((0, 3))
+    points, colours, known = _ground(scenario.terrain, scenario.bounds)
+    return points[known], colours[known]
+
+
+def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
+    """The entity's field of triangles; empty where no ground is known."""
+    ground, colours, known = _ground(terrain, bounds)
     if not known.any():
         return b""
-    low, high = float(up[known].min()), float(up[known].max())
-    share = np.where(known, (up - low) / max(high - low, 1.0), 0.0)
-    colours = _LOW + share[..., None] * (_HIGH - _LOW)
+    up = ground[..., 2]
     number = np.arange(up.size).reshape(up.shape)
     sw, se, nw, ne = number[:-1, :-1], number[:-1, 1:], number[1:, :-1], number[1:, 1:]
     corners = np.stack([sw, se, ne, sw, ne, nw], axis=-1).reshape(-1, 6)
     whole = known.ravel()[corners].all(axis=1)
     mesh = TriangleListPrimitive(pose=_pose((0.0, 0.0, 0.0)), color=Color(r=0.5, g=0.5, b=0.4, a=1.0))
     mesh.indices.extend(corners[whole].ravel().tolist())
-    points = np.stack([ground_e, ground_n, np.where(known, up, low)], axis=-1).reshape(-1, 3)
+    points = ground.reshape(-1, 3)
     # Rounded to 2^-4 m and 2^-7 of a colour: it is drawn, not measured, and takes a quarter of the bytes.
     rgba = np.hstack([np.round(colours.reshape(-1, 3) * 128.0) / 128.0, np.ones((len(points), 1))])
     body = mesh.SerializeToString(deterministic=True)
@@ -119,8 +137,8 @@ def _mesh(terrain: Terrain, bounds: Floats) -> bytes:
     return length_delimited(_ENTITY_TRIANGLES, body)
 
 
-def threats_scene(time_ns: int, threats: Threats) -> bytes:
-    """Missile spheres in red, radar spheres in orange, and their names."""
+def threats_scene(time_ns: int, threats: Threats, terrain: Terrain | None) -> bytes:
+    """Missile spheres in red, radar spheres in orange, and their names above the ground about them."""
     entity = _entity(time_ns, "threats")
     for k, name in enumerate(threats.names):
         centre = threats.position[k]
@@ -128,25 +146,43 @@ def threats_scene(time_ns: int, threats: Threats) -> bytes:
             if radius > 0.0:
                 side = 2.0 * float(radius)
                 entity.spheres.add(pose=_pose(centre), size=Vector3(x=side, y=side, z=side), color=_colour(colour))
-        entity.texts.add(
-            pose=_pose(centre), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
-        )
+        entity.texts.append(_name(_above_ground(centre, terrain), name))
     return _update(entity)
 
 
-def plan_scene(time_ns: int, waypoints: Floats) -> bytes:
-    """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots."""
+def _above_ground(place: Floats, terrain: Terrain | None) -> Floats:
+    """A place for a name: at least `_LIFT` above the highest ground within `_NEAR`, where the ground is known."""
+    east, north, up = (float(value) for value in place)
+    top = up
+    if terrain is not None:
+        steps = np.linspace(-_NEAR, _NEAR, 9)
+        near = terrain.height(*np.meshgrid(east + steps, north + steps))
+        top = float(np.max(near, where=np.isfinite(near), initial=up))
+    return np.array([east, north, top + _LIFT])
+
+
+def _name(place: Floats, name: str) -> TextPrimitive:
+    return TextPrimitive(
+        pose=_pose(place), billboard=True, font_size=14.0, scale_invariant=True, color=_colour(_TRACK), text=name
+    )
+
+
+def plan_scene(time_ns: int, waypoints: Floats, items: Sequence[int]) -> bytes:
+    """Draw the legs between waypoints (w, 3) as a line, the waypoints as dots with their numbers and mission items."""
     entity = _entity(time_ns, "plan")
     entity.lines.append(_line(_PLAN))
     entity.lines[0].points.extend(_points(waypoints))
     for point in waypoints:
         entity.spheres.add(pose=_pose(point), size=Vector3(x=40.0, y=40.0, z=40.0), color=_colour(_PLAN))
+    for number, (point, item) in enumerate(zip(waypoints, items, strict=True)):
+        text = f"{number} (item {item})" if item >= 0 else str(number)
+        entity.texts.append(_name(point + np.array([0.0, 0.0, _LIFT]), text))
     return _update(entity)
 
 
 def track_scene(time_ns: int, positions: Floats) -> bytes:
     """Draw the flown track so far, (n, 3)."""
-    line = _line(_TRACK).SerializeToString(deterministic=True) + repeated_submessages(_LINE_POINTS, _XYZ, positions)
+    line = _TRACK_LINE + repeated_submessages(_LINE_POINTS, _XYZ, positions)
     entity = _entity(time_ns, "track").SerializeToString(deterministic=True)
     return length_delimited(2, entity + length_delimited(_ENTITY_LINES, line))
 
@@ -160,6 +196,16 @@ def _entity(time_ns: int, name: str) -> SceneEntity:
     return SceneEntity(timestamp=timestamp(time_ns), frame_id=MAP, id=name, frame_locked=True)
 
 
+def _colour(rgba: tuple[float, float, float, float]) -> Color:
+    r, g, b, a = rgba
+    return Color(r=r, g=g, b=b, a=a)
+
+
+def _pose(position: ArrayLike) -> Pose:
+    x, y, z = (float(value) for value in np.asarray(position))
+    return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
+
+
 def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
     """A line without points yet."""
     return LinePrimitive(
@@ -171,18 +217,11 @@ def _line(colour: tuple[float, float, float, float]) -> LinePrimitive:
     )
 
 
+_TRACK_LINE = _line(_TRACK).SerializeToString(deterministic=True)
+
+
 def _points(points: Floats) -> Iterable[Point3]:
     return (Point3(x=x, y=y, z=z) for x, y, z in points.tolist())
-
-
-def _pose(position: ArrayLike) -> Pose:
-    x, y, z = (float(value) for value in np.asarray(position))
-    return Pose(position=Vector3(x=x, y=y, z=z), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0))
-
-
-def _colour(rgba: tuple[float, float, float, float]) -> Color:
-    r, g, b, a = rgba
-    return Color(r=r, g=g, b=b, a=a)
 
 
 def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
@@ -196,12 +235,5 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
             for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
                 entity.lines.append(_line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN))
                 entity.lines[-1].points.extend(_points(path))
-        entity.texts.add(
-            pose=_pose(walls[0][0, 1]),
-            billboard=True,
-            font_size=14.0,
-            scale_invariant=True,
-            color=_colour(_TRACK),
-            text=zone.name,
-        )
+        entity.texts.append(_name(_above_ground(walls[0][0, 1], scenario.terrain), zone.name))
     return _update(entity)

@@ -37,6 +37,7 @@ from logs.recording.state_channel import (
     parse_row,
     state_class,
 )
+from logs.recording.viewers.flight_events import NAME as NOTED_IN_FLIGHT
 from logs.verdict.beside_file import parse_beside
 from logs.verdict.levels import FlownBeside
 from world.errors import LogError
@@ -161,6 +162,8 @@ class _MessageCollector:
             self.parts.append(parse_row(data[start + MESSAGE_HEADER : end], self._parser))
         elif self._channels.get(channel) == (EVENT_TOPIC, LOG_NAME):
             message = Log.FromString(data[start + MESSAGE_HEADER : end])
+            if message.name == NOTED_IN_FLIGHT:
+                return end
             # The difference in whole ns first: a float holds no ns since 1970.
             time = (log_time - EPOCH_NS) / 1e9
             self.events.append(LogEvent(time, message.message, _LEVEL_NAMES.get(message.level, "info")))

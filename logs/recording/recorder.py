@@ -15,6 +15,7 @@ import numpy as np
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
@@ -33,7 +34,7 @@ from logs.recording.chunk_layout import (
     lay_out,
     single_record,
 )
-from logs.recording.foxglove_poses import FIX_TOPIC, TF_TOPIC, TRACK_TOPIC, Poses
+from logs.recording.foxglove_poses import FIX_TOPIC, TF_TOPIC, TRACK_POINTS, TRACK_TOPIC, Poses
 from logs.recording.mcap_writer import ChannelIndex, ChunkContent, ContainerWriter
 from logs.recording.protobuf_arrays import as_bytes
 from logs.recording.setup_attachments import pack_setup
@@ -47,6 +48,9 @@ from logs.recording.state_channel import (
     state_schema,
     times_ns,
 )
+from logs.recording.viewers import point_clouds as clouds
+from logs.recording.viewers.aircraft_model import aircraft_scene
+from logs.recording.viewers.flight_events import FlightEvents
 from logs.verdict.beside_file import beside_json
 from logs.verdict.findings import Verdict, verdict_json
 from logs.verdict.levels import FlownBeside
@@ -66,8 +70,10 @@ _CHANNELS: dict[str, Any] = {
     TF_TOPIC: FrameTransform,
     FIX_TOPIC: LocationFix,
     EVENT_TOPIC: Log,
-    **{f"/scene/{name}": SceneUpdate for name in ("terrain", "threats", "plan")},
+    **{f"/scene/{name}": SceneUpdate for name in ("terrain", "threats", "plan", "aircraft")},
     TRACK_TOPIC: SceneUpdate,
+    **{f"/points/{name}": PointCloud for name in ("terrain", "threats", "plan", "aircraft")},
+    TRACK_POINTS: PointCloud,
 }
 
 Floats = NDArray[np.float64]
@@ -123,6 +129,7 @@ class Recorder:
             self._file.close()
             raise
         self._poses = Poses(setup.scenario.origin, self._channels)
+        self._noted = FlightEvents(setup, self._channels[EVENT_TOPIC])
 
     def __enter__(self) -> "Recorder":
         """Return the recorder itself."""
@@ -204,7 +211,7 @@ class Recorder:
             self._skipped = None
         self._emit(None)
         end = max(self._last_ns, EPOCH_NS)
-        self._write([self._poses.whole(end)])
+        self._write([*self._poses.whole(end)])
         if beside is not None:
             self._attach(BESIDE_FILE, beside_json(beside).encode(), end)
         if verdict is not None:
@@ -227,8 +234,13 @@ class Recorder:
             self._channels[topic] = self._writer.channel(topic, descriptor.full_name, schema_of(descriptor))
         scenes = {
             "/scene/terrain": scene.terrain_scene(EPOCH_NS, setup.scenario),
-            "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats),
-            "/scene/plan": scene.plan_scene(EPOCH_NS, setup.route.waypoints),
+            "/scene/threats": scene.threats_scene(EPOCH_NS, setup.scenario.threats, setup.scenario.terrain),
+            "/scene/plan": scene.plan_scene(EPOCH_NS, setup.route.waypoints, setup.route.items.tolist()),
+            "/scene/aircraft": aircraft_scene(EPOCH_NS),
+            "/points/terrain": clouds.ground_cloud(EPOCH_NS, setup.scenario),
+            "/points/threats": clouds.threats_cloud(EPOCH_NS, setup.scenario.threats),
+            "/points/plan": clouds.plan_cloud(EPOCH_NS, setup.route.waypoints),
+            "/points/aircraft": clouds.aircraft_cloud(EPOCH_NS),
         }
         zoned = with_fence_zones(setup).scenario
         if zoned.zones:
@@ -260,7 +272,9 @@ class Recorder:
         events = [item for item in self._events if until is None or item.log_times[0] < until]
         self._events = [item for item in self._events if until is not None and item.log_times[0] >= until]
         rows, log_times = rows[:stop], log_times[:stop]
-        self._write([*self._poses.take(log_times, rows["position"], rows["attitude"]), *events], rows, log_times)
+        shown = self._poses.take(log_times, rows["position"], rows["attitude"])
+        noted = self._noted.take(log_times, rows["position"], rows["leg"])
+        self._write([*shown, *noted, *events], rows, log_times)
         self._writer.flush()
 
     def _write(self, others: list[MessageRecords], rows: Rows = _NO_ROWS, log_times: Ints = _NO_TIMES) -> None:

@@ -4,14 +4,15 @@ import argparse
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from flight.mission.fences import numbered, with_fences
+from flight.mission.fences import numbered
 from flight.mission.items import Mission
 from flight.mission.zone_fences import zone_fences
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
 from logs.recording.reader import FlightLog, read_log
 from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
+from planfly.fence_of_plan import fence_of_plan
 from planfly.named_fences import NamedFences, read_named_fences
-from planfly.open_mission import is_log, open_mission, open_plan
+from planfly.open_mission import is_log, open_mission
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.results import print_warnings
@@ -22,6 +23,8 @@ from world.errors import MissionError
 from world.scenario import Scenario
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
+# What a flight log alone can be written as.
+LOGS = (".csv", ".parquet", ".tlog", ".ulg")
 _HOLDS = {"fence": "fence items", "rally": "rally points"}
 
 
@@ -30,12 +33,14 @@ class _Source:
     """What an input holds.
 
     mission: its items, and a plan's threats as fences.
+    name: a map's title.
     lines, zones: on a map, lines by what they are; none where no target asks for one.
     notes: what the mission does not hold of the plan.
     log: the input, where it is a flight log.
     """
 
     mission: Mission
+    name: str
     lines: dict[str, MapLine] = field(default_factory=dict)
     zones: list[MapZone] = field(default_factory=list)
     notes: tuple[str, ...] = ()
@@ -46,7 +51,7 @@ def export(args: argparse.Namespace) -> int:
     """Read the source, then write every target; 3 for a log that is cut short."""
     path, targets = Path(args.plan), [Path(name) for name in args.files]
     for target in targets:
-        if target.suffix.lower() not in MAPS:
+        if target.suffix.lower() not in (*MAPS, *LOGS):
             _refuse_unknown(target)
         refuse_existing(target, args.overwrite, path)
     maps = any(target.suffix.lower() in MAPS for target in targets)
@@ -56,12 +61,13 @@ def export(args: argparse.Namespace) -> int:
             raise MissionError(f"{path}: --fence: a log is exported with the fence that it was flown with")
         source = _read_log(path)
     else:
+        _refuse_flown(path, targets)
         source = _read_mission(path, maps, fences)
-    texts = [(target, *_text(source, target, str(path))) for target in targets]
+    texts = [(target, *_text(source, target)) for target in targets]
     print_warnings([*source.mission.warnings, *source.notes])
     for target, text, content in texts:
         write_whole(target, text)
-        print(f"{'map' if target.suffix.lower() in MAPS else 'mission':<9} {target} ({content})")
+        print(f"{_kind(target):<9} {target} ({content})")
     code = FLYABLE
     if source.log is not None and not source.log.complete:
         warn_of_loss(source.log)
@@ -81,8 +87,36 @@ def _refuse_unknown(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
-        allowed = ", ".join([*KINDS, *MAPS])
+        allowed = ", ".join([*KINDS, *MAPS, *LOGS])
         raise MissionError(f"{target}: suffix {target.suffix!r}: allowed {allowed}") from None
+
+
+def _refuse_flown(path: Path, targets: list[Path]) -> None:
+    """Refuse to write of a plan or a mission what is about a flight."""
+    for target in targets:
+        if target.suffix.lower() in LOGS:
+            raise MissionError(f"{target}: {target.suffix} is written of a flight log (.mcap), and {path} is none")
+
+
+def _kind(target: Path) -> str:
+    suffix = target.suffix.lower()
+    return "map" if suffix in MAPS else "flight" if suffix in LOGS else "mission"
+
+
+def _flown(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
+    """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
+    content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
+    if suffix == ".tlog":
+        from logs.exports.telemetry_file import telemetry_bytes
+
+        return telemetry_bytes(log), content
+    if suffix == ".ulg":
+        from logs.exports.px4_file import px4_log_bytes
+
+        return px4_log_bytes(log), content
+    from logs.exports.flight_table import csv_text, parquet_bytes
+
+    return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), content
 
 
 def _read_log(path: Path) -> _Source:
@@ -90,28 +124,22 @@ def _read_log(path: Path) -> _Source:
     lines = {"plan": plan_line(log.setup)}
     if len(log.track):
         lines["flown"] = track_line(log.setup, log.track)
-    return _Source(log.setup.mission, lines, map_zones(log.setup), log=log)
+    return _Source(log.setup.mission, log.setup.scenario.name, lines, map_zones(log.setup), log=log)
 
 
 def _read_mission(path: Path, maps: bool, fences: NamedFences) -> _Source:
-    """A plan or a mission file; a map and zones want its place, too, which not every mission has."""
+    """A plan or a mission file; a map, zones and a plan's fence want its place, too, which not every mission has."""
     if not path.is_file():
         raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected")
     is_plan = path.suffix.lower() == ".json"
-    if maps or (fences.zones and not is_plan):
-        setup = open_mission(path, None, None, fences=fences).setup
-        source = _Source(setup.mission, {"plan": plan_line(setup)}, map_zones(setup))
-        return _with_fences(source, setup.scenario) if is_plan else _with_zones(source, setup.scenario)
+    if not (maps or is_plan or fences.zones):
+        return _Source(fences.on_mission(read_mission(path)), path.stem)
+    setup = open_mission(path, None, None, fences=fences).setup
+    source = _Source(setup.mission, setup.scenario.name, {"plan": plan_line(setup)}, map_zones(setup))
     if not is_plan:
-        return _Source(fences.on_mission(read_mission(path)))
-    opened = open_plan(path, change=fences.on_scenario)
-    return _with_fences(_Source(fences.on_mission(opened.mission)), opened.scenario)
-
-
-def _with_fences(source: _Source, scenario: Scenario) -> _Source:
-    """A plan's threats, area and zones as its fence, beside the one named."""
-    fenced, notes = with_fences(source.mission, scenario)
-    return replace(source, mission=fenced, notes=notes)
+        return _with_zones(source, setup.scenario)
+    mission, notes = fence_of_plan(setup)
+    return replace(source, mission=mission, notes=notes)
 
 
 def _with_zones(source: _Source, scenario: Scenario) -> _Source:
@@ -121,12 +149,14 @@ def _with_zones(source: _Source, scenario: Scenario) -> _Source:
     return replace(source, mission=fenced, notes=tuple(notes))
 
 
-def _text(source: _Source, target: Path, title: str) -> tuple[str, str]:
+def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
     """Text of a target, and what it holds."""
     suffix, mission = target.suffix.lower(), source.mission
+    if suffix in LOGS and source.log is not None:
+        return _flown(source.log, suffix)
     if suffix in MAPS:
         held = [*source.lines, *([f"{len(source.zones)} zones"] if source.zones else [])]
-        return MAPS[suffix](title, list(source.lines.values()), source.zones), " and ".join(held)
+        return MAPS[suffix](source.name, list(source.lines.values()), source.zones), " and ".join(held)
     kind = mission_kind(target)
     if kind in _HOLDS:
         count = len(mission.fences if kind == "fence" else mission.rally)

@@ -92,7 +92,12 @@ def _add_replay(line: LineParser) -> None:
     other.add_argument(
         "--movie", metavar="FILE|DIR", help="draw it: FILE.gif, FILE.mp4 (needs ffmpeg), or DIR for PNG frames"
     )
-    other.add_argument("--foxglove", action="store_true", help="play it to Foxglove on this machine over WebSocket")
+    other.add_argument(
+        "--foxglove",
+        action="store_true",
+        help="play it to Foxglove on this machine over WebSocket; needs the extra planfly[foxglove], and a viewer that"
+        " speaks foxglove.sdk.v1 (Foxglove since 2025, Lichtblick after 1.21)",
+    )
     other.add_argument("--port", metavar="N", type=port, default=8765, help="of --foxglove (default: 8765; 0: any)")
     other.add_argument(
         "--wait", metavar="S", type=positive,

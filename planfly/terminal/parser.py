@@ -146,7 +146,7 @@ def _add_plan(line: LineParser) -> None:
 def _add_export(line: LineParser) -> None:
     export = line.command(
         "export",
-        "write a plan, mission or log by suffix: .waypoints, .plan, .fence, .rally, .kml, .gpx",
+        "write a plan, mission or log in the form that a suffix names",
         "planfly export plan.json mission.waypoints mission.fence mission.plan plan.kml",
     )
     completed(
@@ -157,7 +157,11 @@ def _add_export(line: LineParser) -> None:
         files("mcap", *MISSIONS),
     )  # fmt: skip
     export.add_argument(
-        "files", metavar="FILE", nargs="+", help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx"
+        "files",
+        metavar="FILE",
+        nargs="+",
+        help="files to write: .waypoints, .plan, .fence, .rally, .kml, .gpx;"
+        " of a log also .csv, .parquet (extra planfly[tables]), .tlog (MAVLink), .ulg (PX4)",
     )
     fence_option(export)
     result_options(export)

@@ -1,7 +1,7 @@
-"""A person's MAVSDK script: python mavsdk_session.py PORT ITEMS.json fly|upload|plan.  Prints one JSON object.
+"""A person's MAVSDK script: python mavsdk_session.py PORT ITEMS.json fly|upload|plan|ask.  Prints one JSON object.
 
 Run as a subprocess, because the library is native and starts threads.  ITEMS.json:
-[[frame, command, p1, p2, x, y, z]], or for "plan" [[latitude, longitude, height over home]].
+[[frame, command, p1, p2, x, y, z]], or for "plan" and "ask" [[latitude, longitude, height over home]].
 """
 
 import json
@@ -26,7 +26,10 @@ def main() -> None:
     system = sdk.first_autopilot(20.0)
     if system is None:
         raise SystemExit("no vehicle")
-    found = by_plan(system, rows) if task == "plan" else by_items(system, rows, task == "fly")
+    if task == "ask":
+        found = by_asking(system, rows)
+    else:
+        found = by_plan(system, rows) if task == "plan" else by_items(system, rows, task == "fly")
     print(json.dumps(found))
 
 
@@ -65,6 +68,37 @@ def by_plan(system: System, rows: list[list[float]]) -> dict[str, object]:
     found = fly(system, mission.start_mission, mission.is_mission_finished)
     progress = mission.mission_progress()
     return found | {"progress": [progress.current, progress.total]}
+
+
+def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
+    """Ask for what a person may ask for, on the ground and in flight: the seconds that each took, and its answer."""
+    mission, action, telemetry = Mission(system), Action(system), Telemetry(system)
+    mission.upload_mission(MissionPlan([PlanItem(y, x, z, 25.0, True) for y, x, z in rows]))
+    wait(telemetry.health_all_ok)
+    ground = {"item": asked(lambda: mission.set_current_mission_item(1))}
+    action.arm()
+    mission.start_mission()
+    wait(telemetry.in_air)
+    flight = {
+        "item": asked(lambda: mission.set_current_mission_item(0)),
+        "pause": asked(mission.pause_mission),
+        "hold": asked(action.hold),
+        "return": asked(action.return_to_launch),
+        "go": asked(lambda: action.goto_location(46.0, 8.01, 150.0, 0.0)),
+        "speed": asked(lambda: action.set_current_speed(22.0)),
+        "orbit": asked(lambda: action.do_orbit(100.0, 20.0, 0, 46.0, 8.0, 150.0)),
+    }
+    return {"ground": ground, "flight": flight}
+
+
+def asked(request: Callable[[], object]) -> tuple[float, str]:
+    """Seconds that a request took, and MAVSDK's name for what came of it."""
+    begun = time.monotonic()
+    try:
+        request()
+    except Exception as error:  # one class a plugin
+        return time.monotonic() - begun, str(error).split(";")[0]
+    return time.monotonic() - begun, "SUCCESS"
 
 
 def fly(system: System, start: Callable[[], object], is_finished: Callable[[], bool]) -> dict[str, object]:

@@ -139,9 +139,9 @@ def make_verdict() -> Verdict:
 
 def record(path: Path, setup: FlightSetup, track: Track, *, rows_a_block: int = 60, ended: str = "completed") -> Path:
     with Recorder(path, setup) as recorder:
+        recorder.event(1.25, "half way up", "warning")
         for first in range(0, len(track), rows_a_block):
             recorder.write(track.rows(first, min(len(track), first + rows_a_block)))
-        recorder.event(1.25, "half way up", "warning")
         recorder.event(float(track.time[-1]), "arrived")
         recorder.finish(ended, make_verdict())
     return path

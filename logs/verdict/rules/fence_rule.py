@@ -6,17 +6,33 @@ included; that the corridor about it reaches further is told beside.
 
 import math
 
+from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_demands import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
 from logs.verdict.tolerances import ROUNDING
 from logs.verdict.wording import place_text
+from world.airspace.zone_kernels import zone_records
+from world.airspace.zones import Zone
 from world.kernels import Record, Records
 
 _METHOD = "every point of each piece, arc and row"
+
+
+def is_entered(setup: FlightSetup, zone: Zone) -> bool:
+    """Whether the planned path of a setup goes into an exclusion, or out of an inclusion, by what the rule allows.
+
+    >>> from logs.recording.example_log import example_log
+    >>> from world.airspace.zones import Cylinder
+    >>> setup = example_log().setup  # starts at 0, 0
+    >>> [is_entered(setup, Zone("mast", "exclusion", Cylinder(0.0, y, 50.0))) for y in (40.0, -60.0)]
+    [True, False]
+    """
+    moves = planned_moves(route_demands(setup, envelope=False))
+    return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING)
 
 
 def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:

@@ -43,10 +43,11 @@ def _write(target: Path, flight: ImportedFlight) -> None:
     with tempfile.TemporaryDirectory(dir=target.parent, prefix=f".{target.name}.") as folder:
         path = Path(folder) / target.name
         with Recorder(path, flight.setup) as recorder:
+            # Events first, so that each stands in the log where it happened.
+            for event in flight.events:
+                recorder.event(event.time, event.text, event.level)
             # A piece at a time: a recorder takes many times the bytes of a row for it.
             for start in range(0, len(flight.track), _PIECE):
                 recorder.write(flight.track.rows(start, start + _PIECE))
-            for event in flight.events:
-                recorder.event(event.time, event.text, event.level)
             recorder.finish(flight.ended, flight.verdict)
         path.replace(target)

@@ -1,4 +1,8 @@
-"""``planfly replay --foxglove``: a log played to Foxglove over a WebSocket that only this machine reaches."""
+"""``planfly replay --foxglove``: a log played to Foxglove over a WebSocket that only this machine reaches.
+
+The server is foxglove-sdk's: it speaks the WebSocket subprotocol `foxglove.sdk.v1` alone, and refuses a viewer that
+asks for its older name `foxglove.websocket.v1`.
+"""
 
 import argparse
 import itertools
@@ -15,6 +19,8 @@ from planfly.terminal.link_options import Stopped, stop_signals
 from world.errors import FlightError, PlanflyError
 
 _HOST = "127.0.0.1"
+# What the server of foxglove-sdk speaks.
+SUBPROTOCOL = "foxglove.sdk.v1"
 # Time between looks at the clock and at who is listening, s, and until a new subscription is active, s.
 _POLL, _SUBSCRIBING = 0.005, 0.05
 
@@ -41,7 +47,7 @@ def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
         )  # fmt: skip
     except RuntimeError as error:
         raise OSError(0, str(error), f"{_HOST}:{args.port}") from error
-    print(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket)", flush=True)
+    print(f"foxglove  ws://{_HOST}:{server.port} (Open connection, Foxglove WebSocket; {SUBPROTOCOL})", flush=True)
     try:
         with stop_signals() as stopped:
             messages = broadcast.up_to(log_messages(log), round(start * 1e9) + EPOCH_NS)
@@ -131,7 +137,7 @@ class _Broadcast:
         self._waiting = [item for item in self._waiting if now - item[0] < _SUBSCRIBING]
 
     def _note(self, message: LogMessage) -> None:
-        if message.channel.topic.startswith("/scene/"):
+        if message.channel.topic.startswith(("/scene/", "/points/")):
             self._scenes[message.channel.topic] = message
 
     def on_subscribe(self, client: Any, channel: Any) -> None:

@@ -29,6 +29,11 @@ def test_armed_in_auto_with_a_verdict_starts() -> None:
     assert (state.armed, state.mode, state.mission_state) == (False, MANUAL, COMPLETE)
 
 
+def test_only_a_mission_is_said_to_start() -> None:
+    assert judged().arm(True, 0.0).text == "armed: AUTO starts the mission"
+    assert ArmingState().arm(True, 0.0).text == "armed: no mission yet"
+
+
 def test_an_arm_command_waits_for_the_verdict() -> None:
     state = ArmingState()
     state.mission_uploaded()

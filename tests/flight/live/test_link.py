@@ -19,14 +19,37 @@ def link():
     made.close()
 
 
-def test_nothing_is_believed_before_a_heartbeat(link: Link) -> None:
-    ask = packed(mavlink.MAVLink_param_request_list_message(1, 1))
-    assert link.take(ask, ("127.0.0.1", 5)) == []
+FAR = Access(("127.0.0.1", 0), (("127.0.0.1", 9),), frozenset({"192.0.2.1"}))
+
+
+def test_nobody_beyond_this_machine_is_believed_before_a_heartbeat() -> None:
+    link = Link(FAR, Clock(), lambda: WALL)
+    try:
+        ask = packed(mavlink.MAVLink_param_request_list_message(1, 1))
+        assert link.take(ask, ("192.0.2.1", 5)) == []
+        assert link.peers == {}
+        assert link.notices() == ["192.0.2.1 sends PARAM_REQUEST_LIST and no HEARTBEAT: it is not answered"]
+        assert link.take(ask, ("192.0.2.1", 6)) == []
+        assert link.notices() == [], "said once"
+        assert len(link.take(packed(HEARTBEAT) + ask, ("192.0.2.1", 5))) == 2
+        assert link.take(ask, ("192.0.2.1", 6)) == []
+        other = packed(mavlink.MAVLink_param_request_list_message(7, 1))
+        assert link.take(other, ("192.0.2.1", 5)) == []
+    finally:
+        link.close()
+
+
+def test_who_asks_the_vehicle_on_this_machine_needs_no_heartbeat(link: Link) -> None:
+    """Whatever is addressed to it makes a station known, and keeps it so; what is for all or for others does not."""
+    for_all = packed(mavlink.MAVLink_param_request_list_message(0, 0))
+    for_others = packed(mavlink.MAVLink_param_request_list_message(7, 1))
+    assert link.take(for_all, ("127.0.0.1", 5)) + link.take(for_others, ("127.0.0.1", 5)) == []
     assert link.peers == {}
-    assert len(link.take(packed(HEARTBEAT) + ask, ("127.0.0.1", 5))) == 2
-    assert link.take(ask, ("127.0.0.1", 6)) == []
-    other = packed(mavlink.MAVLink_param_request_list_message(7, 1))
-    assert link.take(other, ("127.0.0.1", 5)) == []
+    ask = packed(mavlink.MAVLink_mission_request_list_message(1, 1))
+    for _ in range(3):
+        assert [message.get_type() for message, _ in link.take(ask, ("127.0.0.1", 6))] == ["MISSION_REQUEST_LIST"]
+        link._clock.now += 0.6 * SILENCE
+    assert list(link.peers) == [("127.0.0.1", 6)]
 
 
 def test_the_table_of_stations_is_bounded_and_forgets(link: Link) -> None:
@@ -155,7 +178,7 @@ def _lengths(kind: type) -> list[int]:
 
 
 def test_strangers_and_others_are_counted(link: Link) -> None:
-    ask = mavlink.MAVLink_param_request_list_message(1, 1)
+    ask = mavlink.MAVLink_param_request_list_message(0, 0)
     link.take(packed(ask), ("127.0.0.1", 5))
     link.take(packed(HEARTBEAT, system=1), ("127.0.0.1", 5))
     link.take(packed(HEARTBEAT), ("127.0.0.1", 5))

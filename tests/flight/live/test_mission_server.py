@@ -257,10 +257,53 @@ def test_a_locked_or_too_large_upload_is_denied() -> None:
     server.locked = ""
     big = send(server, mavlink.MAVLink_mission_count_message(1, 1, MOST_UPLOADED + 1, 0), ONE, 20.0)
     assert big[0].message.type == mavlink.MAV_MISSION_NO_SPACE
-    send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), ONE, 30.0)
-    floats = mavlink.MAVLink_mission_item_message(1, 1, 0, 0, 16, 0, 1, 0, 0, 0, 0, 46.0, 8.0, 100.0, 0)
-    assert send(server, floats, ONE, 30.0)[0].message.type == mavlink.MAV_MISSION_UNSUPPORTED
     assert len(server.lists[MissionType.MISSION]) == 3
     assert send(server, mavlink.MAVLink_mission_clear_all_message(1, 1, 255), ONE, 40.0)[0].message.type == 0
     assert server.lists == dict.fromkeys(MissionType, ())
     assert send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 77), ONE, 41.0)[0].message.type == 3
+
+
+def float_item(seq: int, lat: float, current: int = 0) -> object:
+    return mavlink.MAVLink_mission_item_message(1, 1, seq, 0, 16, current, 1, 0, 12, 0, 0, lat, 8.0000004, 100.0, 0)
+
+
+def asked(replies: list) -> list[str]:
+    return [reply.message.get_type() for reply in replies]
+
+
+def test_an_upload_of_float_items_is_taken_and_said_to_be_inexact() -> None:
+    """Positions to the nearest 1e-7 degrees of what a float holds; the next item is asked for in the sender's form."""
+    server = MissionServer()
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), ONE, 0.0)
+    assert asked(send(server, float_item(0, 46.25), ONE, 0.01)) == ["MISSION_REQUEST"]
+    (done,) = send(server, float_item(1, -46.3), ONE, 0.02)
+    assert (done.message.get_type(), done.message.type) == ("MISSION_ACK", mavlink.MAV_MISSION_ACCEPTED)
+    assert "MISSION_ITEM_INT is exact" in done.text
+    first, second = server.lists[MissionType.MISSION]
+    # 46.25 and 8 are floats; of -46.3 the nearest is -46.299999237...
+    assert (first.x, first.y, second.x, first.params) == (462_500_000, 80_000_000, -462_999_992, (0.0, 12.0, 0.0, 0.0))
+    assert (first.lon_deg, second.lat_deg) == (8.0, -46.2999992), "on the grid of 1e-7 degrees"
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 0), ONE, 5.0)
+    assert send(server, float_item(0, 90.5), ONE, 5.0)[0].message.type == mavlink.MAV_MISSION_INVALID_PARAM5_X
+
+
+def test_a_station_that_knows_only_mission_request_is_asked_by_it() -> None:
+    """After four requests that nobody answers; who refuses that one gets MISSION_REQUEST_INT again."""
+    server, seen, now = MissionServer(), [], 0.0
+    send(server, mavlink.MAVLink_mission_count_message(1, 1, 1, 0), ONE, now)
+    while len(seen) < 5:
+        now += 0.01
+        seen += asked(server.tick(now))
+    assert seen == ["MISSION_REQUEST_INT"] * 3 + ["MISSION_REQUEST"] * 2
+    unsupported = mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_UNSUPPORTED, 0)
+    assert asked(send(server, unsupported, ONE, now)) == ["MISSION_REQUEST_INT"]
+    assert send(server, many_items(1)[0], ONE, now)[0].message.type == mavlink.MAV_MISSION_ACCEPTED
+
+
+@pytest.mark.parametrize("current", [2, 3])
+def test_a_guided_item_is_refused_at_once(current: int) -> None:
+    """Mission Planner's "fly to here" and its change of height are items of no mission."""
+    server = MissionServer()
+    (reply,) = send(server, float_item(0, 46.25, current), ONE, 0.0)
+    assert (reply.message.type, reply.text[:13]) == (mavlink.MAV_MISSION_UNSUPPORTED, "go-to refused")
+    assert server.lists[MissionType.MISSION] == ()

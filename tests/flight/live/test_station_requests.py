@@ -1,8 +1,12 @@
-"""Requests of stations: each has its own message rates."""
+"""Requests of stations: each has its own message rates; what the vehicle is not flown by is refused at once."""
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from flight.live.flight_process import FlightEnded, JudgeMission, StartFlight, send_event
+from flight.live.mavlink_items import MissionType
 from tests.flight.live.fake_vehicle import HEARTBEAT, FakeVehicle, command
+from tests.stations import item
 
 
 def test_rates_that_a_station_asks_for_are_its_own(fake: FakeVehicle) -> None:
@@ -14,3 +18,103 @@ def test_rates_that_a_station_asks_for_are_its_own(fake: FakeVehicle) -> None:
     assert (two["ATTITUDE"], two["VFR_HUD"]) == (1 / 30, 0.1)
     fake.send(command(511, 30.0, -1.0), command(511, 32.0, float("nan")), command(511, 74.0, 1.0))
     assert (one["ATTITUDE"], one["VFR_HUD"]) == (None, 0.02)
+
+
+def sent(fake: FakeVehicle) -> list[object]:
+    """What goes out from now on, as it is sent."""
+    out: list[object] = []
+    fake.link.send = lambda message, peer: out.append(message)
+    return out
+
+
+def results(out: list[object], number: int) -> list[int]:
+    return [m.result for m in out if m.get_type() == "COMMAND_ACK" and m.command == number]
+
+
+@pytest.mark.parametrize(
+    ("number", "word"),
+    [
+        (178, "speed change"),
+        (20, "RTL"),
+        (192, "go-to"),
+        (34, "orbit"),
+        (186, "height"),
+        (22, "take-off"),
+        (21, "land"),
+    ],
+)
+def test_what_the_vehicle_is_not_flown_by_is_refused_at_once(fake: FakeVehicle, number: int, word: str) -> None:
+    fake.send(HEARTBEAT)
+    out = sent(fake)
+    fake.send(command(number))
+    assert results(out, number) == [mavlink.MAV_RESULT_UNSUPPORTED]
+    assert next(m.text for m in out if m.get_type() == "STATUSTEXT").startswith(word)
+
+
+def test_a_guided_target_is_refused_in_words(fake: FakeVehicle) -> None:
+    """SET_POSITION_TARGET_GLOBAL_INT has no answer of its own."""
+    fake.send(HEARTBEAT)
+    out = sent(fake)
+    target = mavlink.MAVLink_set_position_target_global_int_message(
+        0, 1, 1, 6, 0, 460_000_000, 80_000_000, 150.0, *[0.0] * 8
+    )
+    for _ in range(20):
+        fake.send(target)
+    texts = [m.text for m in out if m.get_type() == "STATUSTEXT"]
+    assert texts[0].startswith("go-to refused")
+    assert sum(text.startswith("go-to") for text in texts) == 1, "a stream of targets is answered once"
+
+
+ITEMS = [item(k, 460_000_000, 80_000_000 + 50_000 * k, 100.0) for k in range(5)]
+
+
+def test_a_mission_starts_at_the_item_that_a_station_sets(fake: FakeVehicle) -> None:
+    """It is judged anew as what is flown, with the items' own numbers; a new upload begins at its first item."""
+    fake.upload(ITEMS)
+    assert [one.seq for one in fake.orders[-1].mission.items] == [1, 2, 3, 4]
+    out = sent(fake)
+    fake.send(mavlink.MAVLink_mission_set_current_message(1, 1, 3))
+    assert next(m.seq for m in out if m.get_type() == "MISSION_CURRENT") == 3
+    assert isinstance(fake.orders[-1], JudgeMission)
+    assert [one.seq for one in fake.orders[-1].mission.items] == [3, 4]
+    fake.turn()
+    assert fake.vehicle.status.current == 3
+    assert len(fake.vehicle.server.lists[MissionType.MISSION]) == 5
+    for number, result in ((0, 0), (4, 2), (5, 2)):
+        fake.send(command(224, number))
+        assert results(out, 224)[-1] == result, "the last item alone is no way, and there is no fifth"
+    fake.turn()
+    assert [one.seq for one in fake.orders[-1].mission.items] == [1, 2, 3, 4]
+    fake.send(command(224, 2.0))
+    fake.turn()
+    fake.upload(ITEMS)
+    assert [one.seq for one in fake.orders[-1].mission.items] == [1, 2, 3, 4]
+
+
+def test_after_a_flight_from_an_item_the_whole_mission_is_flown_again(fake: FakeVehicle) -> None:
+    fake.upload(ITEMS)
+    fake.send(command(224, 3.0))
+    fake.turn()
+    fake.send(command(400, 1.0), command(176, 1.0, 10.0))
+    assert fake.vehicle.arming.flying
+    assert isinstance(fake.orders[-1], StartFlight)
+    send_event(fake.flight, FlightEnded("completed"))
+    fake.vehicle.step(0.1)
+    fake.turn()
+    fake.turn()
+    assert [one.seq for one in fake.orders[-1].mission.items] == [1, 2, 3, 4]
+
+
+def test_a_refused_item_is_met_with_silence_by_message_and_with_a_result_by_command(fake: FakeVehicle) -> None:
+    """MAVSDK sends MISSION_SET_CURRENT again, without end, at each MISSION_CURRENT of another item."""
+    fake.upload(ITEMS)
+    fake.vehicle.arming.flying = True
+    (peer,) = fake.link.peers.values()
+    out = sent(fake)
+    before = fake.vehicle._clock()
+    fake.send(mavlink.MAVLink_mission_set_current_message(1, 1, 3))
+    assert not [m for m in out if m.get_type() == "MISSION_CURRENT"]
+    assert 2.9 < peer.due["MISSION_CURRENT"] - before < 4.0
+    assert any(m.get_type() == "STATUSTEXT" and m.text.startswith("item 3 refused: in flight") for m in out)
+    fake.send(command(224, 3.0))
+    assert results(out, 224) == [mavlink.MAV_RESULT_TEMPORARILY_REJECTED]

@@ -8,16 +8,22 @@ import pytest
 
 from flight.mission.fences import fence_problem, fence_shapes, with_fences
 from flight.mission.from_plan import plan_mission
+from flight.mission.items import MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
 from tests.mission_lines import a_plan
 from world.errors import MissionError
-from world.frames import to_map
+from world.frames import to_geo, to_map
+
+
+def nothing(_shape: tuple[MissionItem, ...]) -> bool:
+    """No shape is passed."""
+    return False
 
 
 def test_threats_and_area_become_a_fence() -> None:
     plan = a_plan([(9000.0, -5000.0, 700.0), (9500.0, -3000.0, 700.0), (-9000.0, 3000.0, 900.0)])
     scenario = plan.scenario
-    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), scenario)
+    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), scenario, nothing)
     shapes = fence_shapes(mission.fences)
     missiles = [k for k, radius in enumerate(scenario.threats.kill_radius) if radius > 0.0]
     assert [shape[0].command for shape in shapes] == [5001] + [5004] * len(missiles)
@@ -30,7 +36,7 @@ def test_threats_and_area_become_a_fence() -> None:
     box = np.array([corners.min(axis=0), corners.max(axis=0)]).T
     assert box == pytest.approx(scenario.bounds, abs=0.02)
     assert "a fence has no height" in notes[0]
-    assert any("passes through" in note for note in notes[1:])
+    assert len(notes) == 1
     assert mission.home is not None
     assert [item.alt + mission.home.alt for item in mission.rally] == pytest.approx([700.0, 900.0], abs=0.01)
     inside = scenario.threats.position[missiles[0]]
@@ -38,10 +44,27 @@ def test_threats_and_area_become_a_fence() -> None:
     assert fence_problem(mission.fences, scenario.origin, 9000.0, -5000.0) is None
 
 
+def test_what_the_mission_passes_is_left_out_and_named() -> None:
+    plan = a_plan([(9000.0, -5000.0, 700.0), (-9000.0, 3000.0, 900.0)])
+    threats = plan.scenario.threats
+    first = next(k for k, radius in enumerate(threats.kill_radius) if radius > 0.0)
+    centre = [float(value) for value in to_geo(plan.scenario.origin, *threats.position[first, :2])]
+
+    def over_the_first(shape: tuple[MissionItem, ...]) -> bool:
+        return [shape[0].lat_deg, shape[0].lon_deg] == pytest.approx(centre, abs=1e-6)
+
+    whole, _ = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, nothing)
+    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, over_the_first)
+    assert [item.x for item in mission.fences] == [item.x for k, item in enumerate(whole.fences) if k != 4]
+    assert [item.seq for item in mission.fences] == list(range(len(whole.fences) - 1))
+    (said,) = (note for note in notes if note.startswith("left out of the fence"))
+    assert f": {threats.names[first]};" in said
+
+
 @pytest.mark.parametrize("kind", ["fence", "rally", "plan"])
 def test_fences_come_back_from_every_form(kind: Any) -> None:
     plan = a_plan([(9000.0, -5000.0, 700.0), (-9000.0, 3000.0, 900.0)])
-    mission, _ = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario)
+    mission, _ = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, nothing)
     again = parse_mission(mission_text(mission, kind), f"a.{kind}")
     assert again.warnings == ()
     assert again.fences == (() if kind == "rally" else mission.fences)

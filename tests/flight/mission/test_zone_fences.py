@@ -9,7 +9,7 @@ import pytest
 
 from flight.mission.fences import fence_problem, fence_shapes, with_fences
 from flight.mission.from_plan import plan_mission
-from flight.mission.zone_fences import zone_fences, zones_under
+from flight.mission.zone_fences import zone_fences
 from flight.mission_files.formats import mission_text, parse_mission
 from planner.plan import Plan
 from tests.mission_lines import a_plan
@@ -75,13 +75,6 @@ def test_floors_and_ceilings_are_said() -> None:
     assert notes == ["a fence has no floor and no ceiling: low, high are in the fence at every height"]
 
 
-def test_zones_under_a_way() -> None:
-    zones = [Zone("it", "exclusion", Cylinder(0.0, 0.0, 100.0)), Zone("far", "exclusion", Cylinder(0.0, 500.0, 100.0))]
-    zones.append(Zone("fence", "inclusion", Cylinder(0.0, 0.0, 5000.0)))
-    assert zones_under(zones, np.array([[-900.0, 99.0], [900.0, 99.0]])) == ["it"]
-    assert zones_under(zones, np.array([[-900.0, 101.0], [900.0, 101.0]])) == []
-
-
 def planned(**tables: Any) -> Plan:
     plan = a_plan([(0.0, 0.0, 150.0), (6000.0, 0.0, 150.0)])
     scenario = small_scenario(threats=[], **tables)
@@ -104,7 +97,7 @@ TABLES: dict[str, Any] = {
 @pytest.mark.parametrize("kind", ["fence", "plan"])
 def test_a_scenarios_zones_come_back_from_every_form(kind: Any) -> None:
     plan = planned(**TABLES)
-    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario)
+    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: False)
     # The area's four corners, the circle, and the polygon's four.
     assert [item.command for item in mission.fences] == [5001] * 4 + [5004] + [5001] * 4
     again = parse_mission(mission_text(mission, kind), f"a.{kind}").fences
@@ -113,12 +106,19 @@ def test_a_scenarios_zones_come_back_from_every_form(kind: Any) -> None:
     assert len(again) == len(mission.fences)
     assert notes == (
         "a fence has no floor and no ceiling: mast is in the fence at every height",
-        "the mission passes mast above or below: an autopilot with this fence refuses it or breaks off",
         "a fence does not follow the ground: the greatest height of 400 m above ground is not in it",
     )
 
 
 def test_a_scenario_without_zones_says_nothing_of_them() -> None:
     plan = planned()
-    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario)
+    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: False)
     assert (len(mission.fences), notes) == (4, ())
+
+
+def test_what_is_to_be_stayed_in_is_never_left_out() -> None:
+    """Whatever is said to be passed: only exclusions are."""
+    plan = planned(**TABLES)
+    mission, notes = with_fences(plan_mission(plan, 25.0, math.radians(30.0)), plan.scenario, lambda _: True)
+    assert [item.command for item in mission.fences] == [5001] * 8
+    assert any("above or below: mast;" in note for note in notes)

@@ -1,12 +1,16 @@
 """Coordinates through our files into other people's importers, as whole numbers of 1e-7 degrees."""
 
 import json
+import math
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from flight.mission.items import MissionItem
 from flight.mission_files.formats import mission_text, parse_mission
 from flight.mission_files.wpl import fence_text
 from tests.flight.mission_files.worldwide_mission import some_mission
@@ -53,3 +57,51 @@ def test_pymavlink_loads_fences_as_they_are(tmp_path: Path, monkeypatch: pytest.
     assert loader.load(str(file)) == len(mission.fences)
     assert [loader.wp(k).command for k in range(loader.count())] == [item.command for item in mission.fences]
     assert [round(loader.wp(k).x * 1e7) for k in range(loader.count())] == [item.x for item in mission.fences]
+
+
+# Mission Planner's `MissionFile` (ExtLibs/Utilities, MissionFile.cs): its reader, Json.NET, takes no "25.0" for an int
+# and no null for a double.
+_MISSION_PLANNER: dict[str, Any] = {
+    "version": int,
+    "fileType": str,
+    "groundStation": str,
+    "geoFence": {
+        "version": int,
+        "circles": [{"circle": {"center": [float], "radius": float}, "inclusion": bool, "version": int}],
+        "polygons": [{"inclusion": bool, "polygon": [[float]], "version": int}],
+    },
+    "mission": {
+        **dict.fromkeys(("cruiseSpeed", "firmwareType", "hoverSpeed", "vehicleType", "version"), int),
+        "plannedHomePosition": [float],
+        "items": [
+            {
+                **dict.fromkeys(("command", "doJumpId", "frame"), int),
+                "autoContinue": bool,
+                "type": str,
+                "params": [float | None],
+            }
+        ],
+    },
+    "rallyPoints": {"points": [[float]], "version": int},
+}
+
+
+def mismatches(value: Any, kind: Any, where: str = "") -> list[str]:
+    """Places where a JSON value does not fit a C# class; keys that the class does not have are ignored."""
+    if isinstance(kind, dict):
+        return [line for key, part in kind.items() for line in mismatches(value[key], part, f"{where}.{key}")]
+    if isinstance(kind, list):
+        return [line for k, part in enumerate(value) for line in mismatches(part, kind[0], f"{where}[{k}]")]
+    numbers = kind in (float, float | None) and type(value) is int
+    return [] if numbers or (isinstance(value, kind) and not (kind is int and type(value) is bool)) else [where]
+
+
+@pytest.mark.parametrize("speed", [12.4, 25.0, None])
+def test_mission_planners_classes_take_what_is_written(speed: float | None) -> None:
+    mission = some_mission(30)
+    loose = MissionItem(9, 5100, 3, (0.0,) * 4, 46.0, 8.0, math.nan)
+    mission = replace(mission, cruise_speed=speed, rally=(*mission.rally, loose))
+    written = json.loads(mission_text(mission, "plan"))
+    assert mismatches(written, _MISSION_PLANNER) == []
+    assert written["mission"]["cruiseSpeed"] == {12.4: 12, 25.0: 25, None: written["mission"]["cruiseSpeed"]}[speed]
+    assert mismatches({**written, "version": 1.0}, _MISSION_PLANNER) == [".version"]

@@ -42,7 +42,8 @@ def test_a_message_index_points_at_its_messages(log_file: Path) -> None:
 @pytest.mark.parametrize("rate_hz", [1.0, 60.0, 700.0])
 def test_a_chunk_holds_at_most_a_second_and_64_kib(tmp_path: Path, setup: FlightSetup, rate_hz: float) -> None:
     path = record(tmp_path / "a.mcap", setup, make_track(3.0, rate_hz))
-    for chunk in chunks(path)[1:]:  # the first holds the scene
+    # The first hold the scene, of which a part may be larger.
+    for chunk in (chunk for chunk in chunks(path) if chunk.message_end_time > EPOCH_NS):
         assert chunk.message_start_time // SECOND_NS == chunk.message_end_time // SECOND_NS
         assert chunk.uncompressed_size <= CHUNK_SIZE + 4096
     np.testing.assert_array_equal(read_log(path).track.time, make_track(3.0, rate_hz).time)

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from logs.recording.foxglove_layout import layout_text
+from logs.recording.foxglove_scene import AIRCRAFT
 from logs.recording.recorder import _CHANNELS, ZONES_TOPIC
 from logs.recording.state_channel import FIELDS, STATE_TOPIC
+from logs.recording.viewers.aircraft_model import SPAN
 from tests.clients import need
 
 
@@ -16,11 +18,18 @@ def test_the_layout_names_only_topics_and_fields_of_a_log() -> None:
     layout = json.loads(layout_text())
     fields = {field.name for field in FIELDS}
     topics = {*_CHANNELS, STATE_TOPIC, ZONES_TOPIC}
+    assert set(layout["configById"]["3D!planfly"]["topics"]) <= topics
     for name, panel in layout["configById"].items():
         for path in panel.get("paths", ()):
             topic, _, field = path["value"].partition(".")
+            field, _, function = field.partition(".@")
             assert topic == STATE_TOPIC, name
             assert field in fields, name
+            # Angles are shown in degrees, and said to be.
+            assert function == ("rad2deg" if field.endswith("_rad") else ""), name
+            assert path["label"] == (field.removesuffix("_rad") + "_deg" if function else field)
+        # A legend beside the curves covers none of them.
+        assert panel.get("legendDisplay", "top") == "top", name
         named = [panel.get(key) for key in ("followTopic", "topicToRender", "topicPath") if key in panel]
         assert set(named) | set(panel.get("topics", ())) <= topics
 
@@ -60,4 +69,16 @@ def test_the_layouts_settings_are_those_that_foxglove_knows() -> None:
             assert set(path) <= names(known.PlotSeries)
         assert set(panel.get("cameraState", ())) <= names(known.ThreeDeeCameraState)
         assert set(panel.get("scene", ())) <= names(known.BaseRendererSceneSettings)
-        assert set(panel.get("scene", {}).get("transforms", ())) <= names(known.BaseRendererTransforms)
+        # The 3D panel itself reads `axisScale` (FrameAxes.ts); the class of the SDK calls it otherwise.
+        assert set(panel.get("scene", {}).get("transforms", ())) <= {"axisScale", *names(known.BaseRendererTransforms)}
+
+
+def test_the_start_is_in_view() -> None:
+    """Wherever on the map that is: the camera keeps to the aircraft, some ten of its drawn spans away."""
+    panel = json.loads(layout_text())["configById"]["3D!planfly"]
+    assert (panel["followTf"], panel["followMode"], panel["cameraState"]["target"]) == (
+        AIRCRAFT, "follow-position", [0, 0, 0],
+    )  # fmt: skip
+    assert 8.0 < panel["cameraState"]["distance"] / SPAN < 20.0
+    assert panel["scene"]["transforms"]["axisScale"] < SPAN
+    assert panel["topics"]["/scene/aircraft"]["visible"]

@@ -11,7 +11,7 @@ from flight.simulation.track import Track
 from logs.recording.chunk_layout import SECOND_NS
 from logs.recording.foxglove_scene import body_rotation
 from logs.recording.state_channel import EPOCH_NS
-from tests.logs.made_flight import make_setup, record
+from tests.logs.made_flight import make_setup, make_track, record
 from tests.logs.mcap_messages import messages
 from world.frames import to_geo
 
@@ -22,7 +22,8 @@ def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
     found = messages(log_file)
     assert sorted(found) == sorted(
         ["/state", "/tf", "/fix", "/log"]
-        + [f"/scene/{part}" for part in ("terrain", "threats", "plan", "zones", "track")]
+        + [f"/scene/{part}" for part in ("terrain", "threats", "plan", "zones", "track", "aircraft")]
+        + [f"/points/{part}" for part in ("terrain", "threats", "plan", "track", "aircraft")]
     )
     seconds = track.time[-1] - track.time[0]
     for topic, rate in (("/tf", 5), ("/fix", 1)):
@@ -51,7 +52,8 @@ def test_viewers_get_poses_fixes_scenes_and_events_of_the_recorded_rows(
     assert [sphere.size.x for sphere in threats.spheres] == [800.0, 1600.0]
     line = found["/scene/track"][-1][1].entities[0].lines[0]
     assert (line.points[-1].x, line.points[-1].y) == tuple(track.position[-1, :2])
-    assert [(item.level, item.message) for _, item in found["/log"]] == [(3, "half way up"), (2, "arrived")]
+    said = [(item.level, item.message) for _, item in found["/log"] if item.name == "planfly"]
+    assert said == [(3, "half way up"), (2, "arrived")]
 
 
 def test_a_log_has_a_scene_of_the_scenarios_zones_and_the_missions_fence(tmp_path: Path, track: Track) -> None:
@@ -62,3 +64,19 @@ def test_a_log_has_a_scene_of_the_scenarios_zones_and_the_missions_fence(tmp_pat
     setup = make_setup()
     free = replace(setup, mission=replace(setup.mission, fences=()))
     assert "/scene/zones" not in messages(record(tmp_path / "none.mcap", free, track))
+
+
+def test_the_track_keeps_up(tmp_path: Path) -> None:
+    """A message at least every 2 s of flight, each the whole track so far, to where the aircraft is."""
+    flown = make_track(31.0)
+    found = messages(record(tmp_path / "long.mcap", make_setup(), flown))["/scene/track"]
+    times = [(message.log_time - EPOCH_NS) / 1e9 for message, _ in found]
+    assert times[0] == 0.0
+    assert max(np.diff(times)) <= 2.0
+    for time, (_, update) in zip(times, found, strict=True):
+        (entity,) = update.entities
+        line = entity.lines[0].points
+        row = min(int(np.searchsorted(flown.time, time - 1e-6)), len(flown) - 1)
+        assert (entity.id, len(line) <= 96) == ("track", True)
+        np.testing.assert_allclose([line[0].x, line[0].y, line[0].z], flown.position[0], atol=0.04)
+        np.testing.assert_allclose([line[-1].x, line[-1].y, line[-1].z], flown.position[row], atol=0.04)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from logs.recording.foxglove_scene import body_rotation, zones_scene
+from logs.recording.foxglove_scene import body_rotation, plan_scene, threats_scene, zones_scene
 from logs.recording.state_channel import EPOCH_NS
 from tests.logs.made_flight import make_setup
 
@@ -50,3 +50,25 @@ def test_zones_are_lines_from_the_ground_to_the_ceiling() -> None:
     assert [{point.z for point in line.points} for line in town] == [{40.0}, {700.0}, *[{40.0, 700.0}] * 4]
     fence = [point for line in entity.lines[6:] for point in line.points]
     assert all(math.hypot(point.x, point.y) == pytest.approx(1400.0) for point in fence)
+
+
+def test_names_stand_above_the_ground() -> None:
+    """Of a threat on a hill's flank, at the hill's foot, and without any ground known."""
+    hill = [{"east_m": 100.0, "north_m": 200.0, "height_m": 333.3, "sigma_m": 150.0}]
+    setup = make_setup(terrain={"kind": "peaks", "peak": hill})
+    terrain, threats = setup.scenario.terrain, setup.scenario.threats
+    entity = SceneUpdate.FromString(threats_scene(EPOCH_NS, threats, terrain)).entities[0]
+    assert [text.text for text in entity.texts] == list(threats.names)
+    for text in entity.texts:
+        place = text.pose.position
+        east, north = np.meshgrid(place.x + np.arange(-200.0, 201.0, 50.0), place.y + np.arange(-200.0, 201.0, 50.0))
+        assert place.z > terrain.height(east, north).max()
+    free = SceneUpdate.FromString(threats_scene(EPOCH_NS, threats, None)).entities[0]
+    assert [text.pose.position.z for text in free.texts] == [pytest.approx(up + 40.0) for up in threats.position[:, 2]]
+
+
+def test_waypoints_are_named_as_in_a_verdict() -> None:
+    setup = make_setup()
+    update = plan_scene(EPOCH_NS, setup.route.waypoints, setup.route.items.tolist())
+    entity = SceneUpdate.FromString(update).entities[0]
+    assert [text.text for text in entity.texts] == ["0", "1 (item 2)", "2 (item 3)", "3 (item 4)"]

@@ -5,6 +5,7 @@ from xml.etree import ElementTree
 
 import gpxpy
 import numpy as np
+import pyarrow.parquet
 import pytest
 
 from flight.mission_files.formats import read_mission
@@ -36,6 +37,9 @@ def test_a_plan_in_every_form(plan_file: Path, tmp_path: Path, capsys: pytest.Ca
     assert main(["export", str(plan_file), *map(str, targets)]) == 0
     printed = capsys.readouterr()
     assert "a fence has no height" in printed.err
+    # A map is named by the scenario, not by where its file lies.
+    assert ElementTree.parse(targets[4]).getroot().findtext(f"{KML}Document/{KML}name") == "jacksboro"
+    assert gpxpy.parse(targets[5].read_text()).name == "jacksboro"
     assert printed.out.count("\n") == len(targets)
     waypoints, plan, fence, rally = (read_mission(target) for target in targets[:4])
     assert waypoints.items == plan.items
@@ -93,5 +97,30 @@ def test_an_unknown_suffix_is_refused_with_the_known_ones(
     plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
 ) -> None:
     assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / name)]) == 2
-    assert "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx" in capsys.readouterr().err
+    assert (
+        "allowed .waypoints, .plan, .txt, .fence, .rally, .kml, .gpx, .csv, .parquet, .tlog, .ulg"
+        in capsys.readouterr().err
+    )
     assert not (tmp_path / "a.plan").exists()
+
+
+def test_a_log_in_other_programs_forms(log_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    targets = [tmp_path / f"f.{kind}" for kind in ("csv", "parquet", "tlog", "ulg")]
+    assert main(["export", str(log_file), *map(str, targets)]) == 0
+    rows = len(read_log(log_file).track)
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == ["flight"] * 4
+    assert len(targets[0].read_text().splitlines()) == rows + 1
+    assert pyarrow.parquet.read_metadata(targets[1]).num_rows == rows
+    # Both are logs of the field to `check`, and the same flight.
+    for target in targets[2:]:
+        assert main(["check", str(target)]) in (0, 4)
+        assert "Judged: " in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("kind", ["csv", "parquet", "tlog", "ulg"])
+def test_what_is_about_a_flight_is_not_written_of_a_plan(
+    plan_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str
+) -> None:
+    assert main(["export", str(plan_file), str(tmp_path / "a.plan"), str(tmp_path / f"a.{kind}")]) == 2
+    assert f".{kind} is written of a flight log (.mcap)" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

@@ -95,6 +95,30 @@ def test_a_mission_that_cannot_be_flown_is_armed_only_by_force(serve: Callable[.
     assert main(["check", str(vehicle.folder / "logs" / "flight-001.mcap")]) == 4
 
 
+def test_a_station_without_heartbeats_uploads_floats_and_flies(serve: Callable[..., Served]) -> None:
+    """A script on this machine that knows only MISSION_ITEM; the flight starts at the item that it sets."""
+    vehicle = serve("--scenario", "field.toml", "--speed", "50")
+    with UdpStation(vehicle.port, mute=True) as station:
+        station.send(mavlink.MAVLink_mission_count_message(1, 1, len(LONG), 0))
+        for k, one in enumerate(LONG):
+            station.until(lambda m, k=k: m.get_type().startswith("MISSION_REQUEST") and m.seq == k)
+            place = (one.x / 1e7, one.y / 1e7, one.z)
+            station.send(
+                mavlink.MAVLink_mission_item_message(1, 1, k, one.frame, one.command, 0, 1, *[0.0] * 4, *place, 0)
+            )
+        assert station.until(lambda m: m.get_type() == "MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
+        station.send(mavlink.MAVLink_mission_set_current_message(1, 1, 2))
+        station.until(lambda m: m.get_type() == "MISSION_CURRENT" and m.seq == 2)
+        station.fly()
+        station.until(done)
+        assert [m.seq for m in station.log if m.get_type() == "MISSION_ITEM_REACHED"] == [2, 3]
+        assert "MISSION_ITEM_INT is exact" in station.texts()
+    assert vehicle.stop() == 0
+    assert not [line for line in vehicle.lines if line.startswith("frames dropped")]
+    log = read_log(vehicle.folder / "logs" / "flight-001.mcap")
+    assert [one.seq for one in log.setup.mission.items] == [2, 3]
+
+
 def test_of_two_stations_over_sockets_one_wins(serve: Callable[..., Served]) -> None:
     vehicle = serve("--scenario", "field.toml")
     rng = random.Random(4)

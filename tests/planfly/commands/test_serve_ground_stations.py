@@ -103,6 +103,27 @@ def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_
     assert log.setup.route.waypoints[:, 2] == pytest.approx([100.0, 100.0, 110.0])
 
 
+def test_mavsdk_is_answered_at_once_whatever_it_asks(serve: Callable[..., Served], tmp_path: Path) -> None:
+    """A start at another item is flown; in flight all is refused, MISSION_SET_CURRENT by the only way it has."""
+    need("mavsdk")
+    port = free_port()
+    vehicle = serve("--scenario", "field.toml", to=port)
+    found = mavsdk(
+        tmp_path, port, [[46.0, 8.0, 100.0], [46.0, 8.0033, 100.0], [46.0, 8.0165, 100.0], [46.0, 8.03, 100.0]], "ask"
+    )
+    seconds, answer = found["ground"]["item"]
+    assert (seconds < 2.0, answer) == (True, "SUCCESS")
+    answers = {name: answer for name, (_, answer) in found["flight"].items()}
+    denied = dict.fromkeys(("hold", "return", "go"), "COMMAND_DENIED")
+    assert answers == {"item": "TIMEOUT", "pause": "DENIED", **denied, "speed": "UNSUPPORTED", "orbit": "UNSUPPORTED"}
+    # MAVSDK asks five times, half a second apart.
+    assert found["flight"]["item"][0] < 5.0
+    assert max(seconds for name, (seconds, _) in found["flight"].items() if name != "item") < 2.0
+    assert vehicle.stop() == 0
+    log = read_log(tmp_path / "logs" / "flight-001.mcap")
+    assert len(log.setup.route.waypoints) == 3, "from the second place on"
+
+
 def test_mavsdk_uploads_over_a_bad_link(serve: Callable[..., Served], tmp_path: Path) -> None:
     """One datagram in ten lost each way: 200 items in the soak, 40 here; all arrive as they were sent."""
     need("mavsdk")

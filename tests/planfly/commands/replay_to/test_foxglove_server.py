@@ -17,6 +17,7 @@ import pytest
 from flight.simulation.track import Track
 from logs.recording.state_channel import EPOCH_NS, state_class
 from planfly.cli import main
+from planfly.commands.replay_to.foxglove_server import SUBPROTOCOL
 from tests.clients import need
 from tests.logs.made_flight import make_setup, make_track, record
 
@@ -97,11 +98,12 @@ def test_a_viewer_is_given_the_log(log_path: Path, track: Track) -> None:
 
     with served(str(log_path), "--speed", "3") as (process, viewer):
         deadline = time.monotonic() + 20.0
-        while len(viewer.channels) < 9 and time.monotonic() < deadline:
+        while len(viewer.channels) < 15 and time.monotonic() < deadline:
             viewer.take(1.0)
         assert set(viewer.channels) == {
             "/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/zones", "/scene/plan",
-            "/scene/track",
+            "/scene/track", "/scene/aircraft",
+            *(f"/points/{part}" for part in ("terrain", "threats", "plan", "track", "aircraft")),
         }  # fmt: skip
         state = viewer.channels["/state"]
         assert (state["encoding"], state["schemaName"], state["schemaEncoding"]) == (
@@ -132,6 +134,23 @@ def test_a_viewer_is_given_the_log(log_path: Path, track: Track) -> None:
     assert topics == {"/state", "/scene/terrain", "/log", "/scene/plan"}
     assert viewer.times == sorted(viewer.times)
     assert viewer.times[-1] == rows[-1][0]
+
+
+def test_the_subprotocol_is_the_one_that_is_stated(log_path: Path) -> None:
+    """In what is printed and in the help; a viewer that asks for the older name alone is refused."""
+    needed("foxglove", "foxglove-sdk")
+    from websockets.exceptions import WebSocketException
+    from websockets.sync.client import connect
+
+    from planfly.terminal.parser import build_parser
+
+    with served(str(log_path)) as (_, viewer):
+        assert viewer.socket.subprotocol == SUBPROTOCOL == "foxglove.sdk.v1"
+        host, port = viewer.socket.remote_address[:2]
+        with pytest.raises(WebSocketException):
+            connect(f"ws://{host}:{port}", subprotocols=["foxglove.websocket.v1"], proxy=None)  # type: ignore[list-item]  # a plain string
+    commands = next(action for action in build_parser()._actions if hasattr(action, "choices") and action.choices)
+    assert SUBPROTOCOL in " ".join(commands.choices["replay"].format_help().split())
 
 
 def test_only_this_machine_is_served_and_a_port_in_use_is_said(
