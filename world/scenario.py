@@ -123,9 +123,8 @@ def load_scenario(name_or_path: str, terrain: str | None = None) -> Scenario:
         missing = True
     if missing:
         near = did_you_mean(name_or_path, [*known, *_files_beside(path)])
-        raise ScenarioError(
-            f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)}){near}", file=name_or_path
-        )
+        said = f"{name_or_path}: no such file, and not an embedded scenario ({', '.join(known)}){near}"
+        raise ScenarioError(said, file=name_or_path)
     spec = parse_scenario(read_scenario_text(path), str(path))
     return from_spec(spec, str(path), base=path.parent, terrain=terrain)
 
