@@ -16,12 +16,12 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.ready-test
 
 # make low, make newest: the tests with the lowest versions supported, and with the newest there are
-.PHONY: demo test bench soak low newest dev setup clients clean
+.PHONY: demo test bench soak low newest dev docs setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
-test: $(TESTED) clients
+test: $(TESTED) clients docs
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 # Compiled once, while types are checked: each of pytest's processes would compile for itself.
@@ -54,6 +54,11 @@ low newest:
 	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(TWO) $(LOW)
 
 dev: $(TESTED)
+
+# The pages of docs/ as HTML, in build/docs; nothing is fetched while they are built, and every warning is an error.
+docs: $(READY)
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	$(BIN)/python -m sphinx -W -q -b html -d build/docs-trees docs build/docs
 
 setup: $(READY)
 

@@ -1,0 +1,64 @@
+"""The reference of the command line, made from its parser's own help."""
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from planfly.terminal.command_parser import CommandParser
+from planfly.terminal.exit_codes import EXIT_CODES
+from planfly.terminal.parser import build_parser
+
+_ENTRY = re.compile(r"^  (\S.*?)(?:  +(\S.*))?$")
+
+
+@contextmanager
+def _wide(columns: int) -> Iterator[None]:
+    """Help in lines of so many columns, without colour."""
+    before = {name: os.environ.get(name) for name in ("COLUMNS", "NO_COLOR")}
+    os.environ.update(COLUMNS=str(columns), NO_COLOR="1")
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            os.environ.pop(name, None) if value is None else os.environ.update({name: value})
+
+
+def command_pages() -> str:
+    """A section a command: what it does, its usage, options in their groups, examples; at the end the exit codes."""
+    parts = [_section(name, parser) for name, parser in build_parser().commands.items()]
+    return "\n\n".join([*parts, f"## Exit codes\n\n```text\n{EXIT_CODES.strip()}\n```"])
+
+
+def _section(name: str, parser: CommandParser) -> str:
+    with _wide(76):
+        usage = parser.format_usage().strip()
+    with _wide(100_000):
+        text = parser.format_help().replace(EXIT_CODES.strip(), "")
+    # After the usage come what it does, the groups of options, and examples.
+    description, _, rest = text.partition("\n\n")[2].partition("\n\n")
+    out = [f"## {name}", _escaped(description.strip()), f"```text\n{usage}\n```"]
+    for block in re.split(r"\n(?=\S)", rest):
+        title, _, entries = block.partition("\n")
+        if title.startswith("example:") or not _ENTRY.match(entries.split("\n")[0]):
+            out += [f"```text\n{block.strip()}\n```"] if block.strip() else []
+        else:
+            out.append(f"**{title.rstrip(':')}**\n\n{_definitions(entries)}")
+    return "\n\n".join(out)
+
+
+def _definitions(entries: str) -> str:
+    """Options and what they do, as a definition list."""
+    found: list[list[str]] = []
+    for line in entries.splitlines():
+        if not line.strip():
+            continue
+        if not line.startswith("   ") and (entry := _ENTRY.match(line)):
+            found.append([entry[1], entry[2] or ""])
+        elif found:
+            found[-1][1] = f"{found[-1][1]} {line.strip()}".strip()
+    return "\n\n".join(f"`{name}`\n: {_escaped(text) or '–'}" for name, text in found)
+
+
+def _escaped(text: str) -> str:
+    return re.sub(r"([*_<>\[\]|$`])", r"\\\1", text).replace("--", "\\--")

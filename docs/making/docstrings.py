@@ -1,0 +1,25 @@
+"""Docstrings of the house laid out for Sphinx: a line ``name: what it is`` describes an argument or a field."""
+
+import re
+from collections.abc import Iterable
+
+_NAMED = re.compile(r"^([a-z]\w*(?:, [a-z]\w*)*): (.*)$")
+
+
+def as_rst(lines: Iterable[str]) -> list[str]:
+    """The lines with each such name in bold on a line of its own."""
+    out: list[str] = []
+    named = False
+    for line in lines:
+        found = _NAMED.match(line)
+        if found:
+            if not named and out and out[-1]:
+                out.append("")
+            out += [f"* **{found[1]}**: {found[2]}"]
+            named = True
+        elif named and line.strip() and not line.startswith((" ", ">>>")):
+            out.append(f"  {line}")
+        else:
+            named = False
+            out.append(line)
+    return out

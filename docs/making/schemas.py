@@ -1,0 +1,54 @@
+"""Tables of what commands answer with ``--json``, made from their JSON schemas."""
+
+import json
+from typing import Any
+
+from planfly.terminal.answers.schemas import ANSWERS, schema_text
+
+
+def schema_tables(command: str) -> str:
+    """The fields of a command's answer, and of what it is made of: name, type, meaning."""
+    schema = json.loads(schema_text(command))
+    parts = [_table(schema)]
+    for name, one in schema.get("$defs", {}).items():
+        parts.append(f"**{name}**: {one.get('description', '')}\n\n{_table(one)}")
+    return "\n\n".join(parts)
+
+
+def answering_commands() -> list[str]:
+    """The commands that have a schema."""
+    return list(ANSWERS)
+
+
+def _table(schema: dict[str, Any]) -> str:
+    rows = [
+        f"| `{name}` | {_type(one)} | {one.get('description', '').replace('|', '/')} |"
+        for name, one in schema.get("properties", {}).items()
+    ]
+    return "| field | type | meaning |\n|---|---|---|\n" + "\n".join(rows)
+
+
+def _type(one: dict[str, Any]) -> str:
+    if "$ref" in one:
+        return one["$ref"].rpartition("/")[2]
+    if "const" in one:
+        return f"`{one['const']}`"
+    if "enum" in one:
+        return " or ".join(f"`{value}`" for value in one["enum"])
+    for key in ("anyOf", "oneOf"):
+        if key in one:
+            return " or ".join(_type(other) for other in one[key])
+    if one.get("type") == "array":
+        return f"list of {_type(one.get('items', {}))}"
+    return str(one.get("type", "any"))
+
+
+def answer_table() -> str:
+    """A row a command: its schema's name, and the fields at its top."""
+    rows = []
+    for command in answering_commands():
+        schema = json.loads(schema_text(command))
+        fields = schema.get("properties", {})
+        name = fields.get("schema", {}).get("const", "")
+        rows.append(f"| `{command}` | `{name}` | {', '.join(f'`{one}`' for one in fields if one != 'schema')} |")
+    return "| command | schema | fields |\n|---|---|---|\n" + "\n".join(rows)

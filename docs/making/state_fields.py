@@ -1,0 +1,8 @@
+"""The fields of a log's `/state` channel, read from its schema."""
+
+from logs.recording.state_channel import FIELDS
+
+
+def state_fields() -> str:
+    """Names in the order of the message."""
+    return ", ".join(f"`{name}`" for name in ["row", *(field.name for field in FIELDS)])

@@ -1,0 +1,99 @@
+"""Tables of the verdict's tolerances, read from their module: value, unit, reason and source as they stand there."""
+
+import ast
+import math
+import re
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from logs.verdict import tolerances
+
+ROOT = Path(__file__).parents[2]
+VERDICT = ROOT / "logs" / "verdict"
+_HEADING = re.compile(r"^# [A-Z][^.]*$")
+
+
+class Tolerance(NamedTuple):
+    """A constant: its name, its value as a person reads it, what it is, and the heading that it stands under."""
+
+    name: str
+    value: str
+    text: str
+    heading: str
+
+
+def _shown(value: object, angle: bool) -> str:
+    """A value in words; an angle in degrees."""
+    if isinstance(value, dict):
+        return ", ".join(f"{key} {_shown(one, angle)}" for key, one in value.items())
+    if isinstance(value, int | float):
+        return f"{math.degrees(value):.6g}°" if angle else f"{value:.10g}"
+    return str(value)
+
+
+@cache
+def tolerance_list() -> tuple[Tolerance, ...]:
+    """Every constant of `logs.verdict.tolerances`, in the order of the file."""
+    source = (VERDICT / "tolerances.py").read_text(encoding="utf-8")
+    lines, out, heading = source.splitlines(), [], ""
+    starts = {node.lineno - 1: node for node in ast.parse(source).body if isinstance(node, ast.Assign)}
+    comment: list[str] = []
+    for number, line in enumerate(lines):
+        if line.startswith("#"):
+            comment.append(line[1:].strip())
+        elif number in starts:
+            # A constant without words of its own shares those of the one above.
+            text = " ".join(comment) or out[-1].text
+            for name, expression in _assigned(starts[number]):
+                angle = "radians" in expression or "math.pi" in expression
+                told = text.removeprefix("rad.").strip() if angle else text
+                out.append(Tolerance(name, _shown(getattr(tolerances, name), angle), told, heading))
+        elif not line:
+            if comment:
+                heading = " ".join(comment)
+            comment = []
+        if number in starts:
+            comment = []
+    return tuple(out)
+
+
+def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
+    """Each name of an assignment with the expression that it gets."""
+    target, value = node.targets[0], node.value
+    if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+        pairs = zip(target.elts, value.elts, strict=True)
+        return [(ast.unparse(name), ast.unparse(one)) for name, one in pairs]
+    return [(ast.unparse(target), ast.unparse(value))]
+
+
+def _table(rows: list[Tolerance]) -> str:
+    body = "\n".join(f"| `{one.name}` | {one.value} | {one.text.replace('|', '/')} |" for one in rows)
+    return f"| constant | value | what it is, and its source |\n|---|---|---|\n{body}"
+
+
+def imported_tolerances(module: str) -> set[str]:
+    """The constants that a module of the verdict, such as ``rules/turn_rule``, imports."""
+    tree = ast.parse((VERDICT / f"{module}.py").read_text(encoding="utf-8"))
+    return {
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module == "logs.verdict.tolerances"
+        for alias in node.names
+    }
+
+
+def rule_tolerances(*modules: str) -> str:
+    """The table of what a rule's modules use."""
+    wanted = set().union(*(imported_tolerances(module) for module in modules))
+    return _table([one for one in tolerance_list() if one.name in wanted])
+
+
+def all_tolerances() -> str:
+    """Every tolerance, a table a heading."""
+    headings = dict.fromkeys(one.heading for one in tolerance_list())
+    parts = [
+        f"### {heading}\n\n{_table([one for one in tolerance_list() if one.heading == heading])}"
+        for heading in headings
+    ]
+    return "\n\n".join(parts)

@@ -1,0 +1,107 @@
+"""The pages name what is there: every rule, tolerance, command, option and public name; links lead somewhere."""
+
+import math
+import re
+import shlex
+import sys
+from pathlib import Path
+
+import pytest
+
+import planfly
+from logs.verdict import tolerances
+from logs.verdict.findings import RULES
+from planfly.terminal.parser import build_parser
+from tests.docs.page_blocks import PAGES, ROOT
+
+sys.path.insert(0, str(ROOT / "docs"))
+from making.placeholders import filled
+from making.tolerances import imported_tolerances
+
+sys.path.pop(0)
+
+ALL = PAGES
+_CODE = re.compile(r"(?<!`)`(planfly [^`]+)`(?!`)")
+_LINK = re.compile(r"\]\(([^)\s]+)\)")
+
+
+def text_of(name: str) -> str:
+    return filled((ROOT / "docs" / name).read_text(encoding="utf-8"))
+
+
+def section(text: str, title: str) -> str:
+    """What stands under a heading of the second level."""
+    return re.split(r"^## ", text.split(f"\n## {title}\n", 1)[1], maxsplit=1, flags=re.MULTILINE)[0]
+
+
+def numbers(value: object) -> list[float]:
+    return list(value.values()) if isinstance(value, dict) else [float(value)]  # type: ignore[arg-type]
+
+
+def test_every_rule_has_a_section_with_the_tolerances_that_it_uses() -> None:
+    page = text_of("verdict.md")
+    for rule in RULES:
+        assert f"\n### {rule}\n" in page, rule
+    used = {file.stem: imported_tolerances(f"rules/{file.stem}") for file in (ROOT / "logs/verdict/rules").glob("*.py")}
+    source = (ROOT / "docs" / "verdict.md").read_text(encoding="utf-8")
+    for module, constants in used.items():
+        if constants:
+            assert re.search(rf"<!-- made: tolerances .*\brules/{module}\b", source), module
+
+
+def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
+    page = text_of("verdict.md")
+    names = [name for name in vars(tolerances) if name.isupper()]
+    assert len(names) > 80
+    for name in names:
+        rows = re.findall(rf"^\| `{name}` \| (.*?) \| (.*?) \|$", page, re.MULTILINE)
+        assert rows, name
+        for shown, meaning in rows:
+            assert meaning
+            told = [
+                math.radians(float(number)) if degrees else float(number)
+                for number, degrees in re.findall(r"(-?[\d.]+(?:e[+-]?\d+)?)(°?)", shown)
+            ]
+            assert told == pytest.approx(numbers(getattr(tolerances, name)), rel=1e-5), name
+
+
+def test_every_command_stands_in_the_reference_with_its_options() -> None:
+    page = text_of("commands.md")
+    for name, parser in build_parser().commands.items():
+        part = section(page, name)
+        assert [option for option in parser.options() if f"{option}" not in part] == [], name
+
+
+def test_every_public_name_stands_in_the_reference() -> None:
+    page = text_of("api.md")
+    missing = [name for name in planfly.__all__ if name != "__version__" and f":: planfly.{name}" not in page]
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", ALL, ids=lambda page: page.stem)
+def test_commands_in_the_text_have_options_that_there_are(page: Path) -> None:
+    commands = build_parser().commands
+    text = re.sub(r"^```.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    assert re.findall(r"^    planfly .*$", text, re.MULTILINE) == [], "a command stands in a fenced block"
+    for code in _CODE.findall(text):
+        words = shlex.split(code)[1:]
+        if words[0].startswith("-"):
+            continue
+        names = words[0].split("|")
+        assert set(names) <= set(commands), code
+        for name in names:
+            options = {option for word in words[1:] if word.startswith("--") for option in word.split("|")}
+            known = {*commands[name].options(), "--help"}
+            assert {option.partition("=")[0] for option in options} <= known, code
+
+
+@pytest.mark.parametrize("page", ALL, ids=lambda page: page.stem)
+def test_links_lead_to_files(page: Path) -> None:
+    targets = [link.partition("#")[0] for link in _LINK.findall(page.read_text(encoding="utf-8"))]
+    local = [target for target in targets if target and not target.startswith(("http:", "https:"))]
+    assert [target for target in local if not (page.parent / target).exists()] == []
+
+
+def test_pages_are_named_in_the_index() -> None:
+    index = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    assert [page.name for page in PAGES if page.stem != "index" and f"\n{page.stem}\n" not in index] == []

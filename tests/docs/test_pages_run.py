@@ -1,0 +1,34 @@
+"""What a page says to type runs, from its first block to its last."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.docs.page_blocks import PAGES, TYPED, Bench, blocks, parse
+from tests.soak import SOAK
+
+# What other libraries say among themselves is not the reader's fault.
+pytestmark = pytest.mark.filterwarnings("default")
+
+
+@pytest.fixture(scope="module")
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
+    return Bench(tmp_path_factory.mktemp("shared"))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_the_blocks_of_a_page_run(
+    page: Path, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, object] = {"__name__": "__main__"}
+    for block in blocks(page):
+        if not block.file and block.language not in TYPED:
+            continue
+        left = "parse" in block.marks or ("soak" in block.marks and not SOAK)
+        if left and block.language == "sh":
+            parse(block)
+        elif left:
+            compile(block.text, page.name, "exec")
+        else:
+            bench.run(block, names)
