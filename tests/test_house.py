@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
 CODE = sorted(file for folder in (*PACKAGES, "tests", "examples") for file in (ROOT / folder).rglob("*.py"))
 OURS = [file for file in CODE if file.relative_to(ROOT).parts[0] in PACKAGES]
-# As the README lists them.
+# As docs/commands.md lists them.
 COMMANDS = (
     *("run", "plan", "export", "fly", "check", "aircraft", "serve", "replay", "recover", "report", "compare", "paper"),
     *("campaign", "winds"),

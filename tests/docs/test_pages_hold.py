@@ -20,7 +20,7 @@ from making.tolerances import imported_tolerances
 
 sys.path.pop(0)
 
-ALL = PAGES
+ALL = [ROOT / "README.md", *PAGES]
 _CODE = re.compile(r"(?<!`)`(planfly [^`]+)`(?!`)")
 _LINK = re.compile(r"\]\(([^)\s]+)\)")
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.page_blocks import PAGES, TYPED, Bench, blocks, parse
+from tests.docs.page_blocks import PAGES, ROOT, TYPED, Bench, blocks, parse
 from tests.soak import SOAK
 
 # What other libraries say among themselves is not the reader's fault.
@@ -16,7 +16,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     return Bench(tmp_path_factory.mktemp("shared"))
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [ROOT / "README.md", *PAGES], ids=lambda page: page.stem)
 def test_the_blocks_of_a_page_run(
     page: Path, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

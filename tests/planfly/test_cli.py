@@ -1,4 +1,4 @@
-"""Whatever a command meets, the shell gets one line and the code of README's table."""
+"""Whatever a command meets, the shell gets one line and the code that docs/commands.md states."""
 
 import argparse
 import errno

@@ -1,6 +1,6 @@
 """Default plans among zones and in a band of heights above ground: planned where a grid can, and flown inside all.
 
-The counts that the README states are `tests.bench.airspace.flights` and `tests.bench.airspace.many_zones`.
+The counts that docs/measured.md states are `tests.bench.airspace.flights` and `tests.bench.airspace.many_zones`.
 """
 
 import dataclasses

@@ -1,12 +1,15 @@
-"""Exit codes are those of the README's table and of the help."""
+"""Exit codes are those of the README, of the page of the command line, and of the help."""
 
 import re
 from pathlib import Path
 
+import pytest
+
 from planfly.terminal import exit_codes
 
-README = Path(__file__).parents[3] / "README.md"
-# By the sentence that the README has for each; 130 and 143 are what a shell gives a command that a signal ended.
+ROOT = Path(__file__).parents[3]
+PAGES = (ROOT / "README.md", ROOT / "docs" / "commands.md")
+# By the sentence that the pages have for each; 130 and 143 are what a shell gives a command that a signal ended.
 MEANT = {
     "flyable": exit_codes.FLYABLE,
     "our fault or the machine's": exit_codes.FAULT,
@@ -17,11 +20,12 @@ MEANT = {
 }
 
 
-def test_readme_and_help_state_each_code() -> None:
-    stated = re.sub(r"\s+", " ", README.read_text(encoding="utf-8"))
-    readme = stated[stated.index("Exit codes: ") :]
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_pages_and_help_state_each_code(page: Path) -> None:
+    stated = re.sub(r"\s+", " ", page.read_text(encoding="utf-8"))
+    told = stated[stated.index("Exit codes: ") :]
     printed = re.sub(r"\s+", " ", exit_codes.EXIT_CODES)
     for meaning, code in MEANT.items():
-        assert f" {code} {meaning}" in readme
+        assert f" {code} {meaning}" in told
         assert f" {code} {meaning}" in printed
     assert sorted(MEANT.values()) == [0, 1, 2, 3, 4, 128 + 2]
