@@ -11,6 +11,7 @@ import pytest
 import planfly
 from logs.verdict import tolerances
 from logs.verdict.findings import RULES
+from planfly.terminal.exit_codes import EXIT_CODES
 from planfly.terminal.parser import build_parser
 from tests.docs.page_blocks import PAGES, ROOT
 
@@ -65,11 +66,16 @@ def test_every_tolerance_stands_on_the_page_with_its_value() -> None:
             assert told == pytest.approx(numbers(getattr(tolerances, name)), rel=1e-5), name
 
 
-def test_every_command_stands_in_the_reference_with_its_options() -> None:
+def test_every_command_stands_in_the_reference_with_its_options_and_what_they_do() -> None:
     page = text_of("commands.md")
     for name, parser in build_parser().commands.items():
         part = section(page, name)
-        assert [option for option in parser.options() if f"{option}" not in part] == [], name
+        defined = " ".join(re.findall(r"^`(.*)`$", part, re.MULTILINE))
+        assert [option for option in parser.options() if option not in defined] == [], name
+        # Every word of the help but the usage, which breaks its lines elsewhere, and the exit codes.
+        helped = parser.format_help().partition("\n\n")[2].replace(EXIT_CODES.strip(), "")
+        told = set(re.sub(r"[`:*]", " ", part.replace("\\", "")).split())
+        assert set(re.sub(r"[`:*]", " ", helped).split()) <= told, name
 
 
 def test_every_public_name_stands_in_the_reference() -> None:
