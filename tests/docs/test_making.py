@@ -1,0 +1,43 @@
+"""What pages take from the code: placeholders, docstrings and units as they are laid out."""
+
+import sys
+
+import pytest
+
+from tests.docs.page_blocks import ROOT
+
+sys.path.insert(0, str(ROOT / "docs"))
+from making.docstrings import as_rst
+from making.placeholders import filled
+from making.schemas import answer_table, answering_commands
+from making.tolerances import tolerance_list
+
+sys.path.pop(0)
+
+
+def test_a_placeholder_that_is_none_is_noticed() -> None:
+    with pytest.raises(KeyError, match="nothing"):
+        filled("text\n<!-- made: nothing -->\n")
+    assert filled("in a line <!-- made: nothing --> it is text") == "in a line <!-- made: nothing --> it is text"
+
+
+def test_named_lines_of_a_docstring_are_a_list() -> None:
+    lines = ["Read it.", "", "path: where.", "seed, wind: of the search,", "or None.", "", ">>> read()"]
+    told = ["* **path**: where.", "* **seed, wind**: of the search,", "  or None."]
+    assert as_rst(lines) == ["Read it.", "", *told, "", ">>> read()"]
+    assert as_rst(["Text goes on.", "out: a file."]) == ["Text goes on.", "", "* **out**: a file."]
+
+
+def test_angles_are_degrees_and_nothing_else_is() -> None:
+    shown = {one.name: one for one in tolerance_list()}
+    assert (shown["BANK_TOLERANCE"].value, shown["OVERSHOOT"].value) == ("5°", "5")
+    assert [shown[f"BUFFER_{what}"].value for what in ("ANGLE", "LENGTH", "SPEED")] == ["0.1°", "1", "0.03"]
+    assert shown["GUST_OFFSET"].value == "none 0, light 0.5, moderate 1"
+    assert not shown["BANK_TOLERANCE"].text.startswith("rad")
+    # One that stands below another without words of its own has the other's.
+    assert shown["CLOSER"].text == shown["CLOSER_SHARE"].text
+
+
+def test_every_command_with_an_answer_has_a_row() -> None:
+    table = answer_table()
+    assert [name for name in answering_commands() if f"\n| `{name}` | `planfly." not in table] == []
