@@ -35,7 +35,7 @@ bench: $(TESTED)
 	$(BIN)/python -m tests.bench
 
 # Full counts.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
-soak: $(TESTED) clients
+soak: $(TESTED) clients docs
 	@$(BIN)/python -m tests.soak
 	rm -f build/soak.json
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest -m soak $(TWO)
