@@ -16,7 +16,7 @@ READY := $(VENV)/.ready
 TESTED := $(VENV)/.ready-test
 
 # make low, make newest: the tests with the lowest versions supported, and with the newest there are
-.PHONY: demo test bench soak low newest dev docs setup clients clean
+.PHONY: demo test bench soak wheels low newest dev docs setup clients clean
 
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
@@ -40,6 +40,10 @@ soak: $(TESTED) clients docs
 	rm -f build/soak.json
 	PLANFLY_SOAK=1 $(BIN)/python -m pytest -m soak $(TWO)
 	$(BIN)/python -m tests.mutations --count 200
+
+# The wheel, installed anew and flown with on every Python that is there.
+wheels: $(TESTED)
+	PLANFLY_WHEELS=1 $(BIN)/python -m pytest -n0 tests/packaging -k installs
 
 # The tests with the lowest versions that pyproject.toml allows, and with the newest that the registry has, each in an
 # environment of its own.  The lowest numba needs Python 3.11 or 3.12: make low PYTHON=python3.11

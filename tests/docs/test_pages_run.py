@@ -8,7 +8,7 @@ from tests.docs.page_blocks import PAGES, ROOT, TYPED, Bench, blocks, parse
 from tests.soak import SOAK
 
 # What other libraries say among themselves is not the reader's fault.
-pytestmark = pytest.mark.filterwarnings("default")
+pytestmark = pytest.mark.filterwarnings("ignore")
 
 
 @pytest.fixture(scope="module")

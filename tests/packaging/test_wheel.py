@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from tests.packaging.conftest import PACKAGES, ROOT
+from tests.soak import SOAK
 
 VERSIONS = ("3.11", "3.12", "3.13")
 
@@ -115,7 +116,10 @@ def interpreters() -> dict[str, Path]:
     return found
 
 
-@pytest.mark.skipif("CI" not in os.environ, reason="installs everything anew for each Python: minutes; in CI")
+@pytest.mark.skipif(
+    not SOAK and "PLANFLY_WHEELS" not in os.environ,
+    reason="installs everything anew for each Python: minutes; make wheels, which CI calls, too",
+)
 @pytest.mark.parametrize("version", sorted(interpreters()))
 def test_it_installs_and_flies_on(version: str, wheel: Path, tmp_path: Path) -> None:
     place, folder = tmp_path / "venv", tmp_path / "elsewhere"

@@ -6,10 +6,13 @@ import logging
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from world.atomic_files import temporary_folder
 from world.errors import PlanflyError
+from world.interruption import Interrupted
 
 # A flight is given up when a second worker dies on it.
 ALLOWED_FAILURES = 1
@@ -66,24 +69,57 @@ def connected(workers: Workers) -> Iterator[Any]:
             with client:
                 yield client
             return
-        try:
-            cluster = cluster_types.LocalCluster(
-                n_workers=workers.count or os.cpu_count() or 1,
-                threads_per_worker=1,
-                processes=True,
-                host="127.0.0.1",
-                dashboard_address="127.0.0.1:0",
-                scheduler_kwargs={"dashboard": False},
-                worker_dashboard_address=None,
-                memory_limit=0,
-                silence_logs=logging.CRITICAL,
-            )
-        except (RuntimeError, OSError) as error:
-            raise SchedulerError(
-                f"--workers {workers.count or os.cpu_count()}: could not be started: {error}"
-            ) from error
-        with cluster, cluster_types.Client(cluster, set_as_default=False) as client:
-            yield client
+        with contextlib.ExitStack() as stack:
+            # In a folder that goes with this process, however it ends.
+            folder = stack.enter_context(temporary_folder("planfly-workers-"))
+            stack.enter_context(dask.config.set({"temporary-directory": str(folder)}))
+            cluster = stack.enter_context(_local_cluster(cluster_types, workers.count, folder))
+            client = stack.enter_context(cluster_types.Client(cluster, set_as_default=False))
+            try:
+                yield client
+            except Interrupted:
+                # This process ends, and its children with it, sooner than workers can be asked to.
+                stack.pop_all()
+                raise
+
+
+def _start_tracker() -> None:
+    """Start multiprocessing's tracker of semaphores, so that it removes what a killed worker leaves without a word."""
+    from multiprocessing import resource_tracker
+
+    name, words = "PYTHONWARNINGS", "ignore:resource_tracker:UserWarning"
+    before = os.environ.get(name)
+    os.environ[name] = words if before is None else f"{before},{words}"
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def _local_cluster(cluster_types: Any, count: int | None, folder: Path) -> Any:
+    number = count or os.cpu_count() or 1
+    if os.name == "posix":
+        _start_tracker()
+    try:
+        return cluster_types.LocalCluster(
+            n_workers=number,
+            threads_per_worker=1,
+            processes=True,
+            host="127.0.0.1",
+            dashboard_address="127.0.0.1:0",
+            scheduler_kwargs={"dashboard": False},
+            worker_dashboard_address=None,
+            memory_limit=0,
+            silence_logs=logging.CRITICAL,
+            local_directory=str(folder),
+            # What a worker leaves that is killed goes with it, too.
+            env={"TMPDIR": str(folder)},
+        )
+    except (RuntimeError, OSError) as error:
+        raise SchedulerError(f"--workers {number}: could not be started: {error}") from error
 
 
 def checked_address(address: str) -> str:

@@ -40,6 +40,7 @@ LONG = "\n".join(
 PLANNER = 'algorithm = "umda-smooth"\nwaypoints = 10\npopulation = 2000\ngenerations = 100000\n'
 PAPER = ("paper", "--problems", "7", "--runs", "3", "--jobs", "2", "--out", "out")
 FLY = ("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap")
+CAMPAIGN = ("campaign", "long.waypoints", "--scenario", "field.toml", "--workers", "2", "--out", "out")
 SERVE = ("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")
 
 
@@ -67,6 +68,7 @@ FEW = (
     ),
     Case(PAPER, "planning", 1.5, signal.SIGINT),
     Case(SERVE, "flight logs", 0.3, signal.SIGINT),
+    Case(CAMPAIGN, "flying", 3.0, signal.SIGINT),
     # Kernels are compiled meanwhile.
     Case(("run", "jacksboro", "--out", "out"), "", 4.0, signal.SIGTERM, cold=True),
 )
@@ -86,6 +88,8 @@ EVERY = (
     ("scenarios",),
     (*PAPER,),
     (*SERVE,),
+    (*CAMPAIGN,),
+    ("winds", *CAMPAIGN[1:]),
 )
 
 
@@ -192,6 +196,10 @@ def test_a_command_ends_at_once_and_whole(case: Case, inputs: Path, tmp_path: Pa
     assert code == (0 if case.argv[0] == "serve" else 128 + case.number), said
     assert took < LIMIT
     assert "Traceback" not in said
+    if case.argv[0] == "campaign":
+        (line,) = (line for line in said.splitlines() if "interrupted" in line)
+        assert line.endswith("--resume goes on")
+        assert "Warning" not in said
     if case.argv[0] == "fly":
         log = read_log(tmp_path / "work" / "f.mcap")
         assert (log.ended, log.recorded_verdict) == ("interrupted", None)
