@@ -4,7 +4,7 @@ from flight.mission.fence_zones import fence_zones
 from flight.mission.fences import with_fences
 from flight.mission.items import Mission, MissionItem
 from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.rules.fence_rule import is_entered
+from logs.verdict.rules.fence_rule import zone_test
 
 
 def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
@@ -18,8 +18,9 @@ def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
     >>> [item.command for item in mission.fences]  # the area; the example has no missiles
     [5001, 5001, 5001, 5001]
     """
+    is_entered = zone_test(setup)
 
     def passes(shape: tuple[MissionItem, ...]) -> bool:
-        return any(is_entered(setup, zone) for zone in fence_zones(shape, setup.scenario.origin))
+        return any(is_entered(zone) for zone in fence_zones(shape, setup.scenario.origin))
 
     return with_fences(setup.mission, setup.scenario, passes)

@@ -38,7 +38,7 @@ def csv_text(log: FlightLog) -> str:
 
     >>> from logs.recording.example_log import example_log
     >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
-    ['0.0', '46.0', '8.0', '0.0', '0.0', '200.0']
+    ['0.0', '45.99999981773182', '7.993545330437746', '-500.0', '0.0', '200.0']
     """
     columns = flight_columns(log)
     out = io.StringIO()

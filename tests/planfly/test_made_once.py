@@ -124,8 +124,10 @@ def test_a_plan_is_opened_once_to_be_flown_judged_or_exported(count: Count, flig
     plan = str(flight / "plan.json")
     assert count("fly", plan, code=4) == ONCE | FLIGHT
     assert count("check", plan, code=4) == ONCE | OPENED | {"judge_geometry": 1, "route_demands": 1}
-    assert count("export", plan, "a.plan", code=0) == ONCE | {"plan_mission": 1}
-    assert count("export", plan, "a.kml", "b.plan", code=0) == ONCE | OPENED
+    # Its fence is what the planned path keeps to.
+    assert count("export", plan, "a.plan", code=0) == ONCE | OPENED | {"route_demands": 1}
+    assert count("export", plan, "a.kml", "b.plan", "b.fence", code=0) == ONCE | OPENED | {"route_demands": 1}
+    assert count("export", plan, "a.waypoints", code=0) == ONCE | OPENED
 
 
 @pytest.mark.parametrize("command", ["check", "report"])

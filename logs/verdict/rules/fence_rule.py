@@ -5,6 +5,7 @@ included; that the corridor about it reaches further is told beside.
 """
 
 import math
+from collections.abc import Callable
 
 from flight.simulation.flight_setup import FlightSetup
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
@@ -22,17 +23,21 @@ from world.kernels import Record, Records
 _METHOD = "every point of each piece, arc and row"
 
 
-def is_entered(setup: FlightSetup, zone: Zone) -> bool:
-    """Whether the planned path of a setup goes into an exclusion, or out of an inclusion, by what the rule allows.
+def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
+    """Make what tells whether a setup's planned path goes into an exclusion, or out of an inclusion, beyond rounding.
 
     >>> from logs.recording.example_log import example_log
     >>> from world.airspace.zones import Cylinder
-    >>> setup = example_log().setup  # starts at 0, 0
-    >>> [is_entered(setup, Zone("mast", "exclusion", Cylinder(0.0, y, 50.0))) for y in (40.0, -60.0)]
+    >>> is_entered = zone_test(example_log().setup)  # passes 0, 0
+    >>> [is_entered(Zone("mast", "exclusion", Cylinder(0.0, y, 50.0))) for y in (40.0, -60.0)]
     [True, False]
     """
     moves = planned_moves(route_demands(setup, envelope=False))
-    return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING)
+
+    def is_entered(zone: Zone) -> bool:
+        return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING)
+
+    return is_entered
 
 
 def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:

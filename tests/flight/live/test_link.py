@@ -48,7 +48,7 @@ def test_who_asks_the_vehicle_on_this_machine_needs_no_heartbeat(link: Link) -> 
     ask = packed(mavlink.MAVLink_mission_request_list_message(1, 1))
     for _ in range(3):
         assert [message.get_type() for message, _ in link.take(ask, ("127.0.0.1", 6))] == ["MISSION_REQUEST_LIST"]
-        link._clock.now += 0.6 * SILENCE
+        link.clock.now += 0.6 * SILENCE
     assert list(link.peers) == [("127.0.0.1", 6)]
 
 

@@ -48,5 +48,5 @@ def test_parquet_keeps_types_and_says_what_it_is(log_file: Path) -> None:
 def test_without_pyarrow_the_extra_is_named(log_file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = read_log(log_file)
     monkeypatch.setitem(sys.modules, "pyarrow", None)
-    with pytest.raises(PlanflyError, match=r"pyarrow is not installed \(extra: planfly\[parquet\]\)"):
+    with pytest.raises(PlanflyError, match=r"pyarrow is not installed \(extra: planfly\[tables\]\)"):
         parquet_bytes(log)

@@ -215,7 +215,7 @@ def test_a_key_shuts_strangers_out(serve: Callable[..., Served], tmp_path: Path)
     (tmp_path / "key").chmod(0o600)
     vehicle = serve("--scenario", "field.toml", "--sign-key", "key")
     with UdpStation(vehicle.port) as stranger, UdpStation(vehicle.port, system=254) as station:
-        for mav in (station.mav, station._parser):
+        for mav in (station.mav, station.parser):
             mav.signing.secret_key = key
             mav.signing.timestamp = int((time.time() - 1_420_070_400) * 1e5)
         station.mav.signing.sign_outgoing = True
