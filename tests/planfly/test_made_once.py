@@ -127,7 +127,6 @@ def test_a_plan_is_opened_once_to_be_flown_judged_or_exported(count: Count, flig
     # Its fence is what the planned path keeps to.
     assert count("export", plan, "a.plan", code=0) == ONCE | OPENED | {"route_demands": 1}
     assert count("export", plan, "a.kml", "b.plan", "b.fence", code=0) == ONCE | OPENED | {"route_demands": 1}
-    assert count("export", plan, "a.waypoints", code=0) == ONCE | OPENED
 
 
 @pytest.mark.parametrize("command", ["check", "report"])
