@@ -5,9 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.soak import SOAK
+
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 
+@pytest.mark.skipif(not SOAK, reason="README's lines, nearly the same, run in the tests of the pages; in make soak")
 def test_from_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(EXAMPLES / "from_python.py"))

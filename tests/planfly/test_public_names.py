@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import planfly
+from tests.soak import SOAK
 
 ROOT = Path(planfly.__file__).parents[1]
 VERBS = {
@@ -89,6 +90,7 @@ def test_importing_it_takes_no_more_than_30_milliseconds() -> None:
 
 
 @pytest.mark.skipif("CI" not in os.environ, reason="half a minute of mypy: in CI")
+@pytest.mark.skipif(not SOAK, reason="a checker that reads all of planfly anew: in make soak")
 def test_types_are_seen_by_a_checker(tmp_path: Path) -> None:
     (tmp_path / "script.py").write_text(
         "import planfly\n"
