@@ -25,7 +25,7 @@ from tests.bench.campaigns.winds_reference import winds_row
 from world.scenario import Scenario, load_scenario
 from world.scenario_variants import with_wind
 
-FLIGHTS, ROUNDS = 120, 3
+FLIGHTS, ROUNDS = 90, 3
 # Corners of the 13 km: latitude, longitude.
 _CORNERS = ((36.273, -84.28), (36.273, -84.23), (36.309, -84.23), (36.309, -84.28))
 
