@@ -204,7 +204,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
     >>> aircraft = load_aircraft("aerosonde")
     >>> figure = draw_steps(aircraft, step_responses(aircraft))
     >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
-    ['pitch (°)', 'pitch (°)', 'roll (°)', 'roll (°)']
+    ['change of pitch (°)', 'change of pitch (°)', 'change of roll (°)', 'change of roll (°)']
     """
     deep = max(len(step.quantities) for step in steps)
     with style.clean_style():
@@ -234,7 +234,7 @@ def _answer(axes: Any, step: StepResponse, row: int) -> None:
     axes.axvspan(1.0, 1.0 + held, color=style.LIMIT, alpha=0.12, linewidth=0)
     axes.plot(step.time, values, color=style.FLOWN, linewidth=1.1)
     axes.set_xlim(0.0, float(step.time[-1]))
-    axes.set_title(f"{name} ({unit})", fontsize=8.5, pad=3.0)
+    axes.set_title(f"change of {name} ({unit})", fontsize=8.5, pad=3.0)
     axes.grid(color="#e4e4e4", linewidth=0.5)
     axes.set_axisbelow(True)
 

@@ -76,7 +76,10 @@ def test_an_answer_is_in_degrees_with_the_time_of_the_step_shaded(
     change = np.column_stack([0.01 * time, time])
     figure = draw_steps(AIRCRAFT, [StepResponse(control, size, held, time, ("pitch", "airspeed"), change)])
     pitch, airspeed = figure.axes
-    assert (pitch.get_title(loc="left"), airspeed.get_title(loc="left")) == ("pitch (°)", "airspeed (m/s)")
+    assert (pitch.get_title(loc="left"), airspeed.get_title(loc="left")) == (
+        "change of pitch (°)",
+        "change of airspeed (m/s)",
+    )
     assert pitch.lines[-1].get_ydata()[-1] == pytest.approx(math.degrees(0.1))
     assert airspeed.lines[-1].get_ydata()[-1] == 10.0
     corners = np.asarray(pitch.patches[0].get_extents().get_points())
