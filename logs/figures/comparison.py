@@ -54,7 +54,10 @@ def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
 
 
 def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
-    """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle."""
+    """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle.
+
+    Without terrain, that of the height above it is left out.
+    """
     flown = [_distance(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
 
@@ -74,7 +77,7 @@ def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
         Panel("height above\nground (m)", series([_above(flight) for flight in flights])),
         Panel("airspeed\n(m/s)", series([doubles(track.airspeed) for track in tracks]), least_span=4.0),
         Panel("bank, right +\n(°)", series([np.degrees(doubles(_roll(track))) for track in tracks])),
-        Panel("cross-track,\nright + (m)", series([doubles(track.cross_track) for track in tracks]), least_span=2.0),
+        Panel("cross-track,\nright + (m)", series([doubles(track.cross_track) for track in tracks]), least_span=0.1),
         Panel("throttle\n(%)", series([100.0 * doubles(_throttle(track)) for track in tracks])),
     ]
     return draw_panels(

@@ -88,8 +88,8 @@ def _panels(setup: FlightSetup, track: Track) -> list[Panel]:
         ),
         Panel("bank, right +\n(°)", [Series("flown", bank)], [("limit", limit), ("", -limit)]),
         Panel("load factor\n(g)", [Series("flown", doubles(track.load_factor))], least_span=0.2),
-        Panel("cross-track,\nright + (m)", [Series("as guidance saw it", doubles(track.cross_track))], least_span=2.0),
-        Panel("height error,\nhigh + (m)", [Series("as guidance saw it", doubles(track.height_error))], least_span=2.0),
+        Panel("cross-track,\nright + (m)", [Series("as guidance saw it", doubles(track.cross_track))], least_span=0.1),
+        Panel("height error,\nhigh + (m)", [Series("as guidance saw it", doubles(track.height_error))], least_span=0.1),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:

@@ -50,8 +50,18 @@ def test_panels_run_over_the_distance_flown_and_end_with_each_flight() -> None:
     assert np.nanmax(line(airspeed, "second.mcap").get_ydata()) == pytest.approx(23.0)
 
 
-def test_without_terrain_the_height_above_it_is_empty() -> None:
+def test_without_terrain_the_height_above_it_is_left_out() -> None:
     bare = make_setup(terrain={"kind": "none"}, threats=[])
     flight = replace(FIRST, setup=bare)
-    above = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes[1]
-    assert not np.isfinite(line(above, "second.mcap").get_ydata()).any()
+    panels = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes
+    titles = [axes.get_ylabel().split("\n")[0] for axes in panels]
+    assert titles == ["height", "airspeed", "bank, right +", "cross-track,", "throttle"]
+
+
+def test_a_small_cross_track_fills_its_panel() -> None:
+    """7 cm to either side are seen: the panel ends at 7 cm and its 8 % of air, not at a metre."""
+    swing = np.linspace(-0.07, 0.07, len(FIRST.track)).astype(np.float32)
+    flight = replace(FIRST, track=replace(FIRST.track, cross_track=swing))
+    panels = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes
+    (cross,) = [axes for axes in panels if axes.get_ylabel().startswith("cross-track")]
+    assert cross.get_ylim() == pytest.approx((-0.07 - 0.0112, 0.07 + 0.0112), abs=1e-6)
