@@ -17,6 +17,8 @@ Floats = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 2.15, 0.72, 0.55, 1.12, 0.2
 # Inches: right of the panels where no legends stand there, and the height of the one legend above them.
 _EDGE, _LEGEND = 0.25, 0.28
+# Inches from the panels to the middle of their labels.
+_LABEL = 0.44
 # Blocks that a series is thinned to; each keeps its lowest and highest row.
 _BLOCKS = 700
 
@@ -175,7 +177,7 @@ def _draw(axes: Any, panel: Panel, along: Floats) -> None:
     axes.set_xlim(float(along[0]), float(max(along[-1], along[0] + 1e-3)))
     axes.xaxis.set_major_locator(MultipleLocator(style.nice_step(float(np.ptp(axes.get_xlim())), 14)))
     axes.set_ylabel(panel.title)
-    axes.yaxis.set_label_coords(-0.062, 0.5)
+    axes.yaxis.set_label_coords(-_LABEL / (style.WIDTH * axes.get_position().width), 0.5)
     axes.grid(color="#e4e4e4", linewidth=0.5)
     axes.set_axisbelow(True)
 
