@@ -7,12 +7,13 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
 from logs.figures.elements import style
+from logs.figures.elements.failure_labels import draw_inside, inside_threats, radius_of, write_fail_labels
 from logs.figures.elements.failures import Failures, failures, paths_differ
 from logs.figures.elements.ground import draw_ground
 from logs.figures.elements.labels import LabelPlacer
@@ -78,12 +79,16 @@ def draw_map(
         if track is not None and len(track):
             handles += _flown(axes, track, placer)
         if route is not None:
-            handles += _failing_lines(axes, route, failed)
+            handles += _failing_lines(axes, route, failed, scenario.threats)
+        if track is not None and failed.threats:
+            east, north, _ = track.position.T
+            handles += draw_inside(axes, east, north, inside_threats(failed, scenario.threats, track))
         handles += _ends(axes, scenario, route, placer)
         if route is not None:
             _number_waypoints(scenario, route, failed, placer)
-            _fail_labels(route, failed, placer)
-        _name_threats(axes, scenario.threats, placer)
+            centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
+            write_fail_labels(failed, route[:, :2], centres, placer, gap=16.0)
+        _name_threats(axes, scenario.threats, failed, placer)
         name_zones(axes, scenario.zones, placer)
         draw_compass(figure, scenario, _RIGHT_COLUMN)
         draw_legend(figure, handles + around, _LEFT, legend_top)
@@ -196,8 +201,12 @@ def _flown(axes: Any, track: Track, placer: LabelPlacer) -> list[Any]:
     return [line[0]]
 
 
-def _failing_lines(axes: Any, route: Floats, failed: Failures) -> list[Any]:
-    """Draw a broad band under each failing leg and a ring about each failing waypoint."""
+def _failing_lines(axes: Any, route: Floats, failed: Failures, threats: Threats) -> list[Any]:
+    """Draw a broad band under each failing leg, a ring about each failing waypoint, a circle about entered threats."""
+    for place in failed.threats:
+        east, north, _ = threats.position[place.index or 0].tolist()
+        radius = radius_of(threats, place)
+        axes.add_patch(Circle((east, north), radius, fill=False, edgecolor=style.FAIL, linewidth=2.2, zorder=5.5))
     for leg in failed.legs:
         run = np.hypot(*(route[leg + 1, :2] - route[leg, :2]))
         # A leg too short to see shows as a blot.
@@ -258,28 +267,15 @@ def _number_waypoints(scenario: Scenario, route: Floats, failed: Failures, place
             placer.place(str(number), east, north, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
 
 
-def _fail_labels(route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    """Name the rules that fail beside the first dozen of the failing legs and waypoints."""
-    middles = 0.5 * (route[:-1] + route[1:])
-    labels = [(f"leg {k}: {', '.join(rules)}", middles[k]) for k, rules in failed.legs.items()]
-    labels += [(f"waypoint {k}: {', '.join(rules)}", route[k]) for k, rules in failed.waypoints.items()]
-    frame: dict[str, Any] = {
-        "boxstyle": "round,pad=0.2",
-        "facecolor": "white",
-        "edgecolor": style.FAIL,
-        "linewidth": 0.9,
-    }
-    for text, point in labels[:12]:
-        placer.place(text, float(point[0]), float(point[1]), size=7.0, gap=16.0, color=style.FAIL, bbox=frame)
-
-
-def _name_threats(axes: Any, threats: Threats, placer: LabelPlacer) -> None:
+def _name_threats(axes: Any, threats: Threats, failed: Failures, placer: LabelPlacer) -> None:
+    """Name each threat in the picture, as far as there is room; those that fail have labels of their own."""
     if len(threats) > _MOST_NAMES:
         return
+    labelled = failed.threat_names()
     size = 6.0 if len(threats) <= 30 else 5.0
-    for name, point in zip(threats.names, threats.position, strict=True):
+    for k, (name, point) in enumerate(zip(threats.names, threats.position, strict=True)):
         inside = (
             axes.get_xlim()[0] < point[0] < axes.get_xlim()[1] and axes.get_ylim()[0] < point[1] < axes.get_ylim()[1]
         )
-        if inside:
+        if inside and k not in labelled:
             placer.place(style.shorten(name, 20), float(point[0]), float(point[1]), size=size, gap=4.0, optional=True)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle
+from matplotlib.patches import Circle, Patch
 
 from logs.figures.elements import style
 from logs.figures.elements.failures import Failures
@@ -38,6 +38,8 @@ def failing_handles(failed: Failures) -> list[Any]:
     if failed.waypoints:
         ring: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 9, "mfc": "none", "markeredgewidth": 2.0}
         handles.append(Line2D([], [], color=style.FAIL, label="waypoint that fails a rule", **ring))
+    if failed.threats:
+        handles.append(Patch(facecolor="none", edgecolor=style.FAIL, linewidth=2.2, label="threat that is entered"))
     return handles
 
 

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logs.figures.elements.threats import sphere_cuts
+from logs.figures.elements.threats import outline_anchor, sphere_cuts
 
 
 @given(
@@ -23,3 +23,20 @@ def test_cuts_lie_on_the_sphere(points_below: list[tuple[float, float]], radius:
         if not np.isnan(high):
             assert np.hypot(beside, high - up) == pytest.approx(radius, rel=1e-9)
             assert low + high == pytest.approx(2 * up, abs=1e-6)
+
+
+def test_a_name_touches_the_top_the_foot_or_the_left_edge_that_is_in_the_picture() -> None:
+    """A sphere of 300 m at 500 m, cut through its middle from 1 km to 1.6 km."""
+    kilometres = np.linspace(0.0, 3.0, 3001)
+    points = np.column_stack([1000.0 * kilometres, np.zeros(3001), np.zeros(3001)])
+    cut = kilometres, *sphere_cuts(np.array([1300.0, 0.0, 500.0]), 300.0, points)
+    assert outline_anchor(*cut, 0.0, 1000.0) == (pytest.approx(1.3), pytest.approx(800.0), (0, 1))
+    assert outline_anchor(*cut, 0.0, 700.0) == (pytest.approx(1.3), pytest.approx(200.0), (0, -1))
+    # 4 % below the upper rim, on the left flank: of the upper half at 596 m, of the lower one at 396 m.
+    for low, high, up in ((300.0, 600.0, 588.0), (300.0, 400.0, 396.0)):
+        (east, amsl, side) = outline_anchor(*cut, low, high) or (0.0, 0.0, (0, 0))
+        assert (amsl, side) == (pytest.approx(up, abs=6.0), (1, 0))
+        assert np.hypot(1000.0 * east - 1300.0, amsl - 500.0) == pytest.approx(300.0)
+        assert east < 1.3
+    assert outline_anchor(*cut, 900.0, 1000.0) is None
+    assert outline_anchor(*cut, 450.0, 460.0) is not None
