@@ -97,7 +97,7 @@ def _widened(bounds: Floats) -> Floats:
     """Ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
     sides = np.ptp(bounds, axis=1)
     more = 0.5 * np.maximum(_LEAST_SIDE * sides.max() - sides, 0.0)
-    return bounds + np.stack([-more, more], axis=1)
+    return np.asarray(bounds + np.stack([-more, more], axis=1))
 
 
 def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> Projection:
@@ -205,8 +205,8 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Fail
             dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
             axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **look))
         kind = "missile" if radii is threats.kill_radius else "radar"
-        for k in (place.index or 0 for place in failed.threats if place.kind == kind):
-            dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
+        for entered in (place.index or 0 for place in failed.threats if place.kind == kind):
+            dome = projection.project(threats.position[entered])[:2] + float(radii[entered]) * shape
             axes.add_patch(Polygon(dome, fill=False, edgecolor=style.FAIL, linewidth=2.2, zorder=4.6))
         if some.size:
             handles.append(Patch(linewidth=1.1, label=label, **look))

@@ -122,7 +122,9 @@ def shares_legend(panels: Sequence[Panel]) -> bool:
     >>> shares_legend([Panel("bank", [flown]), Panel("height", [Series("from terrain", np.zeros(2))])])
     False
     """
-    entries = [(line.label, (line.color, line.width, line.dashes)) for panel in panels for line in panel.series]
+    entries: list[tuple[str, Any]] = [
+        (line.label, (line.color, line.width, line.dashes)) for panel in panels for line in panel.series
+    ]
     entries += [(label, "limit") for panel in panels for label, _ in panel.limits if label]
     different = set(entries)
     labels, looks = ({entry[side] for entry in different} for side in (0, 1))
