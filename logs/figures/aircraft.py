@@ -115,7 +115,7 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
     _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "turn radius", "ground speed (m/s)", "radius (m)")
     axes.set_ylim(0.0, None)
-    _legend_above(axes, "", 4)
+    _legend_above(axes, "", 2)
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
@@ -144,7 +144,7 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
             )
         axes[0, 0].axhline(0.0, color="#555555", linewidth=0.8)
         _frame(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
-        _legend_above(axes[0, 0], "", 4)
+        _legend_above(axes[0, 0], "", 2)
         _power(axes[0, 1], aircraft, speeds, trims)
         _roots(axes[1, 0], modes, whole=True)
         _roots(axes[1, 1], modes, whole=False)

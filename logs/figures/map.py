@@ -278,7 +278,7 @@ def _ends(axes: Any, scenario: Scenario, route: Floats | None, placer: LabelPlac
     ):
         look: dict[str, Any] = {
             "markersize": size,
-            "markerfacecolor": "#F0E442",
+            "markerfacecolor": style.MARKER,
             "markeredgecolor": "black",
             "markeredgewidth": 1.0,
         }

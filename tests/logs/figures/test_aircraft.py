@@ -40,6 +40,7 @@ def test_no_legend_covers_a_line() -> None:
     panels[0].figure.canvas.draw()
     for axes in panels:
         box = axes.get_legend().get_window_extent()
+        assert axes.bbox.x0 < box.x0 < box.x1 < axes.bbox.x1
         # The marks of speeds run from edge to edge; everything else is a line of numbers.
         lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
         assert lines
