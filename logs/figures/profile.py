@@ -61,7 +61,7 @@ def draw_profile(
         ground = _ground_under(scenario, points)
         _limits(axes, scenario, route, track, ground, float(at[-1]))
         handles = _ground(axes, scenario, distance, ground)
-        threat_handles, names = draw_threat_cuts(axes, scenario.threats, distance, points)
+        threat_handles, names = draw_threat_cuts(axes, scenario.threats, distance, points, ground)
         zone_names = draw_zone_cuts(axes, scenario.zones, distance, points, ground)
         threat_handles += zone_handles(scenario.zones)
         lines = [] if straight else _plan(axes, at, route)
@@ -74,7 +74,7 @@ def draw_profile(
         entered: dict[int, tuple[float, float]] = {}
         if failed.threats:
             places = (distance, points) if track is None else (track_distance(route, track), track.position)
-            entered = draw_entered_cuts(axes, scenario.threats, failed, *places)
+            entered = draw_entered_cuts(axes, scenario.threats, failed, *places, _ground_under(scenario, places[1]))
         if track is not None and failed.threats:
             inside = inside_threats(failed, scenario.threats, track)
             lines += draw_inside(axes, track_distance(route, track) / 1000.0, track.position[:, 2], inside)

@@ -109,22 +109,22 @@ class SphereName:
 
 
 def outline_anchor(
-    kilometres: Floats, lower: Floats, upper: Floats, low: float, high: float
+    kilometres: Floats, lower: Floats, upper: Floats, low: Floats, high: float
 ) -> tuple[float, float, tuple[int, int]] | None:
     """Where a name touches a sphere's cut inside a picture from low to high (m AMSL): its top, foot or left side.
 
-    kilometres, lower, upper: (s,), NaN where no sphere stands.  Returns km, m AMSL and the side of the name; None where
-    nothing of the outline is in the picture.
+    kilometres, lower, upper: (s,), NaN where no sphere stands; low: (s,), the ground where that hides it.  Returns km,
+    m AMSL and the side of the name; None where nothing of the outline is in the picture.
     """
     over = np.flatnonzero(np.isfinite(upper))
     top, foot = over[np.argmax(upper[over])], over[np.argmin(lower[over])]
-    if low < upper[top] < high:
+    if low[top] < upper[top] < high:
         return float(kilometres[top]), float(upper[top]), (0, 1)
-    if low < lower[foot] < high:
+    if low[foot] < lower[foot] < high:
         return float(kilometres[foot]), float(lower[foot]), (0, -1)
     for edge in (upper, lower):
         # From the left: where the outline stays in the picture, its last point below the picture's upper rim.
-        seen = over[(edge[over] > low) & (edge[over] < high - 0.04 * (high - low))]
+        seen = over[(edge[over] > low[over]) & (edge[over] < high - 0.04 * (high - low.min()))]
         if seen.size:
             first = seen[: np.flatnonzero(np.diff(seen, append=seen[-1] + 2) > 1)[0] + 1]
             at = first[np.argmax(edge[first])]
@@ -133,14 +133,14 @@ def outline_anchor(
 
 
 def draw_entered_cuts(
-    axes: Any, threats: Threats, failed: Failures, distance: Floats, points: Floats
+    axes: Any, threats: Threats, failed: Failures, distance: Floats, points: Floats, ground: Floats | None
 ) -> dict[int, tuple[float, float]]:
     """Draw the cut of each sphere whose rule fails, where it stands over the flight; returns where to label each.
 
-    distance: (s,) m along the route, points: (s, 3) m of the flight there.
+    distance: (s,) m along the route, points: (s, 3) m of the flight there, ground: (s,) m AMSL or None.
     """
     labels: dict[int, tuple[float, float]] = {}
-    low, high = axes.get_ylim()
+    low, high = _visible(axes, ground, len(points))
     kilometres = distance / 1000.0
     for place in failed.threats:
         k = place.index or 0
@@ -156,17 +156,23 @@ def draw_entered_cuts(
     return labels
 
 
+def _visible(axes: Any, ground: Floats | None, count: int) -> tuple[Floats, float]:
+    """Lower end at each of so many samples, the ground where it stands in the picture, and upper end (m AMSL)."""
+    low, high = axes.get_ylim()
+    return np.full(count, low) if ground is None else np.fmax(ground, low), float(high)
+
+
 def draw_threat_cuts(
-    axes: Any, threats: Threats, distance: Floats, points: Floats
+    axes: Any, threats: Threats, distance: Floats, points: Floats, ground: Floats | None
 ) -> tuple[list[Any], list[SphereName]]:
     """Fill what missile and radar spheres take of the vertical plane through the path.
 
-    distance: (s,) m along the path, points: (s, 3) m.  Returns the legend's handles, and where to name the spheres that
-    stand over the path, once for each unit.
+    distance: (s,) m along the path, points: (s, 3) m, ground: (s,) m AMSL or None.  Returns the legend's handles, and
+    where to name the spheres that stand over the path, once for each unit.
     """
     handles: list[Any] = []
     names: dict[int, SphereName] = {}
-    bottom, top = axes.get_ylim()
+    bottom, top = _visible(axes, ground, len(points))
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     kilometres = distance / 1000.0
     for radii, colour, label in (
