@@ -19,13 +19,13 @@ class Failures:
     """Rules that failed, by leg and by waypoint number (each rule once, in the verdict's order).
 
     threats: missiles and radars whose reach was entered, each once.
-    names: what the verdict calls legs and waypoints, by kind and number.
+    places: of legs and waypoints that fail, by kind and number, as the verdict has them.
     """
 
     legs: dict[int, tuple[str, ...]]
     waypoints: dict[int, tuple[str, ...]]
     threats: tuple[Place, ...] = ()
-    names: dict[tuple[PlaceKind, int], str] = field(default_factory=dict)
+    places: dict[tuple[PlaceKind, int], Place] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Something failed at a place."""
@@ -34,12 +34,12 @@ class Failures:
     def name(self, kind: PlaceKind, number: int) -> str:
         """What the verdict calls a leg or a waypoint.
 
-        >>> Failures({7: ("slope",)}, {}, names={("leg", 7): "leg 7, to item 9"}).name("leg", 7)
+        >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).name("leg", 7)
         'leg 7, to item 9'
         >>> Failures({7: ("slope",)}, {}).name("leg", 7)
         'leg 7'
         """
-        return self.names.get((kind, number), f"{kind} {number}")
+        return place_text(self.places.get((kind, number), Place(kind, number)))
 
     def threat_names(self) -> dict[int, str]:
         """What the verdict calls each failing threat, by its index; one whose missile fails is called by that."""
@@ -55,7 +55,7 @@ def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
         legs=_rules_at(failed, "leg", waypoint_count - 1),
         waypoints=_rules_at(failed, "waypoint", waypoint_count),
         threats=tuple(dict.fromkeys(place for place in places if place.kind in ("missile", "radar"))),
-        names={(place.kind, place.index or 0): place_text(place) for place in places},
+        places={(place.kind, place.index or 0): place for place in places},
     )
 
 
