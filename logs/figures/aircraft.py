@@ -79,8 +79,7 @@ def _slopes(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     axes.axhline(0.0, color="#555555", linewidth=0.8)
     _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "steepest climb and descent to the air", "airspeed (m/s)", "flight path (°)")
-    _headroom(axes)
-    axes.legend(title="height AMSL", loc="upper right", ncols=3)
+    _legend_above(axes, "height AMSL", 3)
 
 
 def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
@@ -92,7 +91,7 @@ def _level_speeds(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
     span = float(np.nanmax(high) - np.nanmin(low))
     axes.set_xlim(float(np.nanmin(low)) - 0.08 * span, float(np.nanmax(high)) + 0.08 * span)
     _frame(axes, "level flight", "airspeed (m/s)", "height AMSL (m)")
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, 0.9))
+    _legend_above(axes, "", 2)
 
 
 def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
@@ -105,8 +104,7 @@ def _in_wind(axes: Any, aircraft: Aircraft, envelope: Envelope) -> None:
         axes.plot(speeds, -dive, **look)
     axes.axhline(0.0, color="#555555", linewidth=0.8)
     _frame(axes, f"steepest climb and dive over the ground, at {TRIM_AMSL:.0f} m", "airspeed (m/s)", "slope (°)")
-    _headroom(axes)
-    axes.legend(loc="upper right", ncols=2)
+    _legend_above(axes, "", 3)
 
 
 def _turns(axes: Any, aircraft: Aircraft) -> None:
@@ -117,7 +115,7 @@ def _turns(axes: Any, aircraft: Aircraft) -> None:
     _shade_guidance_speeds(axes, aircraft)
     _frame(axes, "turn radius", "ground speed (m/s)", "radius (m)")
     axes.set_ylim(0.0, None)
-    axes.legend(loc="upper left")
+    _legend_above(axes, "", 2)
 
 
 def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[float, Sequence[Mode]]) -> Figure:
@@ -146,7 +144,7 @@ def draw_trims(aircraft: Aircraft, trims: Sequence[TrimRow], modes: Mapping[floa
             )
         axes[0, 0].axhline(0.0, color="#555555", linewidth=0.8)
         _frame(axes[0, 0], "angle of attack and surfaces", "airspeed (m/s)", "angle (°)")
-        axes[0, 0].legend(loc="best")
+        _legend_above(axes[0, 0], "", 2)
         _power(axes[0, 1], aircraft, speeds, trims)
         _roots(axes[1, 0], modes, whole=True)
         _roots(axes[1, 1], modes, whole=False)
@@ -204,7 +202,7 @@ def draw_steps(aircraft: Aircraft, steps: Sequence[StepResponse]) -> Figure:
     >>> aircraft = load_aircraft("aerosonde")
     >>> figure = draw_steps(aircraft, step_responses(aircraft))
     >>> [axes.get_title(loc="left") for axes in figure.axes[:4]]
-    ['pitch (°)', 'pitch (°)', 'roll (°)', 'roll (°)']
+    ['change of pitch (°)', 'change of pitch (°)', 'change of roll (°)', 'change of roll (°)']
     """
     deep = max(len(step.quantities) for step in steps)
     with style.clean_style():
@@ -234,7 +232,7 @@ def _answer(axes: Any, step: StepResponse, row: int) -> None:
     axes.axvspan(1.0, 1.0 + held, color=style.LIMIT, alpha=0.12, linewidth=0)
     axes.plot(step.time, values, color=style.FLOWN, linewidth=1.1)
     axes.set_xlim(0.0, float(step.time[-1]))
-    axes.set_title(f"{name} ({unit})", fontsize=8.5, pad=3.0)
+    axes.set_title(f"change of {name} ({unit})", fontsize=8.5, pad=3.0)
     axes.grid(color="#e4e4e4", linewidth=0.5)
     axes.set_axisbelow(True)
 
@@ -249,10 +247,13 @@ def _step_title(step: StepResponse) -> str:
     return f"{name} {size}" + (f", {step.held:.0f} s" if math.isfinite(step.held) else ", held")
 
 
-def _headroom(axes: Any) -> None:
-    """Raise the upper limit, so that a legend fits above the lines."""
+def _legend_above(axes: Any, title: str, columns: int) -> None:
+    """Write the legend in the panel's upper part, and raise its upper limit until no line comes near it."""
+    legend = axes.legend(title=title or None, loc="upper right", ncols=columns, columnspacing=1.2, handlelength=1.8)
+    renderer = axes.figure.canvas.get_renderer()
+    share = (axes.bbox.y1 - legend.get_window_extent(renderer).y0) / axes.bbox.height
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + 0.3 * (high - low))
+    axes.set_ylim(low, low + (high - low) / (1.0 - share))
 
 
 def _shade_guidance_speeds(axes: Any, aircraft: Aircraft) -> None:

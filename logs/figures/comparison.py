@@ -1,6 +1,6 @@
 """Two flights in one picture: over the first one's map, and as panels over the distance flown."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -8,10 +8,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.track import COLUMNS, Track
+from flight.simulation.track import Track
 from logs.figures.elements import style
+from logs.figures.elements.legend import NamedWind
 from logs.figures.elements.panels import Axis, Panel, Series, doubles, draw_panels
-from logs.figures.map import draw_map
+from logs.figures.map import DrawnTrack, draw_tracks_on_map
 from logs.verdict.measures.airspace import with_fence_zones
 
 Floats = NDArray[np.float64]
@@ -30,31 +31,36 @@ class NamedFlight:
 
 
 def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
-    """Draw the first flight's map and route with both tracks over it."""
+    """Draw the first flight's map and route with both tracks over it, and both winds where they differ."""
     first, _ = flights
-    both = Track(*(np.concatenate([getattr(flight.track, name) for flight in flights]) for name in COLUMNS))
-    setup = first.setup
-    paths: dict[str, Any] = {"plan_waypoints": None, "route_waypoints": setup.route.waypoints}
-    # The map holds both tracks; the line that joins them is taken out again.
-    figure = draw_map(with_fence_zones(setup).scenario, **paths, track=both, verdict=None)
-    axes = figure.axes[0]
-    next(line for line in axes.lines if line.get_label() == "flown track").remove()
     looks: tuple[dict[str, Any], dict[str, Any]] = (
-        {"color": style.FLOWN, "linewidth": 1.6},
-        {"color": _SECOND, "linewidth": 1.6, "linestyle": (0, (5, 2))},
+        {"color": style.FLOWN, "width": 1.6},
+        {"color": _SECOND, "width": 1.6, "dashes": (0, (5, 2))},
     )
-    with style.clean_style():
-        for flight, look in zip(flights, looks, strict=True):
-            rows = flight.track.position[:: max(1, len(flight.track) // 6000)]
-            axes.plot(rows[:, 0], rows[:, 1], zorder=6, label=style.shorten(flight.name, 40), **look)
-        handles = axes.get_lines()[-2:]
-        axes.legend(handles=handles, loc="best", frameon=True, framealpha=0.9)
-        axes.set_title(f"{style.shorten(setup.scenario.name, 40)}: two flights from above", fontweight="bold")
-    return figure
+    winds = [
+        NamedWind(flight.setup.scenario.wind, flight.name, look["color"])
+        for flight, look in zip(flights, looks, strict=True)
+    ]
+    a, b = (replace(named.wind, seed=None) for named in winds)
+    return draw_tracks_on_map(
+        with_fence_zones(first.setup).scenario,
+        "two flights from above",
+        plan_waypoints=None,
+        route_waypoints=first.setup.route.waypoints,
+        tracks=[
+            DrawnTrack(style.shorten(flight.name, 40), flight.track, **look)
+            for flight, look in zip(flights, looks, strict=True)
+        ],
+        winds=[NamedWind(a)] if a == b else winds,
+        verdict=None,
+    )
 
 
 def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
-    """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle."""
+    """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle.
+
+    Without terrain, that of the height above it is left out.
+    """
     flown = [_distance(flight.track) for flight in flights]
     along = np.linspace(0.0, max(float(distance[-1]) for distance in flown), _POINTS)
 
@@ -74,7 +80,7 @@ def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
         Panel("height above\nground (m)", series([_above(flight) for flight in flights])),
         Panel("airspeed\n(m/s)", series([doubles(track.airspeed) for track in tracks]), least_span=4.0),
         Panel("bank, right +\n(°)", series([np.degrees(doubles(_roll(track))) for track in tracks])),
-        Panel("cross-track,\nright + (m)", series([doubles(track.cross_track) for track in tracks]), least_span=2.0),
+        Panel("cross-track,\nright + (m)", series([doubles(track.cross_track) for track in tracks]), least_span=0.1),
         Panel("throttle\n(%)", series([100.0 * doubles(_throttle(track)) for track in tracks])),
     ]
     return draw_panels(

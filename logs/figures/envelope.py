@@ -32,7 +32,9 @@ def draw_envelope_and_flight(setup: FlightSetup, track: Track | None) -> Figure:
         _limits(slope_axes, setup)
         _planned(slope_axes, setup)
         bank = float(np.degrees(min(setup.max_bank, setup.envelope.max_bank)))
-        bank_axes.axhline(bank, color=style.MISSILE, linewidth=1.6, label="bank limit of the plan")
+        bank_axes.axhline(
+            bank, color=style.MISSILE, linewidth=1.6, label="limit of planned turns;\ncorrections may bank beyond it"
+        )
         aircraft = float(np.degrees(setup.envelope.max_bank))
         if abs(aircraft - bank) > 0.1:
             bank_axes.axhline(

@@ -41,9 +41,9 @@ def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> 
 
 
 def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
-    """Strength and sum of kill and of detection along the flown distance (km), as far as units have such a radius.
+    """Strength and sum of kill and of detection along the flown distance (km), of those that the flight was exposed to.
 
-    None without threats.
+    None where it was exposed to nothing.
     """
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:
@@ -63,6 +63,8 @@ def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
         if not (radii > 0.0).any():
             continue
         rate = exposure_rates(position, threats.position, radii, scales)
+        if not np.nansum(rate):
+            continue
         total = np.concatenate([[0.0], np.cumsum(np.nan_to_num(rate) * np.diff(time))])
         strength = Series("strength", np.append(rate, rate[-1]), color=colour, filled=True)
         panels.append(Panel(f"{name}\nstrength (1)", [strength]))

@@ -1,5 +1,6 @@
 """The map: terrain, threats, the planned path and the flown track from above."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -7,16 +8,17 @@ import numpy as np
 from matplotlib import patheffects
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Circle, Rectangle
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
 from logs.figures.elements import style
+from logs.figures.elements.failure_labels import draw_inside, inside_threats, radius_of, write_fail_labels
 from logs.figures.elements.failures import Failures, failures, paths_differ
 from logs.figures.elements.ground import draw_ground
 from logs.figures.elements.labels import LabelPlacer
-from logs.figures.elements.legend import draw_compass, draw_legend, failing_handles
+from logs.figures.elements.legend import NamedWind, draw_compass, draw_legend, failing_handles
 from logs.figures.elements.threats import draw_threat_circles
 from logs.figures.elements.zones import draw_zone_shapes, name_zones
 from logs.verdict.findings import Verdict
@@ -48,6 +50,17 @@ class MapExtent:
         return (self.north[1] - self.north[0]) / (self.east[1] - self.east[0])
 
 
+@dataclass(frozen=True, slots=True)
+class DrawnTrack:
+    """A flown track, and how its line looks, in matplotlib's terms."""
+
+    label: str
+    track: Track
+    color: str = style.FLOWN
+    width: float = 1.0
+    dashes: Any = "-"
+
+
 def draw_map(
     scenario: Scenario,
     *,
@@ -62,10 +75,32 @@ def draw_map(
     numbered and carries the verdict's marks; a plan that differs from it by more than 1 m is drawn beside it.
     Missiles are drawn as the sphere's circle (line) and as its cut at the height of the path nearest to it (fill).
     """
+    return draw_tracks_on_map(
+        scenario,
+        f"{'plan' if track is None else 'plan and flight'} from above",
+        plan_waypoints=plan_waypoints,
+        route_waypoints=route_waypoints,
+        tracks=(DrawnTrack("flown track", track),) if track is not None else (),
+        winds=(NamedWind(scenario.wind),),
+        verdict=verdict,
+    )
+
+
+def draw_tracks_on_map(
+    scenario: Scenario,
+    subject: str,
+    *,
+    plan_waypoints: Floats | None,
+    route_waypoints: Floats | None,
+    tracks: Sequence[DrawnTrack],
+    winds: Sequence[NamedWind],
+    verdict: Verdict | None,
+) -> Figure:
+    """As `draw_map`, with any number of tracks and winds.  subject: of the title, after the scenario's name."""
     route = route_waypoints if route_waypoints is not None else plan_waypoints
     with style.clean_style():
-        extent = _extent(scenario, route, track)
-        figure, axes, legend_top = _frame(extent, scenario, track is not None)
+        extent = _extent(scenario, route, tracks)
+        figure, axes, legend_top = _frame(extent, scenario, subject)
         around = draw_ground(figure, axes, scenario.terrain, _RIGHT_COLUMN, _TOP)
         around += _area(axes, scenario)
         around += draw_threat_circles(axes, scenario.threats, route)
@@ -75,28 +110,33 @@ def draw_map(
         handles: list[Any] = []
         if route is not None:
             handles += _paths(axes, route, plan_waypoints, placer)
-        if track is not None and len(track):
-            handles += _flown(axes, track, placer)
+        for drawn in tracks:
+            if len(drawn.track):
+                handles += _flown(axes, drawn, placer)
         if route is not None:
-            handles += _failing_lines(axes, route, failed)
+            handles += _failing_lines(axes, route, failed, scenario.threats)
+        for drawn in tracks if failed.threats else ():
+            east, north, _ = drawn.track.position.T
+            handles += draw_inside(axes, east, north, inside_threats(failed, scenario.threats, drawn.track))
         handles += _ends(axes, scenario, route, placer)
         if route is not None:
             _number_waypoints(scenario, route, failed, placer)
-            _fail_labels(route, failed, placer)
-        _name_threats(axes, scenario.threats, placer)
+            centres = {k: (float(east), float(north)) for k, (east, north, _) in enumerate(scenario.threats.position)}
+            write_fail_labels(failed, route[:, :2], centres, placer, gap=16.0)
+        _name_threats(axes, scenario.threats, failed, placer)
         name_zones(axes, scenario.zones, placer)
-        draw_compass(figure, scenario, _RIGHT_COLUMN)
+        draw_compass(figure, winds, _RIGHT_COLUMN)
         draw_legend(figure, handles + around, _LEFT, legend_top)
     return figure
 
 
-def _extent(scenario: Scenario, route: Floats | None, track: Track | None) -> MapExtent:
+def _extent(scenario: Scenario, route: Floats | None, tracks: Sequence[DrawnTrack]) -> MapExtent:
     """Area of the scenario, widened to what lies outside it, with a rim, inside the allowed aspects."""
     points = [scenario.bounds.T, scenario.start[None, :2], scenario.destination[None, :2]]
     if route is not None:
         points.append(route[:, :2])
-    if track is not None:
-        points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
+    flown = [drawn.track.position for drawn in tracks]
+    points += [position[np.isfinite(position).all(axis=1), :2] for position in flown]
     together = np.vstack(points)
     low, high = together.min(axis=0), together.max(axis=0)
     padding = 0.015 * float((high - low).max())
@@ -108,7 +148,7 @@ def _extent(scenario: Scenario, route: Floats | None, track: Track | None) -> Ma
     return MapExtent((float(low[0]), float(high[0])), (float(low[1]), float(high[1])))
 
 
-def _frame(extent: MapExtent, scenario: Scenario, flown: bool) -> tuple[Figure, Any, float]:
+def _frame(extent: MapExtent, scenario: Scenario, subject: str) -> tuple[Figure, Any, float]:
     """Figure, axes, and the height (inches) under which the legend stands."""
     height = _MAP_WIDTH * extent.aspect
     tall = max(height, _LEAST_HEIGHT)
@@ -124,11 +164,10 @@ def _frame(extent: MapExtent, scenario: Scenario, flown: bool) -> tuple[Figure, 
         axis.set_major_locator(MultipleLocator(step))
         axis.set_major_formatter(kilometres)
     origin = scenario.origin
-    axes.set_xlabel(f"east of {origin.lat_deg:.4f}°, {origin.lon_deg:.4f}° (km)")
+    place = f"{origin.lat_deg:.4f}°, {origin.lon_deg:.4f}°".replace("-", "\N{MINUS SIGN}")
+    axes.set_xlabel(f"east of {place} (km)")
     axes.set_ylabel("north (km)")
-    axes.set_title(
-        f"{style.shorten(scenario.name, 60)}: {'plan and flight' if flown else 'plan'} from above", fontweight="bold"
-    )
+    axes.set_title(f"{style.shorten(scenario.name, 60)}: {subject}", fontweight="bold")
     return figure, axes, (legend_height - 0.02) / total
 
 
@@ -188,16 +227,22 @@ def _paths(axes: Any, route: Floats, plan: Floats | None, placer: LabelPlacer) -
     return [line[0], *handles, marker]
 
 
-def _flown(axes: Any, track: Track, placer: LabelPlacer) -> list[Any]:
-    rows = track.position[:: max(1, len(track) // 6000)]
-    rows = np.vstack([rows, track.position[-1:]])
-    line = axes.plot(rows[:, 0], rows[:, 1], color=style.FLOWN, linewidth=1.0, zorder=6, label="flown track")
+def _flown(axes: Any, drawn: DrawnTrack, placer: LabelPlacer) -> list[Any]:
+    track = drawn.track
+    shown = np.union1d(np.arange(0, len(track), max(1, len(track) // 6000)), [len(track) - 1])
+    rows = track.position[shown]
+    look: dict[str, Any] = {"color": drawn.color, "linewidth": drawn.width, "linestyle": drawn.dashes}
+    line = axes.plot(rows[:, 0], rows[:, 1], zorder=6, label=drawn.label, **look)
     placer.avoid(rows[:, 0], rows[:, 1])
     return [line[0]]
 
 
-def _failing_lines(axes: Any, route: Floats, failed: Failures) -> list[Any]:
-    """Draw a broad band under each failing leg and a ring about each failing waypoint."""
+def _failing_lines(axes: Any, route: Floats, failed: Failures, threats: Threats) -> list[Any]:
+    """Draw a broad band under each failing leg, a ring about each failing waypoint, a circle about entered threats."""
+    for place in failed.threats:
+        east, north, _ = threats.position[place.index or 0].tolist()
+        radius = radius_of(threats, place)
+        axes.add_patch(Circle((east, north), radius, fill=False, edgecolor=style.FAIL, linewidth=2.2, zorder=5.5))
     for leg in failed.legs:
         run = np.hypot(*(route[leg + 1, :2] - route[leg, :2]))
         # A leg too short to see shows as a blot.
@@ -233,7 +278,7 @@ def _ends(axes: Any, scenario: Scenario, route: Floats | None, placer: LabelPlac
     ):
         look: dict[str, Any] = {
             "markersize": size,
-            "markerfacecolor": "#F0E442",
+            "markerfacecolor": style.MARKER,
             "markeredgecolor": "black",
             "markeredgewidth": 1.0,
         }
@@ -258,28 +303,15 @@ def _number_waypoints(scenario: Scenario, route: Floats, failed: Failures, place
             placer.place(str(number), east, north, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
 
 
-def _fail_labels(route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    """Name the rules that fail beside the first dozen of the failing legs and waypoints."""
-    middles = 0.5 * (route[:-1] + route[1:])
-    labels = [(f"leg {k}: {', '.join(rules)}", middles[k]) for k, rules in failed.legs.items()]
-    labels += [(f"waypoint {k}: {', '.join(rules)}", route[k]) for k, rules in failed.waypoints.items()]
-    frame: dict[str, Any] = {
-        "boxstyle": "round,pad=0.2",
-        "facecolor": "white",
-        "edgecolor": style.FAIL,
-        "linewidth": 0.9,
-    }
-    for text, point in labels[:12]:
-        placer.place(text, float(point[0]), float(point[1]), size=7.0, gap=16.0, color=style.FAIL, bbox=frame)
-
-
-def _name_threats(axes: Any, threats: Threats, placer: LabelPlacer) -> None:
+def _name_threats(axes: Any, threats: Threats, failed: Failures, placer: LabelPlacer) -> None:
+    """Name each threat in the picture, as far as there is room; those that fail have labels of their own."""
     if len(threats) > _MOST_NAMES:
         return
+    labelled = failed.threat_names()
     size = 6.0 if len(threats) <= 30 else 5.0
-    for name, point in zip(threats.names, threats.position, strict=True):
+    for k, (name, point) in enumerate(zip(threats.names, threats.position, strict=True)):
         inside = (
             axes.get_xlim()[0] < point[0] < axes.get_xlim()[1] and axes.get_ylim()[0] < point[1] < axes.get_ylim()[1]
         )
-        if inside:
+        if inside and k not in labelled:
             placer.place(style.shorten(name, 20), float(point[0]), float(point[1]), size=size, gap=4.0, optional=True)

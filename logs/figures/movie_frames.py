@@ -90,7 +90,7 @@ class _MovingParts:
         self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
         look: dict[str, Any] = {"animated": True, "zorder": 9}
         (self._trail,) = axes.plot([], [], color=style.FLOWN, linewidth=1.6, **look)
-        (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color="#B0408A", **look)
+        (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color=style.FAIL, **look)
         self._text = figure.text(
             0.02, 0.018, "", family="monospace", fontsize=9.5, va="bottom", animated=True,
             bbox={"facecolor": "white", "edgecolor": "#bbbbbb", "pad": 4.0},
@@ -125,16 +125,21 @@ class _MovingParts:
         parts = [
             f"{float(track.time[k]):7.1f} s",
             f"leg {int(track.leg[k])} of {self._setup.route.legs}",
-            f"{_number(float(track.airspeed[k]), 1)} m/s",
-            f"{_number(float(track.position[k, 2]), 0)} m AMSL",
-            f"{_number(float(self._above[k]), 0)} m above ground",
-            f"bank {_number(math.degrees(roll), 0)}°",
+            f"{signed_number(float(track.airspeed[k]), 1)} m/s",
+            f"{signed_number(float(track.position[k, 2]), 0)} m AMSL",
+            f"{signed_number(float(self._above[k]), 0)} m above ground",
+            f"bank {signed_number(math.degrees(roll), 0)}°",
         ]
         return "   ".join(parts)
 
 
-def _number(value: float, digits: int) -> str:
-    return f"{value:.{digits}f}" if math.isfinite(value) else "?"
+def signed_number(value: float, digits: int) -> str:
+    """Write a number with so many digits, nought without a sign, "?" for what is no number.
+
+    >>> signed_number(-0.3, 0), signed_number(-12.34, 1)
+    ('0', '−12.3')
+    """
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
 
 
 # Nose, right wing, tail, left wing: an arrowhead that points north.

@@ -139,7 +139,7 @@ def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
         (scenario.start, "^", 9.0, "start"),
         (scenario.destination, "*", 13.0, "destination"),
     ):
-        look: dict[str, Any] = {"markersize": size, "markerfacecolor": "#F0E442", "markeredgecolor": "black"}
+        look: dict[str, Any] = {"markersize": size, "markerfacecolor": style.MARKER, "markeredgecolor": "black"}
         handles += axes.plot(*point[:2], marker, zorder=8, linestyle="", label=name, **look)
         placer.place(name, float(point[0]), float(point[1]), size=8.0, gap=12.0, fontweight="bold")
     return handles

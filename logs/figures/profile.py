@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 from flight.simulation.track import Track
 from logs.figures.elements import style
+from logs.figures.elements.failure_labels import draw_inside, inside_threats, write_fail_labels
 from logs.figures.elements.failures import Failures, failures, route_distance, route_samples, track_distance
 from logs.figures.elements.labels import LabelPlacer
 from logs.figures.elements.legend import draw_legend, failing_handles
-from logs.figures.elements.threats import draw_threat_cuts
+from logs.figures.elements.threats import SphereName, draw_entered_cuts, draw_threat_cuts
 from logs.figures.elements.zones import draw_zone_cuts, zone_handles
 from logs.verdict.findings import Verdict
 from world.scenario import Scenario
+from world.threats import Threats
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +61,7 @@ def draw_profile(
         ground = _ground_under(scenario, points)
         _limits(axes, scenario, route, track, ground, float(at[-1]))
         handles = _ground(axes, scenario, distance, ground)
-        threat_handles, names = draw_threat_cuts(axes, scenario.threats, distance, points)
+        threat_handles, names = draw_threat_cuts(axes, scenario.threats, distance, points, ground)
         zone_names = draw_zone_cuts(axes, scenario.zones, distance, points, ground)
         threat_handles += zone_handles(scenario.zones)
         lines = [] if straight else _plan(axes, at, route)
@@ -69,13 +71,20 @@ def draw_profile(
             lines += _flown(axes, route, track, placer)
         failed = failures(verdict, len(route))
         lines += _failing(axes, at, route, failed)
+        entered: dict[int, tuple[float, float]] = {}
+        if failed.threats:
+            places = (distance, points) if track is None else (track_distance(route, track), track.position)
+            entered = draw_entered_cuts(axes, scenario.threats, failed, *places, _ground_under(scenario, places[1]))
+        if track is not None and failed.threats:
+            inside = inside_threats(failed, scenario.threats, track)
+            lines += draw_inside(axes, track_distance(route, track) / 1000.0, track.position[:, 2], inside)
         lines += _ceiling(axes, scenario)
         if not straight:
             _numbers(axes, at, route, failed, placer)
-        _name_threats(axes, names, placer)
+        _name_spheres(names, scenario.threats, set(failed.threat_names()), placer)
         for name, middle, amsl in zone_names[:_MOST_NAMES]:
             placer.place(name, middle, amsl, size=6.0, gap=0.0, prefer=(0, 0), optional=True, color=style.ZONE)
-        _fail_labels(at, route, failed, placer)
+        write_fail_labels(failed, np.column_stack([at / 1000.0, route[:, 2]]), entered, placer, gap=18.0)
         _label_axes(figure, axes, scenario, straight)
         draw_legend(figure, lines + handles + threat_handles, _LEFT, (_BOTTOM - 0.58) / _HEIGHT)
     return figure
@@ -213,36 +222,12 @@ def _numbers(axes: Any, at: Floats, route: Floats, failed: Failures, placer: Lab
             placer.place(str(number), *point, size=7.5, gap=8.0, color=style.BLUE, fontweight="bold")
 
 
-def _name_threats(axes: Any, names: list[tuple[str, float, float]], placer: LabelPlacer) -> None:
-    """Write each sphere's name over its summit, or under the upper edge of the picture where it reaches that."""
-    low, high = axes.get_ylim()
-    top = high - 0.03 * (high - low)
-    for name, middle, summit in names[:_MOST_NAMES]:
-        placer.place(
-            style.shorten(name, 20),
-            middle,
-            min(top, summit + 0.02 * (high - low)),
-            size=6.5,
-            gap=2.0,
-            prefer=(0, 0),
-            optional=True,
-        )
-
-
-def _fail_labels(at: Floats, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    labels = [
-        (f"leg {k}: {', '.join(rules)}", 0.5 * (at[k] + at[k + 1]), 0.5 * (route[k, 2] + route[k + 1, 2]))
-        for k, rules in failed.legs.items()
-    ]
-    labels += [(f"waypoint {k}: {', '.join(rules)}", at[k], route[k, 2]) for k, rules in failed.waypoints.items()]
-    frame: dict[str, Any] = {
-        "boxstyle": "round,pad=0.2",
-        "facecolor": "white",
-        "edgecolor": style.FAIL,
-        "linewidth": 0.9,
-    }
-    for text, distance, amsl in labels[:12]:
-        placer.place(text, float(distance) / 1000.0, float(amsl), size=7.0, gap=18.0, color=style.FAIL, bbox=frame)
+def _name_spheres(names: list[SphereName], threats: Threats, labelled: set[int], placer: LabelPlacer) -> None:
+    """Write each sphere's name at its outline, in its colour; those that fail have labels of their own."""
+    for name in names[:_MOST_NAMES]:
+        if name.index not in labelled:
+            text = style.shorten(threats.names[name.index], 20)
+            placer.place(text, *name.at, size=6.5, gap=3.0, prefer=name.prefer, optional=True, color=name.colour)
 
 
 def _label_axes(figure: Figure, axes: Any, scenario: Scenario, straight: bool) -> None:

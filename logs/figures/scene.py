@@ -29,6 +29,9 @@ Floats = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
 _ELEVATION = math.radians(36.0)
 _MOST_CELLS = 130
+# Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
+# round, rad.
+_LEAST_SIDE, _ASLANT = 0.3, math.radians(45.0)
 _MOST_NUMBERS, _MOST_NAMES = 40, 30
 
 
@@ -63,18 +66,21 @@ class Projection:
 def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None) -> Figure:
     """Draw the scene from aside of the line from start to destination, heights stretched by the factor in the title.
 
-    Lines are dashed and thin behind a ridge.
+    Lines are dashed and thin behind a ridge.  A long and narrow scene is seen more from its end, with ground about it,
+    so that it is no strip.
     """
-    bounds = scene_bounds(setup, track)
+    all_of_it = scene_bounds(setup, track)
+    bounds = _widened(all_of_it)
+    narrow = not np.array_equal(bounds, all_of_it)
     terrain = setup.scenario.terrain
     grid = ground_grid(terrain, bounds, _MOST_CELLS)
     route = setup.route.waypoints
-    projection = _projection(route, bounds, exaggeration(setup, bounds, grid))
+    projection = _projection(route, bounds, exaggeration(setup, bounds, grid), narrow)
     failed = failures(verdict, len(route))
     with style.clean_style():
         figure, axes = _frame(setup, projection, bounds, grid)
         handles = _ground(axes, projection, grid, bounds)
-        handles += _threats(axes, projection, setup)
+        handles += _threats(axes, projection, setup, failed)
         handles += _zones(axes, projection, setup)
         placer = LabelPlacer(axes)
         handles += _paths(axes, projection, terrain, route, track, failed, placer)
@@ -87,11 +93,19 @@ def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None)
     return figure
 
 
-def _projection(route: Floats, bounds: Floats, stretch: float) -> Projection:
+def _widened(bounds: Floats) -> Floats:
+    """Ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
+    sides = np.ptp(bounds, axis=1)
+    more = 0.5 * np.maximum(_LEAST_SIDE * sides.max() - sides, 0.0)
+    return np.asarray(bounds + np.stack([-more, more], axis=1))
+
+
+def _projection(route: Floats, bounds: Floats, stretch: float, narrow: bool) -> Projection:
     step = route[-1] - route[0]
     azimuth = math.atan2(step[1], step[0]) - math.pi / 2.0
     if math.sin(azimuth) > 0.0:
         azimuth += math.pi
+    azimuth += _ASLANT if narrow else 0.0
     return Projection(azimuth, np.array([*bounds.mean(axis=1), float(route[:, 2].mean())]), stretch)
 
 
@@ -169,8 +183,8 @@ def _ground(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: 
     return []
 
 
-def _threats(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]:
-    """Outlines of the spheres' upper halves, on the height of their centres."""
+def _threats(axes: Any, projection: Projection, setup: FlightSetup, failed: Failures) -> list[Any]:
+    """Outlines of the spheres' upper halves, on the height of their centres; broad where they are entered."""
     threats = setup.scenario.threats
     handles: list[Any] = []
     # A stretched dome of radius 1: the far half of its outline, and the near half of its foot.
@@ -190,6 +204,10 @@ def _threats(axes: Any, projection: Projection, setup: FlightSetup) -> list[Any]
         for k in some:
             dome = projection.project(threats.position[k])[:2] + float(radii[k]) * shape
             axes.add_patch(Polygon(dome, linewidth=0.9, zorder=3, **look))
+        kind = "missile" if radii is threats.kill_radius else "radar"
+        for entered in (place.index or 0 for place in failed.threats if place.kind == kind):
+            dome = projection.project(threats.position[entered])[:2] + float(radii[entered]) * shape
+            axes.add_patch(Polygon(dome, fill=False, edgecolor=style.FAIL, linewidth=2.2, zorder=4.6))
         if some.size:
             handles.append(Patch(linewidth=1.1, label=label, **look))
     return handles
@@ -280,5 +298,10 @@ def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: F
             colour = style.FAIL if k in failed.waypoints else style.BLUE
             placer.place(str(k), *corners[k, :2].tolist(), size=7.5, gap=7.0, color=colour, fontweight="bold")
     threats = setup.scenario.threats
-    for name, point in list(zip(threats.names, projection.project(threats.position), strict=True))[:_MOST_NAMES]:
-        placer.place(style.shorten(name, 20), *point[:2].tolist(), size=6.5, gap=2.0, optional=True)
+    entered = failed.threat_names()
+    named = list(zip(threats.names, projection.project(threats.position), strict=True))
+    # Entered ones first: they have the best places.
+    for k in sorted(range(min(len(named), _MOST_NAMES)), key=lambda k: k not in entered):
+        name, point = named[k]
+        look: dict[str, Any] = {"color": style.FAIL, "fontweight": "bold"} if k in entered else {"optional": True}
+        placer.place(style.shorten(name, 20), *point[:2].tolist(), size=6.5, gap=2.0, **look)

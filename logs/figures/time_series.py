@@ -47,7 +47,14 @@ def draw_controls(setup: FlightSetup, track: Track) -> Figure:
 
 
 def draw_energy(setup: FlightSetup, track: Track) -> Figure:
-    """Four panels over time: battery energy used, power, current, and the aircraft's specific energy as a height."""
+    """Four panels over time: battery energy used, power, current, and the aircraft's specific energy as a height.
+
+    Of an aircraft that burns fuel, its heat is shown, and no current.
+    """
+    burns = setup.envelope.power_level.size > 0 and not setup.envelope.volts
+    store, unit, power_unit, scale = (
+        ("heat of fuel", "kWh", "kW", 1e-3) if burns else ("battery energy", "Wh", "W", 1.0)
+    )
     seconds = track.time
     used = doubles(track.energy)
     late = np.searchsorted(seconds, seconds - _POWER_WINDOW)
@@ -56,9 +63,9 @@ def draw_energy(setup: FlightSetup, track: Track) -> Figure:
     height = track.position[:, 2]
     kinetic = doubles(track.airspeed) ** 2 / (2.0 * GRAVITY)
     panels = [
-        Panel("battery energy\nused (Wh)", [Series("used", used, filled=True)]),
-        Panel("power\n(W)", [Series(f"mean of {_POWER_WINDOW:g} s", power)]),
-        Panel("battery\ncurrent (A)", [Series("current", doubles(track.current))]),
+        Panel(f"{store}\nused ({unit})", [Series("used", scale * used, filled=True)]),
+        Panel(f"power\n({power_unit})", [Series(f"mean of {_POWER_WINDOW:g} s", scale * power)]),
+        *([] if burns else [Panel("battery\ncurrent (A)", [Series("current", doubles(track.current))])]),
         Panel(
             "energy as\nheight (m)",
             [
@@ -67,8 +74,8 @@ def draw_energy(setup: FlightSetup, track: Track) -> Figure:
             ],
         ),
     ]
-    battery = f"{setup.battery:.0f} Wh"
-    return draw_panels(_title(setup, f"energy, of a battery of {battery}"), panels, time_axis(track), track)
+    whole = f"{scale * setup.battery:.0f} {unit} {'in full tanks' if burns else 'in a full battery'}"
+    return draw_panels(_title(setup, f"energy, of {whole}"), panels, time_axis(track), track)
 
 
 def _title(setup: FlightSetup, subject: str) -> str:
@@ -86,10 +93,14 @@ def _panels(setup: FlightSetup, track: Track) -> list[Panel]:
             [Series("commanded", doubles(track.speed_command), **commanded), Series("flown", doubles(track.airspeed))],
             least_span=4.0,
         ),
-        Panel("bank, right +\n(°)", [Series("flown", bank)], [("limit", limit), ("", -limit)]),
+        Panel(
+            "bank, right +\n(°)",
+            [Series("flown", bank)],
+            [("limit of planned turns;\ncorrections may pass it", limit), ("", -limit)],
+        ),
         Panel("load factor\n(g)", [Series("flown", doubles(track.load_factor))], least_span=0.2),
-        Panel("cross-track,\nright + (m)", [Series("as guidance saw it", doubles(track.cross_track))], least_span=2.0),
-        Panel("height error,\nhigh + (m)", [Series("as guidance saw it", doubles(track.height_error))], least_span=2.0),
+        Panel("cross-track,\nright + (m)", [Series("as guidance saw it", doubles(track.cross_track))], least_span=0.1),
+        Panel("height error,\nhigh + (m)", [Series("as guidance saw it", doubles(track.height_error))], least_span=0.1),
     ]
     terrain = setup.scenario.terrain
     if terrain is not None:

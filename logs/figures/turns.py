@@ -15,6 +15,8 @@ from logs.verdict.findings import Finding, Verdict
 
 _LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 0.25, 0.6, 0.85, 1.55, 0.62
 _NUMBERED = 45
+# Room above and below what a panel shows, of its span: half a ring, and some air.
+_ROOM = 0.12
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,23 +100,26 @@ def _bars(axes: Any, values: list[PlaceValue], rule: str) -> None:
     axes.set_xlim(numbers[0] - 0.8, numbers[-1] + 0.8)
     axes.grid(axis="y", color="#e4e4e4", linewidth=0.5)
     axes.set_axisbelow(True)
-    _zoom(axes, values, rule)
+    _frame_values(axes, values, rule)
 
 
-def _zoom(axes: Any, values: list[PlaceValue], rule: str) -> None:
-    """Cut far clearances and far limits off, so that what is near a limit shows."""
-    near = [abs(v) for value in values for v in (value.planned, value.flown) if math.isfinite(v)]
-    limits = [abs(value.limit) for value in values if math.isfinite(value.limit)]
-    if rule == "clearance" and limits and near:
-        axes.set_ylim(0.0, max(min(max(near), 12.0 * max(limits)), 1.5 * max(limits), 1.1 * min(near)))
-    elif rule in ("turn", "corridor") and near and limits and max(limits) > 4.0 * max(near):
-        axes.set_ylim(
-            0.0, max(1.3 * max(near), 1.1 * min(limits)) if min(limits) < 4.0 * max(near) else 1.3 * max(near)
-        )
+def _frame_values(axes: Any, values: list[PlaceValue], rule: str) -> None:
+    """Show every bar, dot and ring whole; of turns and corridors, limits far above them all are cut off, and named."""
+    shown = [v for value in values for v in (value.planned, value.flown) if math.isfinite(v)]
+    limits = [value.limit for value in values if math.isfinite(value.limit)]
+    far = 4.0 * max((abs(v) for v in shown), default=math.inf) if rule in ("turn", "corridor") else math.inf
+    cut = [limit for limit in limits if limit > far]
+    seen = [0.0, *shown, *(limit for limit in limits if limit <= far)]
+    low, high = min(seen), max(seen)
+    room = _ROOM * ((high - low) or 1.0)
+    ringed = any(value.ok is False for value in values)
+    axes.set_ylim(low - room if ringed or low < 0.0 else 0.0, high + room)
+    if cut:
         unit = "°" if rule == "turn" else " m"
+        text = f"{'limits' if len(cut) == len(limits) else 'other limits'} from {min(cut):.0f}{unit}"
         axes.annotate(
-            f"limits from {min(limits):.0f}{unit}", (1.0, 1.0), (0, 3), xycoords="axes fraction",
-            textcoords="offset points", ha="right", fontsize=7, color=style.MISSILE,
+            text, (1.0, 1.0), (0, 3), xycoords="axes fraction", textcoords="offset points", ha="right", fontsize=7,
+            color=style.MISSILE,
         )  # fmt: skip
 
 

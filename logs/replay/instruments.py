@@ -169,7 +169,8 @@ def _printable(text: str) -> str:
 
 
 def _number(value: float, digits: int, sign: str = "") -> str:
-    return f"{value:{sign}.{digits}f}" if math.isfinite(value) else "?"
+    # Nought has no sign that is not asked for: "+0.0" or "0", never "-0".
+    return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
 
 
 def _metres(value: float) -> str:

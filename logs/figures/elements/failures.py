@@ -1,13 +1,14 @@
 """Where a verdict's failures lie on a route, and how far along it a flight has come."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.places import PlaceKind
+from logs.verdict.places import Place, PlaceKind
+from logs.verdict.wording import place_text
 from world.geometry import leg_runs
 
 Floats = NDArray[np.float64]
@@ -15,21 +16,46 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Failures:
-    """Rules that failed, by leg and by waypoint number (each rule once, in the verdict's order)."""
+    """Rules that failed, by leg and by waypoint number (each rule once, in the verdict's order).
+
+    threats: missiles and radars whose reach was entered, each once.
+    places: of legs and waypoints that fail, by kind and number, as the verdict has them.
+    """
 
     legs: dict[int, tuple[str, ...]]
     waypoints: dict[int, tuple[str, ...]]
+    threats: tuple[Place, ...] = ()
+    places: dict[tuple[PlaceKind, int], Place] = field(default_factory=dict)
 
     def __bool__(self) -> bool:
         """Something failed at a place."""
-        return bool(self.legs or self.waypoints)
+        return bool(self.legs or self.waypoints or self.threats)
+
+    def name(self, kind: PlaceKind, number: int) -> str:
+        """What the verdict calls a leg or a waypoint.
+
+        >>> Failures({7: ("slope",)}, {}, places={("leg", 7): Place("leg", 7, to_item=9)}).name("leg", 7)
+        'leg 7, to item 9'
+        >>> Failures({7: ("slope",)}, {}).name("leg", 7)
+        'leg 7'
+        """
+        return place_text(self.places.get((kind, number), Place(kind, number)))
+
+    def threat_names(self) -> dict[int, str]:
+        """What the verdict calls each failing threat, by its index; one whose missile fails is called by that."""
+        radars_first = sorted(self.threats, key=lambda place: place.kind == "missile")
+        return {place.index or 0: place_text(place) for place in radars_first}
 
 
 def failures(verdict: Verdict | None, waypoint_count: int) -> Failures:
     """Find the failing places of a verdict; places that the route does not have are left out."""
     failed = [finding for finding in verdict.findings if finding.ok is False] if verdict is not None else []
+    places = [finding.place for finding in failed if finding.place.index is not None]
     return Failures(
-        legs=_rules_at(failed, "leg", waypoint_count - 1), waypoints=_rules_at(failed, "waypoint", waypoint_count)
+        legs=_rules_at(failed, "leg", waypoint_count - 1),
+        waypoints=_rules_at(failed, "waypoint", waypoint_count),
+        threats=tuple(dict.fromkeys(place for place in places if place.kind in ("missile", "radar"))),
+        places={(place.kind, place.index or 0): place for place in places},
     )
 
 

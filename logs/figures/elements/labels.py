@@ -13,6 +13,12 @@ from logs.figures.elements.style import DPI, INK
 Floats = NDArray[np.float64]
 Box = tuple[float, float, float, float]
 
+# What covering another label costs: more than any distance, and than any line that a label can cover.
+_OVERLAP = 200.0
+# How far from its gap a label may move, in its own heights: a framed one has a line to its point, however far it is;
+# one that may be left out stays close.
+_RINGS_FRAMED = (0.0, 1.0, 2.2, 3.4, 4.6, 6.0, 7.5, 9.0, 11.0)
+_RINGS, _RINGS_OPTIONAL = _RINGS_FRAMED[:3], _RINGS_FRAMED[:2]
 # Directions that are tried for a label, best first: right-up, left-up, right-down, left-down, up, down, right, left.
 _DIRECTIONS = ((1, 1), (-1, 1), (1, -1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 
@@ -58,7 +64,9 @@ class LabelPlacer:
         gap: pixels between text and position.
         prefer: the direction tried first; (0, 0) centres the text on the position.
         optional: left out where it would cover another label.
-        style: of the text; one with a box gets a line to its point.
+        style: of the text.
+
+        A framed label, and one that had to move away, gets a line to its point.
         """
         (px, py) = self._pixels([x], [y])[0]
         if not (math.isfinite(px) and math.isfinite(py)):
@@ -66,13 +74,13 @@ class LabelPlacer:
         pad = 5.0 if "bbox" in style else 1.0
         width = 0.62 * size * len(text) * DPI / 72.0 + 2 * pad
         height = 1.25 * size * DPI / 72.0 + 2 * pad
-        best, best_cost = self._box(px, py, width, height, gap, prefer), math.inf
-        for ring, distance in enumerate((gap, gap + height, gap + 2.2 * height)):
+        best, best_cost, moved = self._box(px, py, width, height, gap, prefer), math.inf, 0
+        for ring, heights in enumerate(_RINGS_FRAMED if "bbox" in style else _RINGS_OPTIONAL if optional else _RINGS):
             for rank, direction in enumerate((prefer, *_DIRECTIONS)):
-                box = self._box(px, py, width, height, distance, direction)
+                box = self._box(px, py, width, height, gap + heights * height, direction)
                 cost = self._cost(box) + 0.05 * rank + 1.5 * ring
                 if cost < best_cost:
-                    best, best_cost = box, cost
+                    best, best_cost, moved = box, cost, ring
         if optional and any(_overlap(best, other) for other in self.boxes):
             return
         self.boxes.append(best)
@@ -81,15 +89,17 @@ class LabelPlacer:
             middle[0], middle[1], text, fontsize=size, ha="center", va="center", **{"color": INK, "zorder": 9, **style}
         )
         if "bbox" in style:
-            self._lead(best, px, py, style["bbox"]["edgecolor"])
+            self._lead(best, px, py, style["bbox"]["edgecolor"], 0.8)
         else:
+            if moved:
+                self._lead(best, px, py, style.get("color", INK), 0.5)
             artist.set_path_effects([patheffects.withStroke(linewidth=1.8, foreground="white", alpha=0.85)])
 
-    def _lead(self, box: Box, x: float, y: float, color: str) -> None:
-        """Draw a thin line from under a framed label to its point."""
+    def _lead(self, box: Box, x: float, y: float, color: str, width: float) -> None:
+        """Draw a thin line from under a label to its point."""
         middle = (0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3]))
         ends = self.axes.transData.inverted().transform([middle, (x, y)])
-        self.axes.plot(ends[:, 0], ends[:, 1], "-", color=color, linewidth=0.8, zorder=8.9, gid="leader")
+        self.axes.plot(ends[:, 0], ends[:, 1], "-", color=color, linewidth=width, zorder=8.9, gid="leader")
 
     def _pixels(self, east: ArrayLike, north: ArrayLike) -> Floats:
         points = np.column_stack([np.asarray(east, dtype=np.float64), np.asarray(north, dtype=np.float64)])
@@ -116,7 +126,7 @@ class LabelPlacer:
             cost += 60.0
         for other in self.boxes:
             if _overlap(box, other):
-                cost += 12.0
+                cost += _OVERLAP
         if len(self.lines):
             inside = (
                 (self.lines[:, 0] > box[0])

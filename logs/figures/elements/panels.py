@@ -15,6 +15,10 @@ from logs.figures.elements import style
 Floats = NDArray[np.float64]
 
 _LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 2.15, 0.72, 0.55, 1.12, 0.2
+# Inches: right of the panels where no legends stand there, and the height of the one legend above them.
+_EDGE, _LEGEND = 0.25, 0.28
+# Inches from the panels to the middle of their labels.
+_LABEL = 0.44
 # Blocks that a series is thinned to; each keeps its lowest and highest row.
 _BLOCKS = 700
 
@@ -74,18 +78,25 @@ def doubles(values: NDArray[np.float32]) -> Floats:
 
 
 def draw_panels(title: str, panels: Sequence[Panel], axis: Axis, track: Track | None) -> Figure:
-    """Stack panels over one axis.
+    """Stack panels over one axis; those without a value are left out, as far as another has any.
 
     track: with as many rows as the axis; grey lines with numbers then part its legs.
+    Where each look means one thing in all panels, and some mean it in several, one legend stands above them.
     """
-    total = _TOP + _BOTTOM + len(panels) * _PANEL + (len(panels) - 1) * _GAP
+    panels = [panel for panel in panels if _has_values(panel)] or panels[:1]
+    top, right = (_TOP, _RIGHT)
+    if shared := shares_legend(panels):
+        top, right = _TOP + _LEGEND, _EDGE
+    total = top + _BOTTOM + len(panels) * _PANEL + (len(panels) - 1) * _GAP
     with style.clean_style():
         figure = style.new_figure(total)
         for row, panel in enumerate(panels):
             base = _BOTTOM + (len(panels) - 1 - row) * (_PANEL + _GAP)
-            frame = (_LEFT / style.WIDTH, base / total, 1 - (_LEFT + _RIGHT) / style.WIDTH, _PANEL / total)
+            frame = (_LEFT / style.WIDTH, base / total, 1 - (_LEFT + right) / style.WIDTH, _PANEL / total)
             axes = figure.add_axes(frame)
             _draw(axes, panel, axis.values)
+            if not shared:
+                axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), handlelength=1.6, borderaxespad=0.2)
             if track is not None:
                 _legs(axes, axis.values, track, numbered=row == 0)
             if row < len(panels) - 1:
@@ -93,7 +104,50 @@ def draw_panels(title: str, panels: Sequence[Panel], axis: Axis, track: Track | 
             else:
                 axes.set_xlabel(axis.label)
         figure.text(_LEFT / style.WIDTH, 1 - 0.3 / total, title, fontsize=11, fontweight="bold", va="center")
+        if shared:
+            _legend_above(figure, 1 - 0.45 / total)
     return figure
+
+
+def _has_values(panel: Panel) -> bool:
+    return any(np.isfinite(line.values).any() for line in panel.series)
+
+
+def shares_legend(panels: Sequence[Panel]) -> bool:
+    """Whether one legend can stand for all panels: no look has two meanings, no meaning two looks, some repeat.
+
+    >>> flown, asked = Series("flown", np.zeros(2)), Series("commanded", np.zeros(2), color=style.LIMIT)
+    >>> shares_legend([Panel("bank", [asked, flown]), Panel("speed", [asked, flown])])
+    True
+    >>> shares_legend([Panel("bank", [flown]), Panel("height", [Series("from terrain", np.zeros(2))])])
+    False
+    """
+    entries: list[tuple[str, Any]] = [
+        (line.label, (line.color, line.width, line.dashes)) for panel in panels for line in panel.series
+    ]
+    entries += [(label, "limit") for panel in panels for label, _ in panel.limits if label]
+    different = set(entries)
+    labels, looks = ({entry[side] for entry in different} for side in (0, 1))
+    return len(labels) == len(looks) == len(different) < len(entries)
+
+
+def _legend_above(figure: Figure, top: float) -> None:
+    """Write each entry of the panels once, in a row.  top: its upper edge, of the figure's height."""
+    entries = {
+        str(label): handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="upper left",
+        bbox_to_anchor=(_LEFT / style.WIDTH - 0.01, top),
+        ncols=len(entries),
+        handlelength=2.2,
+        borderaxespad=0.0,
+        borderpad=0.2,
+    )
 
 
 def _draw(axes: Any, panel: Panel, along: Floats) -> None:
@@ -125,10 +179,9 @@ def _draw(axes: Any, panel: Panel, along: Floats) -> None:
     axes.set_xlim(float(along[0]), float(max(along[-1], along[0] + 1e-3)))
     axes.xaxis.set_major_locator(MultipleLocator(style.nice_step(float(np.ptp(axes.get_xlim())), 14)))
     axes.set_ylabel(panel.title)
-    axes.yaxis.set_label_coords(-0.062, 0.5)
+    axes.yaxis.set_label_coords(-_LABEL / (style.WIDTH * axes.get_position().width), 0.5)
     axes.grid(color="#e4e4e4", linewidth=0.5)
     axes.set_axisbelow(True)
-    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), handlelength=1.6, borderaxespad=0.2)
 
 
 def _legs(axes: Any, along: Floats, track: Track, *, numbered: bool) -> None:

@@ -35,6 +35,9 @@ ZONE, ZONE_FILL = "#7A1F1F", (0.478, 0.122, 0.122)
 BLUE = "#0072B2"
 INK = "#222222"
 QUIET = "#6b6b6b"
+MARKER = "#F0E442"  # start and destination
+# What a picture of few colours keeps as it is.
+DRAWN = (PLANNED, FLOWN, MISSILE, RADAR, FAIL, LIMIT, ZONE, BLUE, INK, QUIET, MARKER, "#FFFFFF")
 
 # Rises in lightness from valley to summit, so that height reads without colour.
 GROUND = ("#9fbfa5", "#cfd8b0", "#efe7c8", "#f6efe2", "#ffffff")

@@ -1,5 +1,6 @@
 """Threats on the map (circles) and on the profile (the part of each sphere that stands over the path)."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ from matplotlib.patches import Circle, Patch
 from numpy.typing import NDArray
 
 from logs.figures.elements import style
-from logs.figures.elements.failures import route_samples
+from logs.figures.elements.failure_labels import radius_of
+from logs.figures.elements.failures import Failures, route_samples
 from world.threats import Threats
 
 Floats = NDArray[np.float64]
@@ -93,16 +95,84 @@ def sphere_cuts(centre: Floats, radius: float, points: Floats) -> tuple[Floats, 
     return centre[2] - half, centre[2] + half
 
 
+@dataclass(frozen=True, slots=True)
+class SphereName:
+    """Where a sphere's name stands on the profile.
+
+    index: of its threat.  at: (km, m AMSL) on its outline, inside the picture.  prefer: the side of the name.
+    """
+
+    index: int
+    colour: str
+    at: tuple[float, float]
+    prefer: tuple[int, int]
+
+
+def outline_anchor(
+    kilometres: Floats, lower: Floats, upper: Floats, low: Floats, high: float
+) -> tuple[float, float, tuple[int, int]] | None:
+    """Where a name touches a sphere's cut inside a picture from low to high (m AMSL): its top, foot or left side.
+
+    kilometres, lower, upper: (s,), NaN where no sphere stands; low: (s,), the ground where that hides it.  Returns km,
+    m AMSL and the side of the name; None where nothing of the outline is in the picture.
+    """
+    over = np.flatnonzero(np.isfinite(upper))
+    top, foot = over[np.argmax(upper[over])], over[np.argmin(lower[over])]
+    if low[top] < upper[top] < high:
+        return float(kilometres[top]), float(upper[top]), (0, 1)
+    if low[foot] < lower[foot] < high:
+        return float(kilometres[foot]), float(lower[foot]), (0, -1)
+    for edge in (upper, lower):
+        # From the left: where the outline stays in the picture, its last point below the picture's upper rim.
+        seen = over[(edge[over] > low[over]) & (edge[over] < high - 0.04 * (high - low.min()))]
+        if seen.size:
+            first = seen[: np.flatnonzero(np.diff(seen, append=seen[-1] + 2) > 1)[0] + 1]
+            at = first[np.argmax(edge[first])]
+            return float(kilometres[at]), float(edge[at]), (1, 0)
+    return None
+
+
+def draw_entered_cuts(
+    axes: Any, threats: Threats, failed: Failures, distance: Floats, points: Floats, ground: Floats | None
+) -> dict[int, tuple[float, float]]:
+    """Draw the cut of each sphere whose rule fails, where it stands over the flight; returns where to label each.
+
+    distance: (s,) m along the route, points: (s, 3) m of the flight there, ground: (s,) m AMSL or None.
+    """
+    labels: dict[int, tuple[float, float]] = {}
+    low, high = _visible(axes, ground, len(points))
+    kilometres = distance / 1000.0
+    for place in failed.threats:
+        k = place.index or 0
+        lower, upper = sphere_cuts(threats.position[k], radius_of(threats, place), points)
+        if not np.isfinite(upper).any():
+            continue
+        axes.fill_between(kilometres, lower, upper, color=style.FAIL, alpha=0.16, linewidth=0, zorder=2.6)
+        for edge in (lower, upper):
+            axes.plot(kilometres, edge, color=style.FAIL, linewidth=1.6, zorder=4.6)
+        anchor = outline_anchor(kilometres, lower, upper, low, high)
+        if anchor is not None:
+            labels[k] = anchor[:2]
+    return labels
+
+
+def _visible(axes: Any, ground: Floats | None, count: int) -> tuple[Floats, float]:
+    """Lower end at each of so many samples, the ground where it stands in the picture, and upper end (m AMSL)."""
+    low, high = axes.get_ylim()
+    return np.full(count, low) if ground is None else np.fmax(ground, low), float(high)
+
+
 def draw_threat_cuts(
-    axes: Any, threats: Threats, distance: Floats, points: Floats
-) -> tuple[list[Any], list[tuple[str, float, float]]]:
+    axes: Any, threats: Threats, distance: Floats, points: Floats, ground: Floats | None
+) -> tuple[list[Any], list[SphereName]]:
     """Fill what missile and radar spheres take of the vertical plane through the path.
 
-    distance: (s,) m along the path, points: (s, 3) m.  Returns the legend's handles, and for each sphere that stands
-    over the path its name, the middle of its stretch (km) and its highest cut (m AMSL), once for each unit.
+    distance: (s,) m along the path, points: (s, 3) m, ground: (s,) m AMSL or None.  Returns the legend's handles, and
+    where to name the spheres that stand over the path, once for each unit.
     """
     handles: list[Any] = []
-    names: dict[str, tuple[str, float, float]] = {}
+    names: dict[int, SphereName] = {}
+    bottom, top = _visible(axes, ground, len(points))
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
     kilometres = distance / 1000.0
     for radii, colour, label in (
@@ -131,9 +201,9 @@ def draw_threat_cuts(
                 at = kilometres[edge if over[edge] else edge - 1]
                 which = edge if over[edge] else edge - 1
                 axes.plot([at, at], [lower[which], upper[which]], **look)
-            highest = int(np.nanargmax(upper))
-            middle = float(np.median(kilometres[over])) if not missile else float(kilometres[highest])
-            names[threats.names[k]] = (threats.names[k], middle, float(upper[highest]))
+            anchor = outline_anchor(kilometres, lower, upper, bottom, top)
+            if anchor is not None:
+                names[int(k)] = SphereName(int(k), style.INK if missile else colour, anchor[:2], anchor[2])
             if not handles or handles[-1].get_label() != label:
                 handles.append(
                     Patch(facecolor="#f7d2bd", edgecolor=colour, label=label)

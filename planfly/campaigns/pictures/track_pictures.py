@@ -47,7 +47,8 @@ def draw_clearance_fan(
         top.set_ylim(bottom=0.0)
         top.set_ylabel("above ground (m)")
         top.set_title("Clearance along the way, over all flights")
-        top.legend(loc="upper right", ncols=3)
+        # Over the panel, where it covers no band.
+        top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
         top.tick_params(labelbottom=False)
         low.fill_between(along, ground, np.nanmin(ground) - 10.0, color="#cfd8b0", linewidth=0.0)
         low.plot(along, ground, color=QUIET, linewidth=0.8)
@@ -87,10 +88,13 @@ def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
             axes.axvline(0.0, color="#cccccc", linewidth=0.6)
             axes.plot(*here[good & ~failed].T, ".", color=BLUE, markersize=2.2, alpha=0.5)
             axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
-            if good.sum() > 2:
-                axes.add_patch(covariance_ellipse(here[good]))
-            axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
             reach = _reach(here)
+            if good.sum() > 2:
+                ellipse = covariance_ellipse(here[good])
+                # Its extents are in metres as long as it stands on no axes.
+                reach = max(reach, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
+                axes.add_patch(ellipse)
+            axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
             axes.set_xlim(-reach, reach)
             axes.set_ylim(-reach, reach)
             axes.tick_params(labelsize=7)

@@ -12,8 +12,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
+from PIL import Image, ImageColor
 
+from logs.figures.elements.style import DRAWN
 from logs.figures.movie_frames import RATE, MovieFrames
 from logs.recording.reader import FlightLog
 from planfly.terminal.progress import progress
@@ -78,14 +79,38 @@ def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
     return files
 
 
+def _colours(frame: Image.Image) -> Image.Image:
+    """An image whose palette holds the colours that pictures draw in, as they are, and the frame's others, blended.
+
+    Of few colours chosen by area alone, thin lines and small marks would lose theirs to the ground.
+    """
+    kept = [ImageColor.getrgb(colour)[:3] for colour in DRAWN]
+    blended = frame.quantize(_CLEAR - len(kept), dither=Image.Dither.NONE).getpalette() or []
+    palette = [part for colour in kept for part in colour] + blended[: 3 * (_CLEAR - len(kept))]
+    holder = Image.new("P", (1, 1))
+    # What is left of 256 repeats the first.
+    holder.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
+    return holder
+
+
+def _in_colours(frame: Image.Image, palette: Image.Image) -> Image.Image:
+    """The frame in the palette's colours; none of its pixels has the number that lets the frame before show."""
+    image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
+    numbers = np.asarray(image)
+    same = Image.fromarray(np.where(numbers == _CLEAR, 0, numbers).astype(np.uint8))
+    same.putpalette(palette.getpalette() or [])
+    return same
+
+
 def _gif(film: MovieFrames) -> bytes:
-    """All frames in the colours of the first, so that nothing flickers; a frame holds only what has changed."""
+    """All frames in the same colours, so that nothing flickers; a frame holds only what has changed."""
     images = _shown(film)
-    # The aircraft's own colour is among them: the first frame shows it, too.
-    first = next(images).quantize(_CLEAR - 1, dither=Image.Dither.NONE)
+    start = next(images)
+    palette = _colours(start)
+    first = _in_colours(start, palette)
     before, rest = np.asarray(first), []
     for image in images:
-        now = np.asarray(image.quantize(palette=first, dither=Image.Dither.NONE))
+        now = np.asarray(_in_colours(image, palette))
         rest.append(Image.fromarray(np.where(now == before, _CLEAR, now).astype(np.uint8)))
         rest[-1].putpalette(first.getpalette() or [])
         rest[-1].info["transparency"] = _CLEAR

@@ -35,6 +35,20 @@ def test_envelope_panels_are_the_envelopes_numbers() -> None:
     assert np.interp(25.0, *labelled(turns, "30° of bank").get_xydata().T) == pytest.approx(110.4, abs=0.2)
 
 
+def test_no_legend_covers_a_line() -> None:
+    panels = draw_envelope(AIRCRAFT, envelope()).axes
+    panels[0].figure.canvas.draw()
+    for axes in panels:
+        box = axes.get_legend().get_window_extent()
+        assert axes.bbox.x0 < box.x0 < box.x1 < axes.bbox.x1
+        # The marks of speeds run from edge to edge; everything else is a line of numbers.
+        lines = [line for line in axes.lines if len(line.get_xdata()) > 2]
+        assert lines
+        for line in lines:
+            pixels = axes.transData.transform(line.get_xydata())
+            assert not any(box.contains(x, y) for x, y in pixels if np.isfinite([x, y]).all())
+
+
 def trim(airspeed: float, throttle: float) -> TrimRow:
     return TrimRow(
         Trim(airspeed, 500.0, 0.0, math.radians(4.0), 0.0, math.radians(-3.0), 0.0, 0.0, throttle), 700.0, 3600.0
@@ -76,7 +90,10 @@ def test_an_answer_is_in_degrees_with_the_time_of_the_step_shaded(
     change = np.column_stack([0.01 * time, time])
     figure = draw_steps(AIRCRAFT, [StepResponse(control, size, held, time, ("pitch", "airspeed"), change)])
     pitch, airspeed = figure.axes
-    assert (pitch.get_title(loc="left"), airspeed.get_title(loc="left")) == ("pitch (°)", "airspeed (m/s)")
+    assert (pitch.get_title(loc="left"), airspeed.get_title(loc="left")) == (
+        "change of pitch (°)",
+        "change of airspeed (m/s)",
+    )
     assert pitch.lines[-1].get_ydata()[-1] == pytest.approx(math.degrees(0.1))
     assert airspeed.lines[-1].get_ydata()[-1] == 10.0
     corners = np.asarray(pitch.patches[0].get_extents().get_points())

@@ -8,6 +8,7 @@ import pytest
 
 from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_both_over_distance
 from tests.logs.report.report_data import make_setup, make_track
+from world.wind import Wind
 
 FIRST = NamedFlight("first.mcap", make_setup(), make_track())
 
@@ -30,8 +31,23 @@ def test_the_map_has_both_tracks_and_no_line_that_joins_them() -> None:
         drawn = line(axes, flight.name).get_xydata()
         np.testing.assert_array_equal(drawn, flight.track.position[:, :2])
     assert "flown track" not in [one.get_label() for one in axes.lines]
-    assert axes.get_legend() is not None
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["first.mcap", "second.mcap"]
+    # The legend stands below the map, where it hides nothing, and has no line that was not drawn.
+    assert axes.get_legend() is None
+    (legend,) = axes.figure.legends
+    shown = [text.get_text() for text in legend.get_texts()]
+    assert {"first.mcap", "second.mcap"} <= set(shown)
+    assert "flown track" not in shown
+
+
+def test_both_winds_are_told_where_they_differ() -> None:
+    def notes(second: NamedFlight) -> list[str]:
+        return [text.get_text() for text in draw_both_on_map((FIRST, second)).texts if "wind" in text.get_text()]
+
+    assert len(notes(shorter())) == 1
+    other = replace(FIRST.setup, scenario=replace(FIRST.setup.scenario, wind=Wind(7.0, 1.0)))
+    first, second = notes(replace(FIRST, name="second.mcap", setup=other))
+    assert first.startswith("first.mcap:")
+    assert second == "second.mcap:\nwind 7.0 m/s\nfrom 057°"
 
 
 def test_panels_run_over_the_distance_flown_and_end_with_each_flight() -> None:
@@ -50,8 +66,18 @@ def test_panels_run_over_the_distance_flown_and_end_with_each_flight() -> None:
     assert np.nanmax(line(airspeed, "second.mcap").get_ydata()) == pytest.approx(23.0)
 
 
-def test_without_terrain_the_height_above_it_is_empty() -> None:
+def test_without_terrain_the_height_above_it_is_left_out() -> None:
     bare = make_setup(terrain={"kind": "none"}, threats=[])
     flight = replace(FIRST, setup=bare)
-    above = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes[1]
-    assert not np.isfinite(line(above, "second.mcap").get_ydata()).any()
+    panels = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes
+    titles = [axes.get_ylabel().split("\n")[0] for axes in panels]
+    assert titles == ["height", "airspeed", "bank, right +", "cross-track,", "throttle"]
+
+
+def test_a_small_cross_track_fills_its_panel() -> None:
+    """7 cm to either side are seen: the panel ends at 7 cm and its 8 % of air, not at a metre."""
+    swing = np.linspace(-0.07, 0.07, len(FIRST.track)).astype(np.float32)
+    flight = replace(FIRST, track=replace(FIRST.track, cross_track=swing))
+    panels = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes
+    (cross,) = [axes for axes in panels if axes.get_ylabel().startswith("cross-track")]
+    assert cross.get_ylim() == pytest.approx((-0.07 - 0.0112, 0.07 + 0.0112), abs=1e-6)

@@ -21,7 +21,9 @@ def test_limits_are_the_envelopes_and_the_bank_limit_the_plans() -> None:
     # report_data's aircraft climbs 0.2 rad and descends 0.1 rad at every speed and height; the route is at 300..380 m.
     assert labelled(slopes, "steepest climb at 300 m").get_ydata() == pytest.approx(math.degrees(0.2))
     assert labelled(slopes, "steepest descent at 380 m").get_ydata() == pytest.approx(-math.degrees(0.1))
-    assert labelled(bank, "bank limit of the plan").get_ydata()[0] == pytest.approx(30.0)
+    assert labelled(bank, "limit of planned turns;\ncorrections may bank beyond it").get_ydata()[0] == pytest.approx(
+        30.0
+    )
     assert labelled(bank, "the aircraft's").get_ydata()[0] == pytest.approx(math.degrees(0.7))
     legs = labelled(slopes, "legs as planned (over the ground)")
     np.testing.assert_allclose(legs.get_xdata(), 25.0)

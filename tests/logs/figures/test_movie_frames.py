@@ -6,8 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logs.figures.movie_frames import MovieFrames
+from logs.figures.movie_frames import MovieFrames, signed_number
 from logs.recording.reader import FlightLog, read_log
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [(-0.4, 0, "0"), (0.4, 0, "0"), (-0.6, 0, "−1"), (-0.04, 1, "0.0"), (-0.06, 1, "−0.1"), (float("nan"), 0, "?")],
+)
+def test_nothing_is_written_as_less_than_nought(value: float, digits: int, text: str) -> None:
+    assert signed_number(value, digits) == text
 
 
 @pytest.fixture(scope="module")

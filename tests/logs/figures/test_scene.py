@@ -89,3 +89,37 @@ def test_zones_are_bodies_from_the_ground_up() -> None:
     stretch = 1.0 if "true to scale" in title else float(title.split("×")[1])
     np.testing.assert_allclose(upper - lower, 460.0 * stretch * math.cos(DOWN))
     assert "zone to keep out of" in legend(figure)
+
+
+def ground_corners(figure: Any) -> np.ndarray:
+    """The level ground's corners where no terrain was given, (4, 2) in the picture's metres."""
+    (ground,) = [item for item in figure.axes[0].collections if item.get_zorder() == 1]
+    return np.asarray(ground.get_paths()[0].vertices[:4])
+
+
+def test_a_long_and_narrow_scene_is_no_strip() -> None:
+    """A route of 4 km in an area 300 m wide: ground 30 % as wide as it is long, seen half from its end."""
+    strip = {"east_m": [-2100, 2100], "north_m": [-150, 150], "ceiling_amsl_m": 500}
+    ends = {"start": {"east_m": -2000, "north_m": 0, "amsl_m": 300}}
+    ends["destination"] = {"east_m": 2000, "north_m": 0, "amsl_m": 300}
+    setup = make_setup(area=strip, terrain={"kind": "none"}, threats=[], **ends)
+    straight = np.array([[-2000.0, 0.0, 300.0], [0.0, 0.0, 300.0], [2000.0, 0.0, 300.0]])
+    straight = np.vstack([straight, [[2050.0, 0.0, 300.0]]])
+    setup = replace(setup, route=replace(setup.route, waypoints=straight))
+    figure = draw_scene(setup, None, None)
+    west_south, east_south, east_north, _ = ground_corners(figure)
+    # Seen from 45 degrees round: each metre east is cos 45 degrees to the right, each metre north as much to the right.
+    turned = math.sqrt(0.5)
+    assert east_south[0] - west_south[0] == pytest.approx(4200.0 * turned)
+    assert east_north[0] - east_south[0] == pytest.approx(0.3 * 4200.0 * turned)
+    wide, tall = figure.axes[0].bbox.width, figure.axes[0].bbox.height
+    assert tall > 0.5 * wide
+
+
+def test_entered_missiles_are_outlined_and_named() -> None:
+    def outlined(*bad: tuple[str, Place]) -> int:
+        figure = draw_scene(make_setup(), make_track(), make_verdict(*bad))
+        return sum(patch.get_linewidth() == 2.2 for patch in figure.axes[0].patches)
+
+    assert outlined(("slope", Place("leg", 1))) == 0
+    assert outlined(("threat", Place("missile", 0, name="M one"))) == 1

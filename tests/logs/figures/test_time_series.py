@@ -27,7 +27,7 @@ def test_bank_and_height_above_ground_are_those_of_track_and_terrain() -> None:
     bank = panel(figure, "bank")
     # Half a radian to the left at 41 s; the limit is 30 degrees either way.
     assert np.interp(41.0, *line(bank, "flown").get_xydata().T) == pytest.approx(-math.degrees(0.5))
-    assert line(bank, "limit").get_ydata()[0] == pytest.approx(30.0)
+    assert line(bank, "limit of planned turns;\ncorrections may pass it").get_ydata()[0] == pytest.approx(30.0)
     above = line(panel(figure, "height above"), "from track and terrain")
     # The ground is level at 200 m; the route starts at 300 m and ends at 360 m.
     assert above.get_ydata()[[0, -1]] == pytest.approx([100.0, 160.0])
@@ -69,3 +69,14 @@ def test_power_and_energy_as_height_are_the_tracks() -> None:
     # 25^2 / (2 9.80665) = 31.87 m above the height itself, at the start 300 m.
     assert whole[0] == pytest.approx(300.0 + 31.866, abs=0.01)
     assert line(height, "height alone").get_ydata()[0] == 300.0
+
+
+def test_an_aircraft_without_a_battery_shows_the_heat_of_its_fuel_in_kilowatt_hours() -> None:
+    envelope = replace(SETUP.envelope, power_level=np.ones_like(SETUP.envelope.climb), volts=0.0)
+    setup = replace(SETUP, limits=replace(SETUP.limits, envelope=envelope))
+    figure = draw_energy(setup, TRACK)
+    assert [axes.get_ylabel().replace("\n", " ") for axes in figure.axes] == [
+        "heat of fuel used (kWh)", "power (kW)", "energy as height (m)",
+    ]  # fmt: skip
+    assert line(figure.axes[0], "used").get_ydata()[-1] == pytest.approx(float(TRACK.energy[-1]) / 1000.0)
+    assert "in full tanks" in figure.texts[0].get_text()

@@ -51,6 +51,37 @@ def test_bars_dots_and_dashes_stand_at_the_findings_numbers() -> None:
     assert "fails" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+def test_the_highest_bar_dot_and_ring_are_whole() -> None:
+    """A clearance 30 times the least, a turn that fails at ten times its limit, and a slope beyond its own."""
+    found = [
+        Finding("clearance", Place("leg", k), high, high, 60.0, "scenario", 0.1, 1.0, "m", "fit", True, "")
+        for k, high in enumerate((70.0, 1800.0))
+    ]
+    found += [
+        Finding("turn", Place("waypoint", 1), 134.0, 134.0, 15.0, "aircraft", 0.1, -1.0, "deg", "fit", False, ""),
+        Finding("slope", Place("leg", 0), -20.0, -21.0, -8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, ""),
+    ]
+    figure = draw_turns("a flight", Verdict(tuple(found), False, True, ("not flyable",), "flown"))
+    figure.canvas.draw()
+    turn, slopes, clearance = figure.axes
+    for axes, value in ((turn, 134.0), (slopes, -21.0)):
+        _, at = axes.transData.transform((0.0, value))
+        # The ring's radius: half its size and its edge, in points of 150/72 pixels.
+        radius = (0.5 * 12.5 + 1.0) * 150.0 / 72.0
+        assert axes.bbox.y0 <= at - radius
+        assert at + radius <= axes.bbox.y1
+    assert clearance.get_ylim()[1] > 1800.0
+    assert clearance.get_ylim()[0] == 0.0
+
+
+def test_limits_far_above_all_turns_are_named_instead() -> None:
+    far = Finding("turn", Place("waypoint", 1), 10.0, 10.0, 152.0, "aircraft", 0.1, 1.0, "deg", "fit", True, "")
+    near = Finding("turn", Place("waypoint", 2), 10.0, 12.0, 45.0, "aircraft", 0.1, 1.0, "deg", "fit", True, "")
+    (axes,) = draw_turns("a flight", Verdict((far, near), True, True, ("flyable",), "flown")).axes
+    assert 45.0 < axes.get_ylim()[1] < 60.0
+    assert [text.get_text() for text in axes.texts] == ["other limits from 152°"]
+
+
 def test_nothing_is_ringed_where_nothing_fails() -> None:
     figure = draw_turns("a flight", Verdict(FINDINGS[:4], True, True, ("flyable",), "flown"))
     assert "fails" not in [text.get_text() for text in figure.legends[0].get_texts()]

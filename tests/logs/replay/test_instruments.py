@@ -48,6 +48,12 @@ def test_the_numbers_are_those_of_the_row(log_file: Path, track: Track) -> None:
     assert "\n".join(show.frame(1e6)) == "\n".join(show.frame(float(track.time[-1])))
 
 
+def test_nought_is_not_less_than_nought(tmp_path: Path, setup: FlightSetup, track: Track) -> None:
+    level = np.full_like(track.attitude, np.radians(-0.02))
+    log = read_log(record(tmp_path / "a.mcap", setup, replace(track, attitude=level)))
+    assert "+0.0°, +0.0°" in "\n".join(make_instruments(log).frame(1.0))
+
+
 @pytest.mark.parametrize(("roll", "left_is_sky"), [(0.6, False), (-0.6, True)])
 def test_the_horizon_leans_against_the_bank(
     tmp_path: Path, setup: FlightSetup, track: Track, roll: float, left_is_sky: bool

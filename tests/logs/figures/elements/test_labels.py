@@ -35,6 +35,31 @@ def test_labels_of_one_place_do_not_cover_each_other(axes: Any) -> None:
         assert np.hypot(*(np.array([box.x0 + box.width / 2, box.y0 + box.height / 2]) - point)) < 8.0 * box.height
 
 
+def test_framed_labels_of_a_crowd_find_room_further_off_and_point_to_their_places(axes: Any) -> None:
+    placer = LabelPlacer(axes)
+    frame = {"boxstyle": "round,pad=0.2", "facecolor": "white", "edgecolor": style.FAIL}
+    at = [(48.0 + k % 4, 48.0 + k // 4) for k in range(14)]
+    for k, (x, y) in enumerate(at):
+        placer.place(f"waypoint {k} (item {k + 2}): turn, waypoint", x, y, gap=16.0, bbox=frame)
+    axes.figure.canvas.draw()
+    written = [text.get_bbox_patch().get_window_extent() for text in axes.texts]
+    assert len(written) == 14
+    assert not any(box.overlaps(other) for k, box in enumerate(written) for other in written[k + 1 :])
+    leaders = [line.get_xydata()[-1] for line in axes.lines if line.get_gid() == "leader"]
+    np.testing.assert_allclose(leaders, at)
+
+
+def test_a_label_that_moved_away_points_to_its_place(axes: Any) -> None:
+    placer = LabelPlacer(axes)
+    placer.place("near", 20.0, 20.0)
+    assert not axes.lines
+    point = axes.transData.transform((50.0, 50.0))
+    placer.boxes.append((point[0] - 60.0, point[1] - 20.0, point[0] + 60.0, point[1] + 20.0))
+    placer.place("12", 50.0, 50.0)
+    (leader,) = axes.lines
+    np.testing.assert_allclose(leader.get_xydata()[-1], (50.0, 50.0))
+
+
 def test_a_label_keeps_off_a_line_that_it_is_told_of(axes: Any) -> None:
     # The line runs up and right, where a label would stand first.
     along = np.linspace(50.0, 90.0, 50)

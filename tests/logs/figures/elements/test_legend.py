@@ -5,8 +5,9 @@ import pytest
 
 from logs.figures.elements import style
 from logs.figures.elements.failures import Failures
-from logs.figures.elements.legend import draw_compass, draw_legend, failing_handles
+from logs.figures.elements.legend import NamedWind, draw_compass, draw_legend, failing_handles
 from tests.logs.figures.figure_data import make_scenario
+from world.wind import Wind
 
 
 def test_failing_marks_are_explained_where_there_are_any() -> None:
@@ -20,10 +21,14 @@ def test_failing_marks_are_explained_where_there_are_any() -> None:
     assert labels((1,), (3,)) == ["leg that fails a rule", "waypoint that fails a rule"]
 
 
+def wind(speed: float, from_deg: float, turbulence: str = "none") -> Wind:
+    return make_scenario(wind={"speed_mps": speed, "from_deg": from_deg, "turbulence": turbulence}).wind
+
+
 @pytest.mark.parametrize(("from_deg", "to"), [(270.0, (1.0, 0.0)), (0.0, (0.0, -1.0)), (45.0, (-1.0, -1.0))])
 def test_the_arrow_points_to_where_the_wind_blows(from_deg: float, to: tuple[float, float]) -> None:
     figure = style.new_figure(6.0)
-    draw_compass(figure, make_scenario(wind={"speed_mps": 5, "from_deg": from_deg, "turbulence": "light"}), 8.7)
+    draw_compass(figure, [NamedWind(wind(5.0, from_deg, "light"))], 8.7)
     (arrow,) = [text for text in figure.axes[0].texts if hasattr(text, "arrow_patch")]
     head, tail = np.array(arrow.xy), np.array(arrow.xyann)
     assert (head - tail) / np.linalg.norm(head - tail) == pytest.approx(np.array(to) / np.hypot(*to), abs=1e-9)
@@ -33,9 +38,30 @@ def test_the_arrow_points_to_where_the_wind_blows(from_deg: float, to: tuple[flo
 
 def test_calm_air_has_no_arrow() -> None:
     figure = style.new_figure(6.0)
-    draw_compass(figure, make_scenario(wind={"speed_mps": 0}), 8.7)
+    draw_compass(figure, [NamedWind(wind(0.0, 0.0))], 8.7)
     assert not any(hasattr(text, "arrow_patch") for text in figure.axes[0].texts)
     assert [text.get_text() for text in figure.texts] == ["no mean wind"]
+
+
+def test_two_winds_are_both_drawn_and_told_apart() -> None:
+    figure = style.new_figure(6.0)
+    winds = [NamedWind(wind(5.0, 270.0), "a.mcap", style.FLOWN), NamedWind(wind(8.0, 0.0), "b.mcap", style.MISSILE)]
+    draw_compass(figure, winds, 8.7)
+    arrows = [text for text in figure.axes[0].texts if hasattr(text, "arrow_patch")]
+    assert [np.sign(np.round(np.array(arrow.xy), 9)).tolist() for arrow in arrows] == [[1.0, 0.0], [0.0, -1.0]]
+    notes = [(text.get_text(), text.get_color()) for text in figure.texts]
+    assert notes == [
+        ("a.mcap:\nwind 5.0 m/s\nfrom 270°", style.FLOWN), ("b.mcap:\nwind 8.0 m/s\nfrom 000°", style.MISSILE),
+    ]  # fmt: skip
+    figure.canvas.draw()
+    upper, lower = (text.get_window_extent() for text in figure.texts)
+    assert upper.y0 > lower.y1 > lower.y0 > 0.0
+
+
+def test_a_wind_from_just_west_of_north_is_no_360() -> None:
+    figure = style.new_figure(6.0)
+    draw_compass(figure, [NamedWind(wind(5.0, 359.7))], 8.7)
+    assert figure.texts[0].get_text().endswith("from 000°")
 
 
 def test_the_legend_stands_where_it_is_put() -> None:

@@ -1,10 +1,12 @@
 """Panels show their series, limits and legs where the data has them."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from logs.figures.elements import style
 from logs.figures.elements.panels import Axis, Panel, Series, doubles, draw_panels, time_axis
 from tests.logs.figures.figure_data import make_track
 
@@ -56,6 +58,38 @@ def test_legs_are_parted_where_they_change_and_numbered_once() -> None:
     assert [text.get_text() for text in upper.texts] == ["leg 0", "1", "2"]
     assert [text.get_text() for text in lower.texts] == []
     assert lower.get_xlabel() == "time since the start (s)"
+
+
+def legend_texts(holder: Any) -> list[str]:
+    return [text.get_text() for text in holder.get_texts()]
+
+
+def test_what_all_panels_share_is_told_once() -> None:
+    def pair(scale: float) -> list[Series]:
+        return [Series("first", scale * ALONG), Series("second", ALONG, color=style.MISSILE)]
+
+    panels = [Panel(str(k), pair(k)) for k in range(1, 7)]
+    figure = draw_panels("title", panels, Axis("", ALONG), None)
+    assert [legend_texts(legend) for legend in figure.legends] == [["first", "second"]]
+    assert [axes.get_legend() for axes in figure.axes] == [None] * 6
+    # The legend stands above the topmost panel and inside the picture.
+    figure.canvas.draw()
+    box = figure.legends[0].get_window_extent()
+    assert figure.axes[0].bbox.y1 < box.y0 < box.y1 < figure.bbox.y1
+
+
+@pytest.mark.parametrize("other", [Series("third", ALONG), Series("first", ALONG, color=style.MISSILE)])
+def test_a_look_with_two_meanings_and_a_meaning_with_two_looks_are_told_apart(other: Series) -> None:
+    panels = [Panel("a", [Series("first", ALONG)]), Panel("b", [Series("first", ALONG)]), Panel("c", [other])]
+    figure = draw_panels("title", panels, Axis("", ALONG), None)
+    assert figure.legends == []
+    assert [legend_texts(axes.get_legend()) for axes in figure.axes] == [["first"], ["first"], [other.label]]
+
+
+def test_a_panel_without_values_is_left_out() -> None:
+    unknown = Panel("unknown", [Series("x", np.full(ALONG.size, np.nan))], limits=[("limit", 1.0)])
+    axes = draw_panels("title", [unknown, Panel("known", [Series("x", ALONG)])], Axis("", ALONG), None).axes
+    assert [one.get_ylabel() for one in axes] == ["known"]
 
 
 def test_unknown_values_leave_a_panel_that_can_be_drawn() -> None:

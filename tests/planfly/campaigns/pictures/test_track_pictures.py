@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 from planfly.campaigns.pictures.track_pictures import covariance_ellipse, draw_clearance_fan, draw_crossings
 
@@ -17,6 +18,18 @@ def test_the_fan_shows_the_median_the_failures_and_what_is_required() -> None:
     assert lines["required, 60 m"].tolist() == [60.0, 60.0]
     np.testing.assert_array_equal(lines["not flyable"], clearance[2])
     assert figure.axes[1].get_xlim() == (0.0, 2.0)
+
+
+def test_the_fans_legend_covers_no_band() -> None:
+    figure = draw_clearance_fan(np.full((9, 30), 80.0), np.zeros(9, dtype=bool), np.full(30, 10.0), 2000.0, 60.0)
+    figure.canvas.draw()
+    top = figure.axes[0]
+    box = top.get_legend().get_window_extent()
+    assert box.y0 >= top.bbox.y1
+    assert box.y1 <= figure.bbox.y1
+    # The title stands left of it.
+    (title,) = [text for text in top.findobj(Text) if text.get_text().startswith("Clearance along")]
+    assert title.get_window_extent().x1 < box.x0
 
 
 def test_the_ellipse_holds_95_percent_of_normal_points() -> None:
@@ -38,3 +51,15 @@ def test_a_panel_a_waypoint() -> None:
     assert [axes.get_title(loc="left") for axes in shown] == [f"waypoint {k}" for k in range(7)]
     dots, crosses = shown[0].lines[2], shown[0].lines[3]
     assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (19, 1)
+
+
+def test_ellipses_are_whole() -> None:
+    """Few points of a wide spread: the ellipse reaches further than they do."""
+    crossings = np.random.default_rng(3).normal(size=(8, 1, 2)) * [3.0, 9.0]
+    (axes,) = [axes for axes in draw_crossings(crossings, np.zeros(8, dtype=bool)).figure.axes if axes.axison]
+    points = crossings[:, 0]
+    # Half the height of an ellipse of the covariance C and the quantile q of chi squared: sqrt(q C22); 5.991 for 95 %.
+    high = points[:, 1].mean() + np.sqrt(5.991 * np.cov(points.T)[1, 1])
+    low = points[:, 1].mean() - np.sqrt(5.991 * np.cov(points.T)[1, 1])
+    assert max(high, -low) > 1.1 * np.abs(points).max()
+    assert axes.get_ylim()[0] < low < high < axes.get_ylim()[1]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageColor
 
 from logs.figures.movie_frames import RATE, MovieFrames
 from logs.recording.reader import FlightLog, read_log
@@ -40,6 +40,11 @@ def test_a_gif_holds_the_frames(
         last = np.asarray(film.convert("RGB")).astype(int)
     # 255 colours instead of all: near everywhere, and the trail is where it was.
     assert np.abs(last - wanted[-1]).mean() < 4.0
+    # What is drawn keeps its colour to the bit: aircraft, trail, path, start and destination, radars.
+    for colour in ("#B0408A", "#000000", "#56B4E9", "#F0E442"):
+        there = (wanted[-1] == ImageColor.getrgb(colour)).all(axis=2)
+        assert there.sum() > 20, colour
+        np.testing.assert_array_equal(last[there], wanted[-1][there])
     first = target.read_bytes()
     assert main(command) == 2
     assert "exists; --overwrite replaces it" in capsys.readouterr().err
