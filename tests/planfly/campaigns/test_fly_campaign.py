@@ -87,6 +87,7 @@ def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBa
     assert table(folder) == want
 
 
+@pytest.mark.skipif(not SOAK, reason="a cluster for what its book is asked above: in make soak")
 def test_prove_keeps_the_flights_that_decide_and_no_more(base: CampaignBase, tmp_path: Path) -> None:
     goal = Goal(0.9, True, 500)
     found = flown(base, goal, tmp_path / "p", Workers(2), all_fly)

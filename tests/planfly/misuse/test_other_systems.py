@@ -11,6 +11,7 @@ import pytest
 
 import planfly
 from planfly.paper.seeded_plans import usable_cores
+from tests.soak import SOAK
 
 ROOT = Path(planfly.__file__).parents[1]
 PACKAGES = ("planfly", "logs", "flight", "planner", "aircraft", "world")
@@ -77,6 +78,7 @@ def elsewhere(folder: Path, *arguments: str) -> "subprocess.CompletedProcess[str
     )
 
 
+@pytest.mark.skipif(not SOAK, reason="a whole run beside those of other tests: in make soak")
 def test_a_plan_is_made_and_flown_and_judged_there(tmp_path: Path) -> None:
     done = elsewhere(tmp_path, "run", "tight", "--seed", "1", "--out", "out")
     assert (done.returncode, "Traceback" in done.stderr) == (4, False), done.stderr
