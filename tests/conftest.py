@@ -9,28 +9,38 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
-from tests.soak import SOAK, note
+from tests.soak import CORE_SECONDS, SECONDS, SOAK, begin_file, end_file, note, passed_files
 
 # The first example of a test may compile kernels, or share its core with another test: neither is the kernel's fault.
 settings.register_profile("planfly", deadline=None)
 settings.load_profile("planfly")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of files that have more to do in a soak."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark the tests of files that have more to do in a soak, and leave out those that one before has passed."""
     for item in items:
         if {"SOAK", "scaled"} & vars(getattr(item, "module", object)).keys():
             item.add_marker("soak")
+    if passed := passed_files():
+        config.hook.pytest_deselected(items=[item for item in items if _file(item.nodeid) in passed])
+        items[:] = [item for item in items if _file(item.nodeid) not in passed]
+
+
+def _file(nodeid: str) -> str:
+    return nodeid.split("::")[0]
 
 
 @pytest.fixture(autouse=True, scope="module")
 def _what_a_file_takes(request: pytest.FixtureRequest) -> Iterator[None]:
     """Note the seconds that a file of tests takes, its processes included, in a soak."""
-    wall, before = time.monotonic(), sum(os.times()[:4])
-    yield
+    wall, before, failed = time.monotonic(), sum(os.times()[:4]), request.session.testsfailed
     file = str(request.node.nodeid)
-    note("seconds by the clock", **{file: round(time.monotonic() - wall, 1)})
-    note("seconds of a core", **{file: round(sum(os.times()[:4]) - before, 1)})
+    begin_file(file)
+    yield
+    note(SECONDS, **{file: round(time.monotonic() - wall, 1)})
+    note(CORE_SECONDS, **{file: round(sum(os.times()[:4]) - before, 1)})
+    if request.session.testsfailed == failed:
+        end_file(file)
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:

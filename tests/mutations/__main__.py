@@ -1,8 +1,9 @@
 """``python -m tests.mutations``: change the verdict's sources and the physics a little at a time, and see tests fail.
 
 Each mutant is tried in a copy of the sources with the tests that cover it, two at a time; the list and its order are
-the same each time.  Printed: killed and alive by room; ``runs/mutations.json`` holds every trial.  Exit code 1 where
-more than `MOST_ALIVE` of them survive, or any change of a limit.
+the same each time.  Printed: killed and alive by room; ``runs/mutations.json`` holds every trial as it ends, so that
+``--go-on`` goes on with a run of the same sources that was stopped.  Exit code 1 where more than `MOST_ALIVE` of them
+survive, or any change of a limit.
 """
 
 import argparse
@@ -21,6 +22,8 @@ from tests.mutations.choice import ROOMS, chosen_mutants
 from tests.mutations.covering import covering_tests, kernels_on, limits_at
 from tests.mutations.mutant import ROOT, Mutant
 from tests.mutations.workplace import Trial, Workplace
+from tests.soak import sources
+from world.atomic_files import write_whole
 
 TARGET = Path("runs") / "mutations.json"
 # Share of the mutants that may survive: some change nothing that anyone could see.
@@ -36,6 +39,7 @@ def main() -> int:
     parser.add_argument("--at-once", type=int, default=2, help="how many are tried at the same time (2)")
     parser.add_argument("--limit", type=float, default=600.0, help="seconds after which a mutant counts as noticed")
     parser.add_argument("--keep", type=Path, help="folder of the copies, kept for the next run of the same sources")
+    parser.add_argument("--go-on", action="store_true", help=f"try only what {TARGET} does not hold for these sources")
     parser.add_argument("--list", action="store_true", help="list the mutants and try none")
     args = parser.parse_args()
     chosen = chosen_mutants(None if args.match else args.count or None, args.room or ROOMS)
@@ -44,17 +48,30 @@ def main() -> int:
         for mutant in mutants:
             print(_text(mutant))
         return 0
+    known = _known(mutants) if args.go_on else []
+    left = [mutant for mutant in mutants if mutant not in {trial.mutant for trial in known}]
     folder = args.keep or Path(tempfile.mkdtemp(prefix="planfly-mutations-"))
     try:
-        trials = _tried(mutants, folder, args.at_once, args.limit)
+        trials = _tried(left, known, folder, args.at_once, args.limit) if left else known
     finally:
         if args.keep is None:
             shutil.rmtree(folder, ignore_errors=True)
     return _report(trials)
 
 
-def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> list[Trial]:
-    """Try all of them, each in the workplace that is free next."""
+def _known(mutants: list[Mutant]) -> list[Trial]:
+    """Of these mutants, what a run of the same sources found before it was stopped."""
+    if not TARGET.is_file():
+        return []
+    kept = json.loads(TARGET.read_text(encoding="utf-8"))
+    if kept["sources"] != sources():
+        return []
+    trials = [Trial(Mutant(**one["mutant"]), one["status"], one["by"], one["seconds"]) for one in kept["trials"]]
+    return [trial for trial in trials if trial.mutant in mutants]
+
+
+def _tried(mutants: list[Mutant], known: list[Trial], folder: Path, at_once: int, limit: float) -> list[Trial]:
+    """Try all of them, each in the workplace that is free next; what is known comes first."""
     places = [Workplace(folder / str(k), limit) for k in range(at_once)]
     # Looked up before the first trial, so that the repository may change meanwhile.
     asked = {mutant: (covering_tests(mutant), kernels_on(mutant)) for mutant in mutants}
@@ -73,11 +90,12 @@ def _tried(mutants: list[Mutant], folder: Path, at_once: int, limit: float) -> l
             if failure:
                 raise SystemExit(f"the tests fail without a mutant, so none can be tried: {failure}")
             free.put(place)
-        trials = []
-        for number, trial in enumerate(pool.map(try_out, mutants), 1):
-            print(f"{number:4d} of {len(mutants)}  {trial.status:8} {trial.seconds:5.0f} s  {_text(trial.mutant)}")
+        trials, whole = list(known), len(known) + len(mutants)
+        for number, trial in enumerate(pool.map(try_out, mutants), len(known) + 1):
+            print(f"{number:4d} of {whole}  {trial.status:8} {trial.seconds:5.0f} s  {_text(trial.mutant)}")
             sys.stdout.flush()
             trials.append(trial)
+            _keep(trials)
     for place in places:
         place.close()
     return trials
@@ -92,11 +110,16 @@ def _report(trials: list[Trial]) -> int:
         print(f"{room:10} {rooms[room, False]:4d} killed {rooms[room, True]:4d} alive")
     for trial in alive:
         print(f"alive: {_text(trial.mutant)}")
-    TARGET.parent.mkdir(exist_ok=True)
-    TARGET.write_text(json.dumps([_record(trial) for trial in trials], indent=1) + "\n", encoding="utf-8")
+    _keep(trials)
     print(f"written to {TARGET}")
     limits = any(trial.mutant.room == "limits" for trial in alive)
     return int(limits or len(alive) > MOST_ALIVE * len(trials))
+
+
+def _keep(trials: list[Trial]) -> None:
+    TARGET.parent.mkdir(exist_ok=True)
+    kept = {"sources": sources(), "trials": [_record(trial) for trial in trials]}
+    write_whole(TARGET, json.dumps(kept, indent=1) + "\n")
 
 
 def _record(trial: Trial) -> dict[str, object]:
