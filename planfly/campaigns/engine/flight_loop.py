@@ -1,11 +1,13 @@
 """Flights sent to workers and taken back, as many at a time as there are workers."""
 
+import contextlib
 import itertools
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
+from planfly.campaigns.engine.cluster import Workers, connected
 from planfly.campaigns.engine.fingerprint import fingerprint
 from planfly.campaigns.engine.flight_tasks import CampaignPlugin, FlyOne, fly_task
 from planfly.campaigns.flights.campaign_base import CampaignBase
@@ -96,3 +98,17 @@ class Pilots:
                 raise error
             raise RuntimeError(f"flight {order.index}: {type(error).__name__}: {error}") from error
         raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
+
+
+@contextlib.contextmanager
+def hired_pilots(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[Pilots]:
+    """Pilots of a campaign on these workers; workers of our own end with it, others forget it.
+
+    Raises SchedulerError as `planfly.campaigns.engine.cluster.connected`.
+    """
+    with connected(workers) as client:
+        pilots = Pilots(client, base, fly)
+        try:
+            yield pilots
+        finally:
+            pilots.close()
