@@ -14,6 +14,7 @@ from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.flights.varied_flight import GivenWind
 from world.errors import PlanflyError
+from world.interruption import Interrupted
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +82,13 @@ class Pilots:
                 send()
                 # After the next was sent: of a kind without any task dask makes a new record with the next one.
                 future.release()
+        except Interrupted:
+            # No time to wait for an answer: these flights end with the client.
+            flying.clear()
+            raise
         finally:
-            self._client.cancel(list(done.futures), force=True)
+            if flying:
+                self._client.cancel(list(done.futures), force=True)
 
     def _result(self, future: Any, order: Order) -> FlightRow:
         from distributed import KilledWorker
@@ -104,11 +110,16 @@ class Pilots:
 def hired_pilots(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[Pilots]:
     """Pilots of a campaign on these workers; workers of our own end with it, others forget it.
 
+    An interruption waits for no answer of workers of our own: they end with this process.
     Raises SchedulerError as `planfly.campaigns.engine.cluster.connected`.
     """
     with connected(workers) as client:
-        pilots = Pilots(client, base, fly)
+        pilots, live_on = Pilots(client, base, fly), True
         try:
             yield pilots
+        except Interrupted:
+            live_on = workers.scheduler is not None
+            raise
         finally:
-            pilots.close()
+            if live_on:
+                pilots.close()

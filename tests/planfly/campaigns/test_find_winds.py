@@ -30,7 +30,7 @@ from tests.planfly.campaigns.made_campaigns import (
     table,
 )
 from tests.planfly.campaigns.slow_client import winds_goal
-from tests.soak import SOAK, note
+from tests.soak import SOAK, note, scaled
 
 pytestmark = pytest.mark.filterwarnings("default")
 GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
@@ -102,6 +102,11 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
     assert len(found.flights) <= 400
     assert found.from_deg(3) == 270.0
     assert found.lost == ()
+    # The draws of each direction are those of any other.
+    rows = table(tmp_path / WINDS_DATABASE)
+    for direction in range(4):
+        draws = [row[3] for row in rows if row[1] == direction]
+        assert draws == list(range(len(draws)))
 
 
 @pytest.mark.usefixtures("here")
@@ -197,7 +202,7 @@ def test_any_workers_find_the_same_stopped_or_not(wind_base: CampaignBase, tmp_p
 
 @pytest.mark.skipif(not SOAK, reason="clients are killed at a small count in a campaign's tests: in make soak")
 def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
-    kills, count, folder = 20, 400, tmp_path / "killed"
+    kills, count, folder = scaled(20, 1), scaled(400, 40), tmp_path / "killed"
     folder.mkdir()
     moments, written = random.Random(4), set[int]()
     for _ in range(kills):
@@ -214,7 +219,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not SOAK, reason="workers are killed at a small count in a campaign's tests: in make soak")
 def test_a_killed_worker_loses_no_flight(wind_base: CampaignBase, tmp_path: Path) -> None:
-    kills, goal, begun = 20, winds_goal(1200), threading.Event()
+    kills, goal, begun = scaled(20, 2), winds_goal(scaled(1200, 150)), threading.Event()
     (tmp_path / "killed").mkdir()
     with (
         open_winds_store(wind_base, goal, tmp_path / "killed", resume=False) as store,
@@ -224,7 +229,7 @@ def test_a_killed_worker_loses_no_flight(wind_base: CampaignBase, tmp_path: Path
     assert len(killed) == kills
     want = searched(wind_base, tmp_path / "one", goal)
     assert same((found, tmp_path / "killed"), (want, tmp_path / "one"))
-    note("winds: kill -9 of its workers", kills=kills, flights=1200, lost=0)
+    note("winds: kill -9 of its workers", kills=kills, flights=goal.flights, lost=0)
 
 
 def test_the_wind_that_is_asked_about_does_not_vary() -> None:

@@ -32,7 +32,7 @@ from tests.planfly.campaigns.made_campaigns import (
     slow_flight,
     table,
 )
-from tests.soak import SOAK, note
+from tests.soak import SOAK, note, scaled
 
 pytestmark = pytest.mark.filterwarnings("default")
 
@@ -148,7 +148,7 @@ def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
 
 
 def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
-    kills, count = (20, 400) if SOAK else (1, 40)
+    kills, count = scaled(20, 1), scaled(400, 40)
     folder = tmp_path / "killed"
     folder.mkdir()
     moments, written = random.Random(3), set[int]()
@@ -166,7 +166,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
 
 
 def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> None:
-    kills, count = (20, 1200) if SOAK else (2, 100)
+    kills, count = scaled(20, 2), scaled(1200, 100)
     begun, goal = threading.Event(), Goal(None, False, count)
     with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun) as killed:
         fly_campaign(base, goal, Workers(2), store, lambda *_: begun.set(), fly=slow_flight)

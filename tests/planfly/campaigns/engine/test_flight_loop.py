@@ -11,6 +11,7 @@ from planfly.campaigns.engine.flight_tasks import CampaignPlugin
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.storage.row_values import same_flight
 from tests.planfly.campaigns.made_campaigns import made_flight
+from world.interruption import Interrupted
 
 
 @pytest.mark.filterwarnings("default")
@@ -35,7 +36,22 @@ def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
         other.close()
 
 
-def test_pilots_are_let_go_whatever_happens(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("error", "scheduler", "told_twice"),
+    [
+        (ZeroDivisionError(), None, True),
+        (Interrupted(2), "tcp://127.0.0.1:8786", True),
+        # They end with this process, and are not asked to.
+        (Interrupted(2), None, False),
+    ],
+)
+def test_workers_that_live_on_forget_a_campaign(
+    base: CampaignBase,
+    monkeypatch: pytest.MonkeyPatch,
+    error: BaseException,
+    scheduler: str | None,
+    told_twice: bool,
+) -> None:
     told: list[str] = []
 
     class Client:
@@ -46,7 +62,6 @@ def test_pilots_are_let_go_whatever_happens(base: CampaignBase, monkeypatch: pyt
             told.append(name)
 
     monkeypatch.setattr("planfly.campaigns.engine.flight_loop.connected", lambda _: nullcontext(Client()))
-    with pytest.raises(ZeroDivisionError), hired_pilots(Workers(1), base, made_flight):
-        raise ZeroDivisionError
-    assert len(told) == 2
-    assert told[0] == told[1]
+    with pytest.raises(type(error)), hired_pilots(Workers(1, scheduler), base, made_flight):
+        raise error
+    assert told == told[:1] * (2 if told_twice else 1)
