@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds
+from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import open_campaign
+from planfly.campaigns.report.campaign_files import campaign_folder
 from planfly.campaigns.report.wind_files import write_winds
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
 
@@ -22,13 +23,15 @@ def winds(
     workers: int | None = None,
     scheduler: str | None = None,
     out: str | Path | None = None,
+    resume: bool = False,
 ) -> WindsFound:
     """The largest wind from each direction in which a mission flies with a probability, by flights put where they tell.
 
     target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
     prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all directions.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
-    out: a folder for ``winds.html``, ``winds.png`` and ``winds.json``; None writes none.
+    out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
+    resume: go on with the search that is there.
 
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
     Raises ValueError for numbers that are none, and a `planfly.PlanflyError` for bad input.
@@ -46,9 +49,10 @@ def winds(
             raise ValueError(f"{name}: {value:g}: {low:g} to {high:g} is expected")
     goal = WindsGoal(prove, confidence, directions, most, flights)
     chosen = default_spread() if spread is None else read_spread(Path(spread))
-    base = open_campaign(str(target), chosen.without(ASKED), seed=seed)
-    found = find_winds(base, goal, Workers(workers, scheduler))
-    if out is not None:
-        Path(out).mkdir(parents=True, exist_ok=True)
-        write_winds(Path(out), base, found, f"planfly winds {target} --seed {base.seed}")
+    with campaign_folder(out, resume=resume) as folder:
+        base = open_campaign(str(target), chosen.without(ASKED), planned=folder / "plan.json", seed=seed)
+        with open_winds_store(base, goal, folder, resume=resume) as store:
+            found = find_winds(base, goal, Workers(workers, scheduler), store)
+        if out is not None:
+            write_winds(folder, base, found, f"planfly winds {target} --seed {base.seed}")
     return found

@@ -1,17 +1,23 @@
 """A campaign as the command line asks for it: its goal, spread, mission and folder."""
 
 import argparse
+import signal
+import sys
 from pathlib import Path
 
 from planfly.campaigns.campaign_result import make_goal
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign
 from planfly.campaigns.spread.spread_file import FlightSpread, default_spread, read_spread
 from planfly.campaigns.statistics.decision import Goal
 from planfly.pipeline import Advance
 from planfly.terminal.progress import progress
 from planfly.terminal.scenario_options import scenario_change
 from planfly.terminal.targets import RESULTS
+from planner.plan import plan_json
+from world.atomic_files import write_whole
 from world.errors import PlanflyError
+from world.interruption import Interrupted
 
 
 def campaign_goal(args: argparse.Namespace) -> Goal:
@@ -27,7 +33,44 @@ def campaign_spread(args: argparse.Namespace) -> FlightSpread:
     return default_spread() if args.spread is None else read_spread(Path(args.spread))
 
 
-def open_base(args: argparse.Namespace, spread: FlightSpread, folder: Path | None) -> CampaignBase:
+def open_base(args: argparse.Namespace, spread: FlightSpread, folder: Path, table: str, *, again: bool) -> CampaignBase:
+    """The mission of the options, and its folder ready for it: cleared, or with what is to be gone on with.
+
+    table: name of the file of flights.  A scenario's plan is kept in the folder, for those that go on.
+    Raises PlanflyError; a folder that was not ready is as it was then.
+    """
+    if again and not (folder / table).is_file():
+        raise PlanflyError(f"{folder / table}: no campaign there to go on with")
+    if not again:
+        _refuse_campaign(folder, table, args.overwrite)
+    base = _opened(args, spread, folder if again else None)
+    if not again:
+        clear_campaign(folder)
+    if base.plan is not None and not (folder / "plan.json").exists():
+        write_whole(folder / "plan.json", plan_json(base.plan))
+    return base
+
+
+def _refuse_campaign(folder: Path, table: str, overwrite: bool) -> None:
+    """Refuse a folder that is a file, or that holds a campaign or anything else.  Raises PlanflyError."""
+    if folder.exists() and not folder.is_dir():
+        raise PlanflyError(f"{folder}: is a file; a folder is expected")
+    if overwrite or not folder.is_dir() or not any(folder.iterdir()):
+        return
+    if (folder / table).exists():
+        raise PlanflyError(f"{folder}: holds a campaign; --resume goes on with it, --overwrite replaces it")
+    if any((folder / name).exists() for name in CAMPAIGN_FILES):
+        raise PlanflyError(f"{folder}: holds another campaign; --overwrite replaces it")
+    raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
+
+
+def tell_interrupted(stop: KeyboardInterrupt, folder: Path, flights: int) -> int:
+    """Say what is kept of a campaign that was interrupted, and how to go on; its exit code."""
+    print(f"planfly: interrupted; {flights} flights are kept in {folder}, --resume goes on", file=sys.stderr)
+    return 128 + (stop.number if isinstance(stop, Interrupted) else signal.SIGINT)
+
+
+def _opened(args: argparse.Namespace, spread: FlightSpread, folder: Path | None) -> CampaignBase:
     """The mission of the options, planned if it is a scenario and the folder holds no plan of it."""
     change = scenario_change(args)
 

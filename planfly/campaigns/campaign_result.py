@@ -1,24 +1,24 @@
 """Campaigns for Python: fly one, and read what came of it."""
 
-import tempfile
 from collections.abc import Iterable, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.report.campaign_files import clear_campaign
+from planfly.campaigns.report.campaign_files import campaign_folder
 from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, summarise
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
 from planfly.campaigns.statistics.decision import Answer, Goal
 from planfly.campaigns.statistics.proportions import Interval
-from planfly.campaigns.storage.store import DATABASE, read_table
+from planfly.campaigns.storage.read_table import read_shapes, read_table
+from planfly.campaigns.storage.store import DATABASE
 from world.notebooks.html_table import html_table
 
 # Flights of a campaign that says no number, and the most of one that stops by itself.
@@ -29,11 +29,13 @@ USUAL_FLIGHTS, MOST_FLIGHTS = 300, 5000
 class CampaignResult:
     """What `planfly.campaign` returns.
 
-    columns: the table of flights, a list a column.
+    columns: the table of flights, (n,) each.
+    table: its file; None where none was kept.
     """
 
     summary: CampaignSummary
-    columns: Mapping[str, list[Any]]
+    columns: Mapping[str, NDArray[Any]]
+    table: Path | None = None
 
     @property
     def probability(self) -> float:
@@ -66,8 +68,19 @@ class CampaignResult:
         try:
             import pandas as pd
         except ImportError:
-            return {name: np.array(values) for name, values in self.columns.items()}
+            return dict(self.columns)
         return pd.DataFrame(dict(self.columns))
+
+    def shapes(self) -> dict[str, NDArray[np.float32]]:
+        """Each flight's way, read from the campaign's folder at every call; a row a flight, NaN where none is known.
+
+        "clearance": (n, 150) least height above ground on each equal piece of the route's length, m.
+        "crossings": (n, w, 2) how far right of and above each waypoint it was at its nearest, m.
+        Raises ValueError for a campaign that kept no folder.
+        """
+        if self.table is None:
+            raise ValueError("shapes: the campaign kept no folder; give it one by out")
+        return read_shapes(self.table)
 
     def __repr__(self) -> str:
         tally, (low, high) = self.summary.estimate.tally, self.interval
@@ -116,10 +129,7 @@ def campaign(
     """
     goal = make_goal(flights, prove, at_least, confidence)
     chosen = default_spread() if spread is None else read_spread(Path(spread))
-    with tempfile.TemporaryDirectory() if out is None else nullcontext(str(out)) as name:
-        folder = Path(name)
-        if not resume:
-            clear_campaign(folder)
+    with campaign_folder(out, resume=resume) as folder:
         base = open_campaign(str(target), chosen, planned=folder / "plan.json", seed=seed)
         with open_store(base, goal, folder, resume=resume) as store:
             estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
@@ -127,7 +137,8 @@ def campaign(
         if summary is None:
             command = f"planfly campaign {target} --seed {base.seed}"
             summary = finish_campaign(base, goal, estimate, folder, command)
-        return CampaignResult(summary, read_table(folder / DATABASE))
+        table = folder / DATABASE
+        return CampaignResult(summary, read_table(table), None if out is None else table)
 
 
 def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float) -> Goal:

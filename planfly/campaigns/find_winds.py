@@ -1,16 +1,21 @@
 """The largest wind from each direction in which a mission flies: flights put where they tell most, in rounds."""
 
-import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from pathlib import Path
 
-from planfly.campaigns.engine.cluster import Workers, connected
-from planfly.campaigns.engine.flight_loop import Flown, Order, Pilots
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.fingerprint import code_hash
+from planfly.campaigns.engine.flight_loop import Order, Pilots, hired_pilots
+from planfly.campaigns.engine.flight_rate import FlightRate
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import fly_one
+from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.statistics.wind_boundary import Direction, WindBoundary, needs_more
+from planfly.campaigns.storage.held_table import StoreError
+from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, WindsStore
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction.
 ACCURACY, FEWEST = 0.4, 30
@@ -33,11 +38,15 @@ class WindsGoal:
 
 @dataclass(frozen=True, repr=False)
 class WindsFound:
-    """The boundary of each direction, and the flights it rests on: direction, speed, and whether flyable."""
+    """The boundary of each direction, and the flights it rests on: direction, speed, and whether flyable.
+
+    lost: which of them, from 0, could not be flown; they count as not flyable.
+    """
 
     goal: WindsGoal
     boundaries: tuple[WindBoundary, ...]
     flights: tuple[tuple[int, float, bool], ...]
+    lost: tuple[int, ...] = ()
 
     def from_deg(self, direction: int) -> float:
         """Where the wind of a direction comes from, degrees."""
@@ -48,64 +57,150 @@ class WindsFound:
         return f"<WindsFound {len(self.boundaries)} directions, {least:.1f} m/s the least; {len(self.flights)} flights>"
 
 
-def find_winds(
-    base: CampaignBase, goal: WindsGoal, workers: Workers, advance: Advance | None = None, fly: FlyOne = fly_one
-) -> WindsFound:
-    """Fly in rounds until each boundary is known well enough, or the flights are used up.
+def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resume: bool) -> WindsStore:
+    """The search's table in a folder, new or to go on with.
 
-    A round's winds follow from the rounds before it alone, so that the result is the same for any number of workers.
+    base: of a spread without the quantities of `ASKED`.
+    Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer.
+    """
+    settings = {"name": base.name, "seed": base.seed, "spread": base.spread.to_json(), **asdict(goal)}
+    return WindsStore(folder / WINDS_DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
+
+
+def find_winds(
+    base: CampaignBase,
+    goal: WindsGoal,
+    workers: Workers,
+    store: WindsStore,
+    advance: Advance | None = None,
+    fly: FlyOne = fly_one,
+) -> WindsFound:
+    """Fly in rounds, but for what the table has, until each boundary is known well enough or flights are used up.
+
+    A round's winds follow from the rounds before it alone, so that the result is the same for any number of workers
+    and however often it was stopped.  What was flown before an error or Ctrl-C stays in the table.
     base: of a spread without the quantities of `ASKED`.
     """
-    directions = [Direction(goal.most, goal.target, goal.confidence) for _ in range(goal.directions)]
-    flown: list[tuple[int, float, bool]] = []
-    with connected(workers) as client:
-        pilots = Pilots(client, base, fly)
-        try:
-            while orders := _round(goal, directions, len(flown)):
-                done = sorted(_fly_round(pilots, goal, orders, len(flown), advance))
-                for number, speed, _, flyable in done:
-                    directions[number].add(speed, flyable)
-                    flown.append((number, speed, flyable))
-        finally:
-            pilots.close()
-    return WindsFound(goal, tuple(one.boundary() for one in directions), tuple(flown))
+    search, known = _Search(goal), _Known(store)
+    pace = _Pace(search, len(known.outcomes), advance)
+    with ExitStack() as stack:
+        pilots: Pilots | None = None
+        while asked := search.next_round():
+            if missing := known.missing(asked):
+                pilots = pilots or stack.enter_context(hired_pilots(workers, base, fly))
+                _fly_round(pilots, search, missing, known, pace)
+            for one in asked:
+                search.take(one, known.outcomes[one.number])
+    store.drop_from(len(search.flown))
+    return search.found()
 
 
-def _round(goal: WindsGoal, directions: list[Direction], flown: int) -> list[tuple[int, float, int]]:
-    """Direction, speed and flight's index of the next round; none where all is known or used up."""
-    wanted = []
-    for number, direction in enumerate(directions):
+class _Search:
+    """What has been asked for, round after round, and what came of it."""
+
+    def __init__(self, goal: WindsGoal) -> None:
+        self.goal = goal
+        self.directions = [Direction(goal.most, goal.target, goal.confidence) for _ in range(goal.directions)]
+        self.open = list(range(goal.directions))
+        self.flown: list[tuple[int, float, bool]] = []
+        self.lost: list[int] = []
+
+    def next_round(self) -> list[AskedFlight]:
+        """The flights to fly next; none where all is known or used up."""
+        self.open = [number for number, one in enumerate(self.directions) if self._is_open(one)]
+        asked: list[AskedFlight] = []
+        for number in self.open:
+            direction = self.directions[number]
+            for k, speed in enumerate(direction.next_speeds()):
+                draw = len(direction.speeds) + k
+                asked.append(AskedFlight(len(self.flown) + len(asked), number, speed, draw))
+        return asked[: max(0, self.goal.flights - len(self.flown))]
+
+    @staticmethod
+    def _is_open(direction: Direction) -> bool:
         count = len(direction.speeds)
-        if not count or needs_more(direction.boundary(), count, ACCURACY, FEWEST):
-            wanted += [(number, speed, count + k) for k, speed in enumerate(direction.next_speeds())]
-    return wanted[: max(0, goal.flights - flown)]
+        return not count or needs_more(direction.boundary(), count, ACCURACY, FEWEST)
+
+    def take(self, asked: AskedFlight, outcome: str) -> None:
+        """Take a flight in, in the order in which they were asked for."""
+        flyable = outcome == "flyable"
+        self.directions[asked.direction].add(asked.speed, flyable)
+        self.flown.append((asked.direction, asked.speed, flyable))
+        if outcome == "lost":
+            self.lost.append(asked.number)
+
+    def order(self, asked: AskedFlight) -> Order:
+        """As it is flown."""
+        return Order(asked.draw, GivenWind(asked.speed, 360.0 * asked.direction / self.goal.directions))
+
+    def at_least(self) -> int:
+        """Flights that are to come before any direction that is open can be known, of all of them."""
+        to_come = sum(max(0, FEWEST - len(self.directions[number].speeds)) for number in self.open)
+        return min(to_come, self.goal.flights - len(self.flown))
+
+    def found(self) -> WindsFound:
+        """The answer."""
+        boundaries = tuple(one.boundary() for one in self.directions)
+        return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost))
 
 
-def _fly_round(
-    pilots: Pilots, goal: WindsGoal, orders: list[tuple[int, float, int]], before: int, advance: Advance | None
-) -> list[tuple[int, float, int, bool]]:
-    left = itertools.chain(orders)
-    asked: dict[Order, tuple[int, float, int]] = {}
+class _Known:
+    """The flights that the table has, and their outcomes by number."""
+
+    def __init__(self, store: WindsStore) -> None:
+        known = store.known()
+        self._store = store
+        self._asked = {number: asked for number, (asked, _) in known.items()}
+        self.outcomes = {number: outcome for number, (_, outcome) in known.items()}
+
+    def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
+        """Those that have still to be flown.  Raises StoreError for one that was asked for otherwise."""
+        for one in asked:
+            if self._asked.get(one.number, one) != one:
+                path = self._store.path
+                raise StoreError(f"{path}: flight {one.number} does not follow from those before it", file=path)
+        return [one for one in asked if one.number not in self.outcomes]
+
+    def add(self, asked: AskedFlight, row: FlightRow) -> None:
+        """Write one down."""
+        self._store.add(asked, row)
+        self.outcomes[asked.number] = row.outcome
+
+
+def _fly_round(pilots: Pilots, search: _Search, missing: list[AskedFlight], known: _Known, pace: "_Pace") -> None:
+    left = iter(missing)
+    asked: dict[Order, AskedFlight] = {}
 
     def following() -> Order | None:
-        entry = next(left, None)
-        if entry is None:
+        one = next(left, None)
+        if one is None:
             return None
-        number, speed, index = entry
-        order = Order(index, GivenWind(speed, 360.0 * number / goal.directions))
-        asked[order] = entry
+        order = search.order(one)
+        asked[order] = one
         return order
 
-    done = []
-    for one in pilots.fly(following):
-        done.append((*asked[one.order], _flyable(one)))
-        if advance is not None:
-            count = before + len(done)
-            advance(
-                float(count), float(goal.flights), f"{count} flights, {len({n for n, _, _ in orders})} directions open"
-            )
-    return done
+    for order, row in pilots.fly(following):
+        known.add(asked[order], row)
+        pace.tell(len(known.outcomes))
 
 
-def _flyable(one: Flown) -> bool:
-    return one.row.outcome == "flyable"
+class _Pace:
+    """Progress, told now and then; known: flights that were there before."""
+
+    def __init__(self, search: _Search, known: int, advance: Advance | None) -> None:
+        self._search, self._advance, self._rate = search, advance, FlightRate(known)
+
+    def tell(self, flights: int) -> None:
+        """How far it is: directions settled, flights, flights a minute, and time left while flights are known to come.
+
+        How many a direction takes beyond the fewest shows only when it has them: no time is told then.
+        """
+        if self._advance is None or not self._rate.due():
+            return
+        search, rate = self._search, self._rate.a_second(flights)
+        to_come = len(search.flown) + search.at_least() - flights
+        settled, whole = search.goal.directions - len(search.open), search.goal.directions
+        remark = f"{settled} of {whole} directions settled, {flights} flights, {60.0 * rate:.0f} a minute"
+        if to_come > 0 and rate > 0.0:
+            remark += f", {to_come / rate:.0f} s left at least"
+        self._advance(float(flights), float(flights + max(to_come, 1)), remark)

@@ -1,13 +1,13 @@
 """A campaign from its first flight to its answer: flown in parallel, written down by index, told from the table."""
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from planfly.campaigns.engine.cluster import Workers, connected
+from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.fingerprint import code_hash
-from planfly.campaigns.engine.flight_loop import Order, Pilots
+from planfly.campaigns.engine.flight_loop import Order, Pilots, hired_pilots
+from planfly.campaigns.engine.flight_rate import FlightRate
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
@@ -16,8 +16,6 @@ from planfly.campaigns.statistics.proportions import Tally
 from planfly.campaigns.storage.store import DATABASE, Store
 
 Advance = Callable[[float, float, str], None]
-# Seconds between two lines of progress.
-_TOLD_EVERY = 0.5
 
 
 @dataclass
@@ -90,21 +88,18 @@ def fly_campaign(
         if index < goal.flights:
             book.add(index, outcome)
     if not book.decided and book.tally.flown < goal.flights:
-        with connected(workers) as client:
-            _fly_rest(Pilots(client, base, fly), book, store, _Pace(goal, estimator, advance))
+        with hired_pilots(workers, base, fly) as pilots:
+            _fly_rest(pilots, book, store, _Pace(goal, estimator, book.tally, advance))
     store.drop_from(book.tally.flown)
     return estimator.estimate(store.tally())
 
 
 def _fly_rest(pilots: Pilots, book: _Book, store: Store, pace: "_Pace") -> None:
-    try:
-        for _, row in pilots.fly(book.following):
-            _take(row, book, store)
-            pace.tell(book.tally)
-            if book.decided:
-                break
-    finally:
-        pilots.close()
+    for _, row in pilots.fly(book.following):
+        _take(row, book, store)
+        pace.tell(book.tally)
+        if book.decided:
+            break
 
 
 def _take(row: FlightRow, book: _Book, store: Store) -> None:
@@ -113,23 +108,18 @@ def _take(row: FlightRow, book: _Book, store: Store) -> None:
 
 
 class _Pace:
-    """Progress, told now and then."""
+    """Progress, told now and then; known: the flights that were there before."""
 
-    def __init__(self, goal: Goal, estimator: Estimator, advance: Advance | None) -> None:
+    def __init__(self, goal: Goal, estimator: Estimator, known: Tally, advance: Advance | None) -> None:
         self._goal, self._estimator, self._advance = goal, estimator, advance
-        self._started = self._last = time.monotonic()
-        self._first: int | None = None
+        self._rate = FlightRate(known.flown)
 
     def tell(self, tally: Tally) -> None:
         """How far it is: flights, P with its bounds, flights a minute, time left."""
-        now = time.monotonic()
-        if self._first is None:
-            self._first = tally.flown
-        if self._advance is None or not tally.flown or now - self._last < _TOLD_EVERY:
+        if self._advance is None or not tally.flown or not self._rate.due():
             return
-        self._last = now
         found = self._estimator.estimate(tally)
-        rate = (tally.flown - self._first) / max(now - self._started, 1e-3)
+        rate = self._rate.a_second(tally.flown)
         whole = max(self._estimator.fewest, tally.flown) if self._goal.stops else self._goal.flights
         left = (whole - tally.flown) / rate if rate > 0.0 else 0.0
         remark = (

@@ -25,7 +25,6 @@ def add_campaigns(command: _Command) -> None:
     goal.add_argument("--prove", metavar="P", type=_share, help="fly until P is reached or missed")
     goal.add_argument("--at-least", metavar="P", type=_share, help="answer after all flights whether P is reached")
     campaign.add_argument("--flights", metavar="N", type=_flights, help="how many (300), at most with --prove (5000)")
-    campaign.add_argument("--resume", action="store_true", help="go on with the campaign in --out")
     campaign.add_argument(
         "--refly", metavar="K", type=_index, help="fly flight K of the campaign in --out again, into a log"
     )
@@ -59,6 +58,7 @@ def _shared(parser: CommandParser) -> None:
     parser.add_argument("--seed", metavar="N", type=seed, help="of plan and draws (default: the scenario's, or 1)")
     parser.add_argument("--workers", metavar="N", type=positive_count, help="processes here (default: one a core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT")
+    parser.add_argument("--resume", action="store_true", help="go on with what is in --out")
     result_options(parser, "where the files go (default: runs/<name>-<command>, kept)")
 
 

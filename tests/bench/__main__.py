@@ -1,8 +1,9 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
-``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [airspace] [--runs N]
-[--seconds S] [--seeds N]``: parts to measure (default: all), seeds of each whole planner run (15), what OMPL is given
-(10 s), and seeds of flights (20).
+``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [airspace] [campaigns]
+[--runs N] [--seconds S] [--seeds N] [--flights N] [--long]``: parts to measure (default: all), seeds of each whole
+planner run (15), what OMPL is given (10 s), seeds of flights (20), flights of a campaign (90), and the rows of
+campaigns that take an hour.
 """
 
 import argparse
@@ -15,7 +16,7 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = ("chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace")
+PARTS = ("chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace", "campaigns")
 TARGET = Path("runs") / "bench.json"
 
 
@@ -26,12 +27,15 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=15, help="seeds of each whole planner run")
     parser.add_argument("--seconds", type=float, default=10.0, help="what OMPL is given")
     parser.add_argument("--seeds", type=int, default=20, help="seeds of each kind of flight")
+    parser.add_argument("--flights", type=int, default=90, help="flights of a campaign whose rate is taken")
+    parser.add_argument("--long", action="store_true", help="campaigns: winds, client's memory and step rates, too")
     args = parser.parse_args()
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f"{', '.join(sorted(unknown))}: not a part")
     # Imported here: the setting above must come first.
     from tests.bench import aircraft, autopilot, chain, flight, peers, planner
     from tests.bench.airspace import check_log
+    from tests.bench.campaigns import campaign_rows
     from tests.bench.planning import ablation
 
     TARGET.parent.mkdir(exist_ok=True)
@@ -47,6 +51,7 @@ def main() -> None:
         "aircraft": aircraft.run,
         "autopilot": autopilot.run,
         "airspace": check_log.run,
+        "campaigns": lambda: campaign_rows.run(args.flights, whole=args.long),
     }
     for part in args.parts or PARTS:
         record[part] = work[part]()

@@ -1,17 +1,20 @@
 """Flights sent to workers and taken back, as many at a time as there are workers."""
 
+import contextlib
 import itertools
 import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
+from planfly.campaigns.engine.cluster import Workers, connected
 from planfly.campaigns.engine.fingerprint import fingerprint
 from planfly.campaigns.engine.flight_tasks import CampaignPlugin, FlyOne, fly_task
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.flights.varied_flight import GivenWind
 from world.errors import PlanflyError
+from world.interruption import Interrupted
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,8 +82,13 @@ class Pilots:
                 send()
                 # After the next was sent: of a kind without any task dask makes a new record with the next one.
                 future.release()
+        except Interrupted:
+            # No time to wait for an answer: these flights end with the client.
+            flying.clear()
+            raise
         finally:
-            self._client.cancel(list(done.futures), force=True)
+            if flying:
+                self._client.cancel(list(done.futures), force=True)
 
     def _result(self, future: Any, order: Order) -> FlightRow:
         from distributed import KilledWorker
@@ -96,3 +104,22 @@ class Pilots:
                 raise error
             raise RuntimeError(f"flight {order.index}: {type(error).__name__}: {error}") from error
         raise OSError(0, "the scheduler was lost; the flights before are kept, --resume goes on", "--scheduler")
+
+
+@contextlib.contextmanager
+def hired_pilots(workers: Workers, base: CampaignBase, fly: FlyOne = fly_one) -> Iterator[Pilots]:
+    """Pilots of a campaign on these workers; workers of our own end with it, others forget it.
+
+    An interruption waits for no answer of workers of our own: they end with this process.
+    Raises SchedulerError as `planfly.campaigns.engine.cluster.connected`.
+    """
+    with connected(workers) as client:
+        pilots, live_on = Pilots(client, base, fly), True
+        try:
+            yield pilots
+        except Interrupted:
+            live_on = workers.scheduler is not None
+            raise
+        finally:
+            if live_on:
+                pilots.close()

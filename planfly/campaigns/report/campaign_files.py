@@ -1,23 +1,46 @@
-"""The files of a campaign's folder beside its table: summary, report, and the logs of its worst flights."""
+"""The files of a campaign's folder: what is cleared there, and summary, report, and the logs of its worst flights."""
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.report.summary import CampaignSummary, log_name, summary_json
-from planfly.campaigns.storage.store import Store, same_flight
+from planfly.campaigns.storage.row_values import same_flight
+from planfly.campaigns.storage.store import DATABASE, Store
+from planfly.campaigns.storage.winds_store import WINDS_DATABASE
 from planfly.pipeline import Advance
 from world.atomic_files import write_whole
 from world.errors import PlanflyError
 
-# What a campaign writes into its folder, and clears where it is replaced.
+# What a campaign or a search for winds writes into its folder, and clears where it is replaced.
 CAMPAIGN_FILES = (
-    "campaign.sqlite", "campaign.sqlite-wal", "campaign.sqlite-shm", "summary.json", "report.html", "plan.json",
+    *(f"{table}{ending}" for table in (DATABASE, WINDS_DATABASE) for ending in ("", "-wal", "-shm")),
+    "summary.json", "report.html", "winds.json", "winds.png", "winds.html", "plan.json",
 )  # fmt: skip
 
 
+@contextmanager
+def campaign_folder(out: Path | str | None, *, resume: bool) -> Iterator[Path]:
+    """A campaign's folder, cleared unless it is gone on with; out: None for one that is removed at the end.
+
+    Raises ValueError for a campaign to resume without a folder.
+    """
+    if out is not None:
+        if not resume:
+            clear_campaign(Path(out))
+        yield Path(out)
+        return
+    if resume:
+        raise ValueError("resume: out is missing: the folder of what is to be gone on with")
+    with tempfile.TemporaryDirectory() as name:
+        yield Path(name)
+
+
 def clear_campaign(folder: Path) -> None:
-    """Make a folder, and clear what an earlier campaign left there; anything else stays."""
+    """Make a folder, and clear what an earlier campaign or search left there; anything else stays."""
     folder.mkdir(parents=True, exist_ok=True)
     for path in (*(folder / name for name in CAMPAIGN_FILES), *_logs(folder)):
         path.unlink(missing_ok=True)

@@ -50,6 +50,7 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
         "confidence": goal.confidence,
         "most": goal.most,
         "flights": len(found.flights),
+        "lost": list(found.lost),
         "directions": [
             {
                 "from_deg": one.from_deg,
@@ -86,6 +87,17 @@ def _open_lines(found: WindsFound) -> list[str]:
     ]
 
 
+def _lost_lines(found: WindsFound) -> list[str]:
+    """Which flights could not be flown, where some could not."""
+    if not found.lost:
+        return []
+    named = ", ".join(
+        f"{number} ({found.flights[number][1]:.1f} m/s from {found.from_deg(found.flights[number][0]):g}°)"
+        for number in found.lost[:10]
+    )
+    return [f"lost      {len(found.lost)} could not be flown, their workers died, and count as not flyable: {named}"]
+
+
 def wind_lines(found: WindsFound) -> list[str]:
     """What was found, in a few lines."""
     chart = spokes(found)
@@ -95,6 +107,7 @@ def wind_lines(found: WindsFound) -> list[str]:
         f"flies with P >= {found.goal.target:g} in wind up to {_speed_text(least.boundary, most)}"
         f" from {least.from_deg:g}° (the least), {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
         *_open_lines(found),
+        *_lost_lines(found),
         f"{len(found.flights)} flights; intervals at {100 * found.goal.confidence:g} %, by probit regression"
         " of each direction",
     ]

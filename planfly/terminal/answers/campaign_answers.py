@@ -104,5 +104,7 @@ class WindsDocument:
     most: float
     """The strongest wind that was looked at, m/s."""
     flights: int
+    lost: list[int]
+    """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
     directions: list[WindDirection]
     spread: dict[str, Any]

@@ -10,13 +10,14 @@ and at most the target above.
 
 import argparse
 import json
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from planfly.campaigns.engine.cluster import Workers, connected
-from planfly.campaigns.engine.flight_loop import Order, Pilots
-from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.flight_loop import Order, hired_pilots
+from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
@@ -45,20 +46,18 @@ def share_at(base: CampaignBase, wind: GivenWind, most: int) -> Tally:
         index = None if decide.decides(flown) else next(indices, None)
         return None if index is None else Order(index, wind)
 
-    with connected(Workers(2)) as client:
-        pilots = Pilots(client, base)
-        try:
-            for one in pilots.fly(following):
-                good = one.row.outcome == "flyable"
-                flown = Tally(flown.flyable + good, flown.failed + (not good), 0)
-        finally:
-            pilots.close()
+    with hired_pilots(Workers(2), base) as pilots:
+        for one in pilots.fly(following):
+            good = one.row.outcome == "flyable"
+            flown = Tally(flown.flyable + good, flown.failed + (not good), 0)
     return flown
 
 
 def found_winds() -> WindsFound:
     """The boundaries as `planfly winds jacksboro --seed 1` finds them."""
-    return find_winds(demo(1), GOAL, Workers(2))
+    base = demo(1)
+    with tempfile.TemporaryDirectory() as name, open_winds_store(base, GOAL, Path(name), resume=False) as store:
+        return find_winds(base, GOAL, Workers(2), store)
 
 
 def winds_row() -> dict[str, float]:

@@ -9,7 +9,11 @@ import planfly
 from planfly.api import wind_limits
 from planfly.campaigns.find_winds import WindsFound, WindsGoal
 from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import FlightRow
+from planfly.campaigns.spread.draws import draw_flight
 from planfly.campaigns.statistics.wind_boundary import Direction
+from planfly.campaigns.storage.winds_store import AskedFlight, WindsStore
+from tests.planfly.campaigns.made_campaigns import table
 
 FLIGHTS = tuple((number, speed, speed < 8.0) for number in range(4) for speed in (2.0, 6.0, 7.5, 8.5, 10.0, 14.0))
 
@@ -19,8 +23,10 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
     """What a search was asked; it finds that 8 m/s decide."""
     seen = []
 
-    def found(base: CampaignBase, goal: WindsGoal, *_: object) -> WindsFound:
+    def found(base: CampaignBase, goal: WindsGoal, _: object, store: WindsStore) -> WindsFound:
         seen.append((base, goal))
+        if not store.known():
+            store.add(AskedFlight(0, 0, 5.0, 0), made_row(base))
         directions = [Direction(goal.most, goal.target, goal.confidence) for _ in range(goal.directions)]
         for number, speed, flyable in FLIGHTS:
             directions[number].add(speed, flyable)
@@ -30,15 +36,36 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
     return seen
 
 
+def made_row(base: CampaignBase) -> FlightRow:
+    return FlightRow(draw_flight(base.spread, base.seed, 0), "flyable", "completed")
+
+
 def test_what_is_asked_is_what_is_flown(asked: list[tuple[CampaignBase, WindsGoal]], tmp_path: Path) -> None:
-    found = planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, flights=99, seed=2, out=tmp_path / "out")
+    out = tmp_path / "out"
+    found = planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, flights=99, seed=2, out=out)
     ((base, goal),) = asked
     assert goal == WindsGoal(0.9, 0.95, 4, 15.0, 99)
     assert base.seed == 2
     assert not {"wind_speed", "wind_from"} & {one.quantity.name for one in base.spread.varying}
-    assert sorted(file.name for file in (tmp_path / "out").iterdir()) == ["winds.html", "winds.json", "winds.png"]
+    names = ["plan.json", "winds.html", "winds.json", "winds.png", "winds.sqlite"]
+    assert sorted(file.name for file in out.iterdir()) == names
     assert repr(found).startswith("<WindsFound 4 directions, ")
     assert repr(found).endswith(" 24 flights>")
+    # It goes on with the plan and the flights that are there; another question is refused.
+    plan = (out / "plan.json").read_bytes()
+    planfly.winds("paper-07", prove=0.9, directions=4, most=15.0, seed=2, out=out, resume=True)
+    assert (out / "plan.json").read_bytes() == plan
+    assert len(table(out / "winds.sqlite")) == 1
+    with pytest.raises(planfly.PlanflyError, match="directions 8: the flights there were asked for with 4"):
+        planfly.winds("paper-07", prove=0.9, directions=8, most=15.0, seed=2, out=out, resume=True)
+
+
+def test_nothing_to_go_on_with(asked: list[object], tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="resume: out is missing"):
+        planfly.winds("paper-07", resume=True)
+    with pytest.raises(ValueError, match="resume: out is missing"):
+        planfly.campaign("paper-07", resume=True)
+    assert asked == []
 
 
 @pytest.mark.parametrize(

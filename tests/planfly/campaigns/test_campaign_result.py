@@ -7,7 +7,9 @@ import pytest
 import planfly
 from planfly.campaigns.campaign_result import MOST_FLIGHTS, USUAL_FLIGHTS, CampaignResult, make_goal
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.storage.store import DATABASE, read_table
+from planfly.campaigns.flights.track_shape import STATIONS
+from planfly.campaigns.storage.read_table import read_table
+from planfly.campaigns.storage.store import DATABASE
 from tests.planfly.campaigns.report.made_report import made_report
 
 
@@ -19,7 +21,7 @@ def test_the_public_name_is_the_package_s() -> None:
 def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     with made_report(base, tmp_path) as (store, summary):
         tally = store.tally()
-    result = CampaignResult(summary, read_table(tmp_path / DATABASE))
+    result = CampaignResult(summary, read_table(tmp_path / DATABASE), tmp_path / DATABASE)
     assert result.probability == tally.flyable / 60
     assert result.interval.low < result.probability < result.interval.high
     assert result.bounds.low > result.interval.low
@@ -27,6 +29,10 @@ def test_what_it_tells(base: CampaignBase, tmp_path: Path) -> None:
     flights = result.flights
     assert list(flights["flight"]) == list(range(60))
     assert list(flights["outcome"]).count("lost") == 1
+    assert "clearance" not in flights
+    assert result.shapes()["clearance"].shape == (60, STATIONS)
+    with pytest.raises(ValueError, match="kept no folder; give it one by out"):
+        CampaignResult(summary, result.columns).shapes()
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,98 @@
-"""The boundary of made flights, whose truth is known."""
+"""The boundary of made flights, whose truth is known; the same whoever flew, and however often it was stopped."""
+
+import random
+import re
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
 import pytest
 
+from planfly.campaigns import find_winds as module
 from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.find_winds import ASKED, WindsGoal, find_winds
+from planfly.campaigns.engine.flight_loop import Flown, Order
+from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.find_winds import ASKED, FEWEST, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import fly_one, lost_row
 from planfly.campaigns.spread.spread_file import default_spread
-from tests.planfly.campaigns.made_campaigns import made_flight
+from planfly.campaigns.storage.held_table import StoreError
+from planfly.campaigns.storage.row_values import row_of
+from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight
+from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
+from tests.planfly.campaigns.made_campaigns import (
+    deadly_in_the_east,
+    made_flight,
+    short_base,
+    slow_flight,
+    table,
+)
+from tests.planfly.campaigns.slow_client import winds_goal
+from tests.soak import SOAK, note, scaled
+
+pytestmark = pytest.mark.filterwarnings("default")
+GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
 
 
-@pytest.mark.filterwarnings("default")
-def test_the_boundary_is_found_in_each_direction(base: CampaignBase) -> None:
-    goal = WindsGoal(0.9, 0.95, 4, 20.0, 400)
-    found = find_winds(base, goal, Workers(1), fly=made_flight)
+@pytest.fixture(scope="module")
+def wind_base(tmp_path_factory: pytest.TempPathFactory) -> CampaignBase:
+    return short_base(tmp_path_factory.mktemp("winds"), default_spread().without(ASKED))
+
+
+class HerePilots:
+    """Pilots in this process: three at a time, the last to be sent the first to be back."""
+
+    def __init__(self, base: CampaignBase, fly: FlyOne) -> None:
+        self._base, self._fly = base, fly
+
+    def fly(self, following: Callable[[], Order | None]) -> Iterator[Flown]:
+        while orders := [one for one in (following() for _ in range(3)) if one is not None]:
+            for order in reversed(orders):
+                yield Flown(order, self._fly(self._base, order.index, order.wind))
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fly without workers."""
+
+    @contextmanager
+    def hired(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
+        yield HerePilots(base, fly)
+
+    monkeypatch.setattr(module, "hired_pilots", hired)
+
+
+def searched(
+    base: CampaignBase, folder: Path, goal: WindsGoal = GOAL, workers: int = 2, fly: FlyOne = made_flight
+) -> WindsFound:
+    """Search in a folder, or go on there."""
+    folder.mkdir(exist_ok=True)
+    resume = (folder / WINDS_DATABASE).exists()
+    with open_winds_store(base, goal, folder, resume=resume) as store:
+        return find_winds(base, goal, Workers(workers), store, fly=fly)
+
+
+def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], goal: WindsGoal = GOAL) -> None:
+    """A folder with some of the flights of another, as one who was stopped leaves it."""
+    part.mkdir()
+    with open_winds_store(base, goal, part, resume=False) as store:
+        for values in table(whole / WINDS_DATABASE):
+            if values[0] in numbers:
+                known = dict(zip(KIND.columns, (*values, 0.0, ""), strict=True))
+                store.add(AskedFlight(*values[:4]), row_of(known["draw"], known))
+
+
+def same(one: tuple[WindsFound, Path], other: tuple[WindsFound, Path]) -> bool:
+    """Whether two searches found the same, by the same table."""
+    found, rows = zip(*((found, table(folder / WINDS_DATABASE)) for found, folder in (one, other)), strict=True)
+    return bool(found[0] == found[1] and rows[0] == rows[1])
+
+
+@pytest.mark.usefixtures("here")
+def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_path: Path) -> None:
+    found = searched(wind_base, tmp_path)
     # A flight fails from W + luck - 0.5 on, luck even in 0..1: one in ten has failed at W - 0.4.
     truth = [7.6, 7.6, 7.6, 11.6]
     for direction, boundary in enumerate(found.boundaries):
@@ -21,6 +101,135 @@ def test_the_boundary_is_found_in_each_direction(base: CampaignBase) -> None:
         assert not boundary.beyond
     assert len(found.flights) <= 400
     assert found.from_deg(3) == 270.0
+    assert found.lost == ()
+    # The draws of each direction are those of any other.
+    rows = table(tmp_path / WINDS_DATABASE)
+    for direction in range(4):
+        draws = [row[3] for row in rows if row[1] == direction]
+        assert draws == list(range(len(draws)))
+
+
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("seed", range(4))
+def test_what_was_stopped_anywhere_comes_out_the_same(wind_base: CampaignBase, tmp_path: Path, seed: int) -> None:
+    whole = searched(wind_base, tmp_path / "whole")
+    count = len(whole.flights)
+    # The last round that was begun has gaps; seed 0 has none at all, seed 1 all.
+    last = {0: 0, 1: count}.get(seed, random.Random(seed).randrange(count))
+    numbers = {k for k in range(count) if k < last - 5 or (k <= last + 5 and (k * 7 + seed) % 3)}
+    keep_part(wind_base, tmp_path / "whole", tmp_path / "part", set(range(count)) if last == count else numbers)
+    flown_now: list[int] = []
+
+    def counted(base: CampaignBase, index: int, wind: Any) -> Any:
+        flown_now.append(index)
+        return made_flight(base, index, wind)
+
+    again = searched(wind_base, tmp_path / "part", fly=counted)
+    assert same((whole, tmp_path / "whole"), (again, tmp_path / "part"))
+    # What was there was not flown again.
+    assert len(flown_now) == (0 if last == count else count - len(numbers & set(range(count))))
+
+
+@pytest.mark.usefixtures("here")
+def test_more_flights_or_fewer_go_on_as_if_asked_at_once(wind_base: CampaignBase, tmp_path: Path) -> None:
+    few, many = (WindsGoal(0.9, 0.95, 4, 20.0, flights) for flights in (31, 100))
+    first, asked_many = (searched(wind_base, tmp_path / name, goal) for name, goal in (("a", few), ("many", many)))
+    assert len(first.flights) == 31
+    assert same((searched(wind_base, tmp_path / "a", many), tmp_path / "a"), (asked_many, tmp_path / "many"))
+    assert same((searched(wind_base, tmp_path / "a", few), tmp_path / "a"), (first, tmp_path / "a"))
+    assert len(table(tmp_path / "a" / WINDS_DATABASE)) == 31
+
+
+@pytest.mark.usefixtures("here")
+def test_a_table_whose_flights_do_not_follow_is_refused(wind_base: CampaignBase, tmp_path: Path) -> None:
+    with open_winds_store(wind_base, GOAL, tmp_path, resume=False) as store:
+        store.add(AskedFlight(3, 1, 9.9, 0), made_flight(wind_base, 0))
+    with pytest.raises(StoreError, match="flight 3 does not follow from those before it"):
+        searched(wind_base, tmp_path)
+    assert len(table(tmp_path / WINDS_DATABASE)) == 1
+
+
+@pytest.mark.usefixtures("here")
+def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planfly.campaigns.engine.flight_rate.TOLD_EVERY", 0.0)
+    told: list[tuple[float, float, str]] = []
+    with open_winds_store(wind_base, GOAL, tmp_path, resume=False) as store:
+        found = find_winds(wind_base, GOAL, Workers(1), store, lambda *one: told.append(one), made_flight)
+    pattern = r"(\d) of 4 directions settled, (\d+) flights, \d+ a minute(, \d+ s left at least)?"
+    lines = [re.fullmatch(pattern, remark) for _, _, remark in told]
+    assert all(lines)
+    assert [int(line[2]) for line in lines if line] == list(range(1, len(found.flights) + 1))
+    # Four directions take thirty each; how many more shows when it shows.
+    assert [bool(line[3]) for line in lines if line] == [k < 4 * FEWEST for k in range(1, len(lines) + 1)]
+    # Three of them are alike, and settled together.
+    assert {line[1] for line in lines if line} == {"0", "3"}
+    assert told[0][:2] == (1.0, 120.0)
+    assert all(done < whole for done, whole, _ in told)
+
+
+@pytest.mark.skipif(not SOAK, reason="workers die at a small count in a campaign's tests: in make soak")
+def test_a_deadly_flight_is_named_and_counts_against(wind_base: CampaignBase, tmp_path: Path) -> None:
+    """By workers: all others come out as without them, and the one counts as not flyable."""
+    goal = WindsGoal(0.9, 0.95, 4, 20.0, 48)
+    found = searched(wind_base, tmp_path / "two", goal, fly=deadly_in_the_east)
+
+    def here(base: CampaignBase, index: int, wind: Any) -> Any:
+        dies = index == 5 and wind.from_deg == 90.0
+        return lost_row(base, index, "lost: its worker died twice") if dies else made_flight(base, index, wind)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "hired_pilots", contextmanager(lambda _, *given: iter([HerePilots(*given)])))
+        want = searched(wind_base, tmp_path / "one", goal, fly=here)
+    assert same((found, tmp_path / "two"), (want, tmp_path / "one"))
+    (lost,) = found.lost
+    assert found.flights[lost][::2] == (1, False)
+    # The flights of N and S are those of E but for the one.
+    assert found.boundaries[1].estimate < found.boundaries[0].estimate == found.boundaries[2].estimate
+
+
+@pytest.mark.skipif(not SOAK, reason="seven workers and flights in earnest: in make soak")
+@pytest.mark.parametrize("fly", [made_flight, fly_one])
+def test_any_workers_find_the_same_stopped_or_not(wind_base: CampaignBase, tmp_path: Path, fly: FlyOne) -> None:
+    goal = WindsGoal(0.9, 0.95, 4, 20.0, 60)
+    one = searched(wind_base, tmp_path / "w1", goal, 1, fly)
+    for workers in (2, 4):
+        again = searched(wind_base, tmp_path / f"w{workers}", goal, workers, fly)
+        assert same((one, tmp_path / "w1"), (again, tmp_path / f"w{workers}"))
+    keep_part(wind_base, tmp_path / "w1", tmp_path / "part", {*range(22), 24, 27}, goal)
+    again = searched(wind_base, tmp_path / "part", goal, 2, fly)
+    assert same((one, tmp_path / "w1"), (again, tmp_path / "part"))
+
+
+@pytest.mark.skipif(not SOAK, reason="clients are killed at a small count in a campaign's tests: in make soak")
+def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
+    kills, count, folder = scaled(20, 1), scaled(400, 40), tmp_path / "killed"
+    folder.mkdir()
+    moments, written = random.Random(4), set[int]()
+    for _ in range(kills):
+        said = kill_while_it_flies("winds", folder, count, moments.randint(1, 12), moments.uniform(0.0, 0.2))
+        assert not said & written
+        written |= said
+        assert written <= {row[0] for row in table(folder / WINDS_DATABASE)}
+    assert not finish_client("winds", folder, count) & written
+    base, goal = short_base(folder, default_spread().without(ASKED)), winds_goal(count)
+    want = searched(base, tmp_path / "one", goal)
+    assert same((searched(base, folder, goal), folder), (want, tmp_path / "one"))
+    note("winds: kill -9 of its client", kills=kills, flights=count, lost=0)
+
+
+@pytest.mark.skipif(not SOAK, reason="workers are killed at a small count in a campaign's tests: in make soak")
+def test_a_killed_worker_loses_no_flight(wind_base: CampaignBase, tmp_path: Path) -> None:
+    kills, goal, begun = scaled(20, 2), winds_goal(scaled(1200, 150)), threading.Event()
+    (tmp_path / "killed").mkdir()
+    with (
+        open_winds_store(wind_base, goal, tmp_path / "killed", resume=False) as store,
+        workers_killed(kills, begun) as killed,
+    ):
+        found = find_winds(wind_base, goal, Workers(2), store, lambda *_: begun.set(), slow_flight)
+    assert len(killed) == kills
+    want = searched(wind_base, tmp_path / "one", goal)
+    assert same((found, tmp_path / "killed"), (want, tmp_path / "one"))
+    note("winds: kill -9 of its workers", kills=kills, flights=goal.flights, lost=0)
 
 
 def test_the_wind_that_is_asked_about_does_not_vary() -> None:

@@ -10,12 +10,13 @@ from planfly.campaigns.flights.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.store import same_flight
+from planfly.campaigns.storage.row_values import same_flight
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.planfly.terminal.answers.checked_answers import validate
 
 pytestmark = pytest.mark.filterwarnings("default")
+TABLE = '[{}]\ndistribution = "{}"\nloc = {}\nscale = 0.01\nsource = "by hand"\n'
 
 
 @pytest.fixture(scope="module")
@@ -50,13 +51,19 @@ def test_a_flight_is_flown_again_byte_for_byte(flown: tuple[list[str], Path]) ->
         ([], "--resume goes on with it"),
         (["--resume", "--seed", "2"], "another campaign"),
         (["--resume", "--spread", "none.toml"], "cannot be read"),
+        (["--overwrite", "--spread", "heavy.toml"], "at the middle of these aerosonde holds no level flight"),
+        (["--overwrite", "--spread", "unknown.toml"], "mass.distribution: 'bell': no distribution of scipy.stats"),
         (["--resume", "--scheduler", "tcp://10.0.0.1:8786", "--flights", "5"], "plain TCP beyond loopback"),
     ],
 )
 def test_one_line_and_nothing_lost(
-    flown: tuple[list[str], Path], more: list[str], words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+    flown: tuple[list[str], Path], more: list[str], words: str, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
     line, out = flown
+    monkeypatch.chdir(out.parent)
+    Path("heavy.toml").write_text(TABLE.format("mass", "norm", 1.9) + TABLE.format("drag", "norm", 2.85))
+    Path("unknown.toml").write_text(TABLE.format("mass", "bell", 1.0))
     before = (out / "summary.json").read_bytes()
     assert main([*line, *more]) == 2
     told = [one for one in capsys.readouterr().err.splitlines() if one.startswith("planfly: ")]

@@ -1,24 +1,106 @@
-"""``planfly winds``: the chart of a short mission."""
+"""``planfly winds``: the chart of a short mission, gone on with where it was stopped."""
 
 import json
+import shutil
+import signal
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 
+from planfly.campaigns.find_winds import WindsGoal
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
-from tests.planfly.campaigns.made_campaigns import write_short
+from planfly.commands import winds as command
+from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short
 from tests.planfly.terminal.answers.checked_answers import answered
+from world.interruption import Interrupted
+
+pytestmark = pytest.mark.filterwarnings("default")
 
 
-@pytest.mark.filterwarnings("default")
-def test_a_short_mission_has_its_chart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    mission, scenario = write_short(tmp_path)
-    line = ["winds", str(mission), "--scenario", str(scenario), "--workers", "1", "--directions", "4"]
-    answer = answered(capsys, 0, *line, "--flights", "12", "--out", str(tmp_path / "out"))
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"winds.html", "winds.json", "winds.png"}
-    data = json.loads((tmp_path / "out" / "winds.json").read_text())
+@pytest.fixture(scope="module")
+def line(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    mission, scenario = write_short(tmp_path_factory.mktemp("winds"))
+    return ["winds", str(mission), "--scenario", str(scenario), "--workers", "1", "--directions", "4"]
+
+
+def test_a_short_mission_has_its_chart_stopped_or_not(
+    line: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    answer = answered(capsys, 0, *line, "--flights", "12", "--out", str(out))
+    assert {path.name for path in out.iterdir()} == {"winds.html", "winds.json", "winds.png", WINDS_DATABASE}
+    data = json.loads((out / "winds.json").read_text())
     assert data == answer
     assert (data["flights"], len(data["directions"])) == (12, 4)
     assert "wind_speed" not in data["spread"]
-    assert main([*line, "--out", str(tmp_path / "out")]) == 2
-    assert "not empty" in capsys.readouterr().err
+    assert main([*line, "--out", str(out)]) == 2
+    assert "--resume goes on with it" in capsys.readouterr().err
+    # As a kill leaves it: a round with gaps, and no chart.
+    again = tmp_path / "again"
+    again.mkdir()
+    shutil.copy(out / WINDS_DATABASE, again)
+    with closing(sqlite3.connect(again / WINDS_DATABASE)) as connection, connection:
+        connection.execute("DELETE FROM flights WHERE flight IN (5, 8) OR flight > 9")
+    assert main([*line, "--flights", "12", "--out", str(again), "--resume"]) == 0
+    assert (again / "winds.json").read_bytes() == (out / "winds.json").read_bytes()
+    assert table(again / WINDS_DATABASE) == table(out / WINDS_DATABASE)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interruption_says_what_is_kept_and_how_to_go_on(
+    line: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], number: int
+) -> None:
+    def interrupted(base: CampaignBase, _goal: WindsGoal, _workers: object, store: WindsStore, *_: object) -> None:
+        for index in range(3):
+            store.add(AskedFlight(index, 0, 5.0, index), made_flight(base, index))
+        raise Interrupted(number)
+
+    monkeypatch.setattr(command, "find_winds", interrupted)
+    assert main([*line, "--out", str(tmp_path / "out")]) == 128 + number
+    told = capsys.readouterr().err.splitlines()
+    assert told[-1] == f"planfly: interrupted; 3 flights are kept in {tmp_path / 'out'}, --resume goes on"
+    assert [path.name for path in (tmp_path / "out").iterdir()] == [WINDS_DATABASE]
+    assert len(table(tmp_path / "out" / WINDS_DATABASE)) == 3
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["--resume", "--seed", "2"], "another campaign"),
+        (["--resume", "--prove", "0.9"], "target 0.9: the flights there were asked for with 0.99"),
+        (["--resume", "--most", "30"], "most 30.0: the flights there"),
+        (["--resume", "--out", "campaign"], "no campaign there to go on with"),
+        (["--out", "campaign"], "holds another campaign; --overwrite replaces it"),
+        ([], "--resume goes on with it"),
+        (["--resume"], "held by another process"),
+    ],
+)
+def test_one_line_and_nothing_lost(
+    line: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    more: list[str], words: str,
+) -> None:  # fmt: skip
+    def left(base: CampaignBase, _goal: WindsGoal, _workers: object, store: WindsStore, *_: object) -> None:
+        store.add(AskedFlight(0, 0, 5.0, 0), made_flight(base, 0))
+        raise Interrupted(signal.SIGINT)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(command, "find_winds", left)
+    assert main([*line, "--out", "out"]) == 130
+    Path("campaign").mkdir()
+    Path("campaign", "campaign.sqlite").write_bytes(b"another one's")
+    before = table(Path("out", WINDS_DATABASE))
+    holder = sqlite3.connect(Path("out", WINDS_DATABASE), isolation_level=None)
+    if words == "held by another process":
+        holder.execute("BEGIN IMMEDIATE")
+    capsys.readouterr()
+    assert main([*line, "--out", "out", *more]) == 2
+    holder.close()
+    told = [one for one in capsys.readouterr().err.splitlines() if one.startswith("planfly: ")]
+    assert len(told) == 1
+    assert words in told[0]
+    assert table(Path("out", WINDS_DATABASE)) == before
+    assert Path("campaign", "campaign.sqlite").read_bytes() == b"another one's"

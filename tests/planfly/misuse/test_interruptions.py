@@ -69,6 +69,8 @@ FEW = (
     Case(PAPER, "planning", 1.5, signal.SIGINT),
     Case(SERVE, "flight logs", 0.3, signal.SIGINT),
     Case(CAMPAIGN, "flying", 3.0, signal.SIGINT),
+    # It ends as a campaign does.
+    *((Case(("winds", *CAMPAIGN[1:]), "flying", 3.0, signal.SIGINT),) if SOAK else ()),
     # Kernels are compiled meanwhile.
     Case(("run", "jacksboro", "--out", "out"), "", 4.0, signal.SIGTERM, cold=True),
 )
@@ -196,7 +198,7 @@ def test_a_command_ends_at_once_and_whole(case: Case, inputs: Path, tmp_path: Pa
     assert code == (0 if case.argv[0] == "serve" else 128 + case.number), said
     assert took < LIMIT
     assert "Traceback" not in said
-    if case.argv[0] == "campaign":
+    if case.argv[0] in ("campaign", "winds"):
         (line,) = (line for line in said.splitlines() if "interrupted" in line)
         assert line.endswith("--resume goes on")
         assert "Warning" not in said

@@ -8,7 +8,7 @@ from logs.verdict.places import Place
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import failed_findings, fly_one, least_margins, lost_row
 from planfly.campaigns.spread.spread_file import parse_spread
-from planfly.campaigns.storage.store import same_flight
+from planfly.campaigns.storage.row_values import same_flight
 from planfly.open_mission import open_mission
 from planfly.pipeline import fly_and_judge
 from tests.planfly.campaigns.made_campaigns import write_short

@@ -10,7 +10,7 @@ from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import campaign_lines
 from planfly.campaigns.statistics.decision import Estimator, Goal
-from planfly.campaigns.storage.store import StoreError
+from planfly.campaigns.storage.held_table import StoreError
 from tests.planfly.campaigns.made_campaigns import all_fly
 
 GOAL = Goal(0.9, False, 40, 0.95)

@@ -1,6 +1,7 @@
 """The go/no-go chart's files."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 from planfly.campaigns.find_winds import WindsFound, WindsGoal
@@ -12,6 +13,7 @@ FOUND = WindsFound(
     WindsGoal(0.9, 0.95, 4, 20.0, 99),
     (*(WindBoundary(7.0 + k, 6.5 + k, 7.5 + k, False) for k in range(3)), WindBoundary(20.0, 18.0, 20.0, True)),
     ((0, 8.0, True), (0, 8.0, False), (1, 5.0, True), (2, 5.0, True), (3, 20.0, True)),
+    (1,),
 )
 
 
@@ -35,7 +37,14 @@ def test_data_picture_and_page(base: CampaignBase, tmp_path: Path) -> None:
     data = json.loads((tmp_path / "winds.json").read_text())
     assert [one["boundary_mps"] for one in data["directions"]] == [7.0, 8.0, 9.0, 20.0]
     assert data["directions"][3]["beyond"] is True
+    assert data["lost"] == [1]
     assert (tmp_path / "winds.png").read_bytes()[:4] == b"\x89PNG"
     page = (tmp_path / "winds.html").read_text()
     assert "over 20 m/s" in page
     assert page.count("<img") == 1
+    assert "lost      1 could not be flown" in page
+
+
+def test_flights_that_could_not_be_flown_are_named() -> None:
+    assert any(line.endswith("and count as not flyable: 1 (8.0 m/s from 0°)") for line in wind_lines(FOUND))
+    assert not any("lost" in line for line in wind_lines(replace(FOUND, lost=())))

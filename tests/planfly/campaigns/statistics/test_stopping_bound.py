@@ -97,8 +97,8 @@ def test_it_leaves_out_the_truth_in_at_most_a_twentieth(p: float, flights: int) 
 
 
 def looks(most: int) -> list[int]:
-    """Numbers of flights at which the campaigns are looked at: each up to 60, then a twentieth more each time."""
-    out = list(range(1, 61))
+    """Numbers of flights at which the campaigns are looked at: each up to 60, then a twentieth more; in a soak each."""
+    out = list(range(1, most + 1 if SOAK else 61))
     while out[-1] < most:
         out.append(math.ceil(1.05 * out[-1]))
     return out

@@ -1,0 +1,61 @@
+"""The table of a search for the largest winds: a row a flight, numbered in the order in which they are asked for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from planfly.campaigns.flights.flight_row import FlightRow
+from planfly.campaigns.storage.held_table import HeldTable, TableKind
+from planfly.campaigns.storage.row_values import ROW_COLUMNS, row_values
+
+WINDS_DATABASE = "winds.sqlite"
+# What decides which flights are asked for; of the number of flights, only how many are.
+FIXED = ("target", "confidence", "directions", "most")
+KIND = TableKind(
+    "planfly.winds-flights/1",
+    {
+        "flight": "INTEGER PRIMARY KEY",
+        "direction": "INTEGER NOT NULL",
+        "asked_speed": "REAL NOT NULL",
+        "draw": "INTEGER NOT NULL",
+        **ROW_COLUMNS,
+    },
+    FIXED,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class AskedFlight:
+    """A flight that a search asks for.
+
+    number: in the order of the search.
+    direction: counted from the north.  speed: of the mean wind, m/s.
+    draw: index of what varies about that wind; the same in all directions.
+    """
+
+    number: int
+    direction: int
+    speed: float
+    draw: int
+
+
+class WindsStore(HeldTable):
+    """A search's table, held by one process at a time."""
+
+    def __init__(self, path: Path, made_of: str, settings: dict[str, Any], *, resume: bool) -> None:
+        """Make the table, or open it to go on with the same question; settings: with `FIXED` among them."""
+        super().__init__(path, KIND, made_of, settings, resume=resume)
+
+    def add(self, asked: AskedFlight, row: FlightRow) -> None:
+        """Write a flight, for good.  Raises OSError for a full disk; what was written before stays."""
+        asked_for = {
+            "flight": asked.number, "direction": asked.direction, "asked_speed": asked.speed, "draw": asked.draw,
+        }  # fmt: skip
+        self.insert({**asked_for, **row_values(row, self.made_of)})
+
+    def known(self) -> dict[int, tuple[AskedFlight, str]]:
+        """Each flight there is and its outcome, by number."""
+        rows = self._connection.execute(
+            "SELECT flight, direction, asked_speed, draw, outcome FROM flights ORDER BY flight"
+        )
+        return {number: (AskedFlight(number, *asked), outcome) for number, *asked, outcome in rows}
