@@ -36,7 +36,7 @@ def campaign(args: argparse.Namespace) -> int:
     folder = Path(args.out) if args.out else default_campaign_folder(args.target, "campaign")
     again = args.resume or args.refly is not None
     if again and not (folder / DATABASE).is_file():
-        raise PlanflyError(f"{folder / DATABASE}: no campaign there to go on with")
+        raise PlanflyError(f"{folder / DATABASE}: no campaign there to go on with", file=folder / DATABASE)
     if not again:
         refuse_campaign(folder, args.overwrite)
     base = open_base(args, campaign_spread(args), folder if again else None)
@@ -46,7 +46,7 @@ def campaign(args: argparse.Namespace) -> int:
         keep_plan(base, folder)
     if args.refly is not None:
         if args.json:
-            raise PlanflyError("--json: goes with a campaign, not with --refly")
+            raise PlanflyError("--json: goes with a campaign, not with --refly", field="--json", value=args.json)
         return _refly(base, goal, folder, args.refly)
     return _fly(args, base, goal, folder)
 
@@ -72,7 +72,8 @@ def _refly(base: CampaignBase, goal: Goal, folder: Path, index: int) -> int:
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
-            raise PlanflyError(f"{store.path}: --refly {index}: no such flight; it has {store.tally().flown}, from 0")
+            allowed = f"no such flight; it has {store.tally().flown}, from 0"
+            raise PlanflyError.of_option("--refly", index, allowed, file=store.path)
     target = folder / "flights" / f"flight-{index:06d}.mcap"
     target.parent.mkdir(exist_ok=True)
     again = fly_row_again(base, row, target)
@@ -92,8 +93,8 @@ def keep_plan(base: CampaignBase, folder: Path) -> None:
 def refuse_campaign(folder: Path, overwrite: bool) -> None:
     """Refuse a folder that is a file, or that holds a campaign or anything else.  Raises PlanflyError."""
     if folder.exists() and not folder.is_dir():
-        raise PlanflyError(f"{folder}: is a file; a folder is expected")
+        raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
         holds = any((folder / name).exists() for name in CAMPAIGN_FILES)
         what = "holds a campaign; --resume goes on with it, " if holds else "exists and is not empty; "
-        raise PlanflyError(f"{folder}: {what}--overwrite replaces it")
+        raise PlanflyError(f"{folder}: {what}--overwrite replaces it", file=folder)
