@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aircraft.jsbsim_model import OURS, Model, read_model
+from world.errors import FlightError
 from world.scenario_tables import names_folder
 from world.text_files import did_you_mean, read_at_most, read_toml
 
@@ -120,7 +121,7 @@ def aircraft_names() -> tuple[str, ...]:
 def load_aircraft(name: str) -> Aircraft:
     """The embedded aircraft of this name.
 
-    Raises ValueError, in one line, for an unknown name or a metadata file with a missing, unknown or bad entry.
+    Raises FlightError, in one line, for an unknown name or a metadata file with a missing, unknown or bad entry.
 
     >>> aircraft = load_aircraft("aerosonde")
     >>> aircraft.mass, aircraft.airspeed
@@ -131,14 +132,16 @@ def load_aircraft(name: str) -> Aircraft:
         near = did_you_mean(name, known)
         # A folder's name alone is not how it is named.
         near = near or (f": did you mean './{name}'?" if Path(name).is_dir() else "")
-        raise ValueError(f"no aircraft called {name!r}{near} (known are {', '.join(known)}, and folders, with a slash)")
+        allowed = f"known are {', '.join(known)}, and folders, with a slash"
+        message = f"no aircraft called {name!r}{near} ({allowed})"
+        raise FlightError(message, file=name, allowed=allowed)
     return read_aircraft(_ROOT / name)
 
 
 def find_aircraft(name: str) -> Aircraft:
     """The embedded aircraft of this name, or the one in this folder if the name has a slash.
 
-    Raises ValueError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft` does.
 
     >>> find_aircraft("c172x").airspeed
     50.0
@@ -149,45 +152,48 @@ def find_aircraft(name: str) -> Aircraft:
 def read_aircraft(folder: Path) -> Aircraft:
     """The aircraft described by ``<folder>/<folder's name>.toml``.
 
-    Raises ValueError as `load_aircraft` does.
+    Raises FlightError as `load_aircraft` does.
     """
     file = folder / f"{folder.name}.toml"
     try:
         table = read_toml(file, "aircraft")
     except OSError as error:
-        raise ValueError(f"{file}: {error.strerror}") from None
+        raise FlightError(f"{file}: {error.strerror}", file=file) from None
     except ValueError as error:  # a TOML or a UTF-8 error
-        raise ValueError(f"{file}: {' '.join(str(error).split())}") from None
+        raise FlightError(f"{file}: {' '.join(str(error).split())}", file=file) from None
     title = table.pop("title", folder.name)
     if not isinstance(title, str):
-        raise ValueError(f"{file}: title = {title!r} is not a text")
+        raise FlightError(f"{file}: title = {title!r} is not a text", file=file, field="title", value=title)
     try:
         model = read_model(table.pop("model"), folder.name) if "model" in table else OURS
         values = _numbers(table)
-    except ValueError as error:
-        raise ValueError(f"{file}: {error}") from None
+    except FlightError as error:
+        raise FlightError.from_error(error, file) from None
     if not values["stall_speed"] <= values["airspeed_min"] <= values["airspeed"] <= values["airspeed_max"]:
-        raise ValueError(
+        raise FlightError(
             f"{file}: stall_speed_mps <= airspeed_min_mps <= airspeed_mps <= airspeed_max_mps does not hold:"
-            f" {values['stall_speed']}, {values['airspeed_min']}, {values['airspeed']}, {values['airspeed_max']}"
+            f" {values['stall_speed']}, {values['airspeed_min']}, {values['airspeed']}, {values['airspeed_max']}",
+            file=file,
+            field="airspeed_mps",
+            value=values["airspeed"],
         )
     return Aircraft(name=folder.name, title=title, folder=folder, model=model, **values)
 
 
 def _numbers(table: dict[str, Any]) -> dict[str, float]:
-    """The numeric fields of `Aircraft`; ValueError without the file's name."""
+    """The numeric fields of `Aircraft`; FlightError without the file's name."""
     store = _FUEL if set(_FUEL) & table.keys() else _BATTERY
     allowed = {*_KEYS, *store}
     missing, unknown = sorted(allowed - table.keys()), sorted(table.keys() - allowed)
     near = did_you_mean(unknown[0], missing) if unknown else ""
     # A key that is mistaken is missing, too: the mistake tells more.
     if missing and not near:
-        raise ValueError(f"missing {', '.join(missing)}")
+        raise FlightError(f"missing {', '.join(missing)}", field=missing[0])
     if unknown:
-        raise ValueError(f"unknown key {', '.join(unknown)}{near}")
+        raise FlightError(f"unknown key {', '.join(unknown)}{near}", field=unknown[0], value=table[unknown[0]])
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
-            raise ValueError(f"{key} = {value!r} is not a positive number")
+            raise FlightError(f"{key} = {value!r} is not a positive number", field=key, value=value)
     values = {field: table[key] * factor for key, (field, factor) in _KEYS.items()}
     first, second = (float(table[key]) for key in store)
     # Watt hours to joules, or kilograms of fuel times megajoules a kilogram.
@@ -201,7 +207,7 @@ def model_hash(aircraft: Aircraft) -> str:
     """SHA-256, as hex, over the names and contents of the model's XML and TOML files.
 
     Any change of the model changes it, so a cached envelope or an old log can say which model it belongs to.
-    Other files in the folder, such as guidance gains, do not count.  Raises ValueError for a file that cannot be read.
+    Other files in the folder, such as guidance gains, do not count.  Raises FlightError for a file that cannot be read.
 
     >>> len(model_hash(load_aircraft("aerosonde")))
     64
@@ -212,7 +218,8 @@ def model_hash(aircraft: Aircraft) -> str:
     try:
         return _hash_files(files, tuple((file.stat().st_mtime_ns, file.stat().st_size) for file in files))
     except OSError as error:
-        raise ValueError(f"{error.filename}: the aircraft model cannot be read: {error.strerror}") from None
+        message = f"{error.filename}: the aircraft model cannot be read: {error.strerror}"
+        raise FlightError(message, file=error.filename) from None
 
 
 @cache

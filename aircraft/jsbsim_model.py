@@ -5,6 +5,7 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from world.errors import FlightError
 from world.text_files import did_you_mean
 
 _COMMANDS = ("elevator", "aileron", "rudder", "throttle")
@@ -69,7 +70,7 @@ def read_model(table: object, aircraft: str) -> Model:
 
     aircraft: its name, which is that of JSBSim's own model where the table does not name another.
 
-    Raises ValueError, in one line that begins with the key, for an unknown, missing or bad entry.
+    Raises FlightError, in one line that begins with the key, for an unknown, missing or bad entry.
     """
     table = _table(table, "model", ("shipped_by_jsbsim", "engine_settles", "command", "reading"))
     commands = _table(table.get("command", {}), "model.command", _COMMANDS)
@@ -95,10 +96,10 @@ def read_model(table: object, aircraft: str) -> Model:
 
 def _table(value: object, key: str, known: tuple[str, ...]) -> dict[str, Any]:
     if not isinstance(value, dict):
-        raise ValueError(f"{key} = {value!r} is not a table")
+        raise FlightError(f"{key} = {value!r} is not a table", field=key, value=value)
     if unknown := sorted(value.keys() - set(known)):
         near = did_you_mean(unknown[0], sorted(set(known) - value.keys()))
-        raise ValueError(f"{key}: unknown key {', '.join(unknown)}{near}")
+        raise FlightError(f"{key}: unknown key {', '.join(unknown)}{near}", field=key, value=unknown[0])
     return value
 
 
@@ -108,14 +109,15 @@ def _shipped(table: dict[str, Any], aircraft: str) -> str:
     if isinstance(value, bool):
         return aircraft if value else ""
     if not isinstance(value, str) or _PLAIN.fullmatch(value) is None:
-        raise ValueError(f"model.shipped_by_jsbsim = {value!r} is not true, false or the name of a model of JSBSim's")
+        field, allowed = "model.shipped_by_jsbsim", "true, false or the name of a model of JSBSim's"
+        raise FlightError(f"{field} = {value!r} is not {allowed}", field=field, value=value, allowed=allowed)
     return value
 
 
 def _truth(table: dict[str, Any], name: str) -> bool:
     value = table.get(name, False)
     if not isinstance(value, bool):
-        raise ValueError(f"model.{name} = {value!r} is not true or false")
+        raise FlightError(f"model.{name} = {value!r} is not true or false", field=f"model.{name}", value=value)
     return value
 
 
@@ -130,5 +132,6 @@ def _entry(value: object, key: str, numbers: int) -> tuple[Any, ...]:
             for number in value[1:]
         )
     if not good or not isinstance(value, list):
-        raise ValueError(f"{key} = {value!r} is not a property and {numbers} number(s) other than 0")
+        allowed = f"a property and {numbers} number(s) other than 0"
+        raise FlightError(f"{key} = {value!r} is not {allowed}", field=key, value=value, allowed=allowed)
     return (value[0], *(float(number) for number in value[1:]))

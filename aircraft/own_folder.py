@@ -31,13 +31,12 @@ def make_own_folder(folder: Path, source: Aircraft) -> tuple[str, ...]:
     """
     target = folder.absolute()
     if _NAME.fullmatch(target.name) is None or target.name in _TAKEN:
-        raise FlightError(
-            f"{folder}: a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_TAKEN)}"
-        )
+        allowed = f"a folder's name of letters, digits, '.', '_' and '-' is expected, none of {', '.join(_TAKEN)}"
+        raise FlightError(f"{folder}: {allowed}", file=folder, value=target.name, allowed=allowed)
     if target.exists() or target.is_symlink():
-        raise FlightError(f"{folder}: exists; name a folder that does not")
+        raise FlightError(f"{folder}: exists; name a folder that does not", file=folder)
     if not target.parent.is_dir():
-        raise FlightError(f"{folder}: its folder {target.parent} does not exist")
+        raise FlightError(f"{folder}: its folder {target.parent} does not exist", file=folder)
     files = _renamed(source, target.name)
     write_folder(target, files)
     return tuple(sorted(files))

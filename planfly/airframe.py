@@ -9,7 +9,7 @@ from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
 from flight.ardupilot.tracking_error import tracking_error
 from flight.dynamics.envelope_tables import load_envelope
 from flight.simulation.flight_setup import make_limits
-from world.errors import ScenarioError
+from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 
 
@@ -82,10 +82,8 @@ def find_airframe(scenario: Scenario) -> tuple[Aircraft, float]:
     try:
         aircraft = find_aircraft(table.aircraft)
         model_hash(aircraft)
-    except ValueError as error:
-        raise ScenarioError(
-            f"{scenario.name}: flight.aircraft: {error}", file=scenario.name, field="flight.aircraft"
-        ) from error
+    except FlightError as error:
+        raise ScenarioError.from_error(error, scenario.name, "flight.aircraft", table.aircraft) from error
     return aircraft, aircraft.battery_energy / 3600.0 if table.battery_wh is None else table.battery_wh
 
 
@@ -93,15 +91,14 @@ def _airspeed(scenario: Scenario, aircraft: Aircraft, parameters: ArduPilotParam
     """Airspeed until a mission sets one, m/s: the scenario's, a parameter file's AIRSPEED_CRUISE, the aircraft's."""
     stated = {} if parameters is None else parameters.by_origin("file")
     if (airspeed := scenario.flight.airspeed_mps) is not None:
-        where = f"{scenario.name}: flight.airspeed_mps"
+        file, field = scenario.name, "flight.airspeed_mps"
     elif parameters is not None and "AIRSPEED_CRUISE" in stated:
-        airspeed, where = stated["AIRSPEED_CRUISE"], f"{parameters.source}: AIRSPEED_CRUISE"
+        airspeed, file, field = stated["AIRSPEED_CRUISE"], parameters.source, "AIRSPEED_CRUISE"
     else:
-        airspeed, where = aircraft.airspeed, aircraft.name
+        airspeed, file, field = aircraft.airspeed, aircraft.name, "airspeed"
     if not aircraft.airspeed_min <= airspeed <= aircraft.airspeed_max:
-        raise ScenarioError(
-            f"{where}: {airspeed:g}: {aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
-        )
+        allowed = f"{aircraft.name} flies {aircraft.airspeed_min:g}..{aircraft.airspeed_max:g}"
+        raise ScenarioError.at(file, field, airspeed, allowed, shown=f"{airspeed:g}")
     return airspeed
 
 

@@ -317,4 +317,4 @@ def _refuse_constant(name: str) -> float:
 
 def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
     if sorted(given) != sorted(wanted):
-        raise MissionError(f"{source}: {field}: keys {sorted(given)}: expected {sorted(wanted)}", file=source)
+        raise MissionError.at(source, field, sorted(given), f"keys {sorted(wanted)} are expected")

@@ -266,3 +266,38 @@ def test_a_modules_tests_are_found_by_its_name() -> None:
     assert len(modules) > 200
     without = [str(file) for file in modules if not (ROOT / "tests" / file.parent / f"test_{file.name}").is_file()]
     assert without == []
+
+
+def error_kinds() -> set[str]:
+    """Names of `PlanflyError` and of all that is made of it."""
+    kinds, before = {"PlanflyError"}, set[str]()
+    classes = [node for file in OURS for node in ast.walk(parsed(file)) if isinstance(node, ast.ClassDef)]
+    while kinds != before:
+        before = set(kinds)
+        kinds |= {node.name for node in classes if before & {ast.unparse(base) for base in node.bases}}
+    return kinds
+
+
+def placeless_errors(tree: ast.AST, kinds: set[str]) -> Iterator[str]:
+    """Errors made without a file and a field; a kind that a function is handed, `error: type[PlanflyError]`, counts."""
+    typed = {f"type[{kind}]" for kind in kinds}
+    named = (node for node in ast.walk(tree) if isinstance(node, ast.arg) and node.annotation)
+    handed = {node.arg for node in named if node.annotation and ast.unparse(node.annotation) in typed}
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name))
+    for call in calls:
+        # None: by **, of what a helper has put together.
+        given = {"file", "field", None} & {keyword.arg for keyword in call.keywords}
+        if ast.unparse(call.func) in kinds | handed and not given:
+            yield f"{call.lineno}: {ast.unparse(call)[:80]}"
+
+
+def test_every_error_carries_its_file_or_field_apart() -> None:
+    """By keyword, or through `PlanflyError.at`, `of_option` or `from_error`: a program need not take the line apart."""
+    # A flight that cannot begin: its first argument is the file.
+    kinds = error_kinds() - {"StartError"}
+    assert len(kinds) > 9
+    errors = "def f(e: type[LogError]) -> None:\n    raise {}\n"
+    bare = [f"{name}('a: b')" for name in (*kinds, "e")] + ["LogError('a', value=3, allowed='0..2')"]
+    assert all(list(placeless_errors(ast.parse(errors.format(one)), kinds)) for one in bare)
+    found = [f"{name_of(file)}:{one}" for file in OURS for one in placeless_errors(parsed(file), kinds)]
+    assert found == []

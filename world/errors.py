@@ -41,14 +41,50 @@ class PlanflyError(Exception):
     def at(cls, file: str | Path, field: str, value: Any, allowed: str, *, shown: str | None = None) -> Self:
         """An error of one value in one place, its message made of the four.
 
-        shown: the value as the message has it; None for as it prints.
+        shown: the value as the message has it; None for as it prints, "" for not at all.
 
         >>> error = ScenarioError.at("a.toml", "wind.speed_mps", 41.0, "allowed 0..40", shown="41")
         >>> print(error, "|", error.value)
         a.toml: wind.speed_mps: 41: allowed 0..40 | 41.0
+        >>> print(ScenarioError.at("a.toml", "name", None, "missing", shown=""))
+        a.toml: name: missing
         """
-        text = f"{file}: {field}: {value if shown is None else shown}: {allowed}"
+        parts = (file, field, value if shown is None else shown, allowed)
+        text = ": ".join(str(part) for part in (parts if shown != "" else (file, field, allowed)))
         return cls(text, file=file, field=field, value=value, allowed=allowed)
+
+    @classmethod
+    def of_option(
+        cls, option: str, value: Any, allowed: str, *, shown: str | None = None, file: str | Path = ""
+    ) -> Self:
+        """An error of an option of the command line.
+
+        shown: the value as the message has it; None for as it prints.  file: that the option is about, if any.
+
+        >>> error = FlightError.of_option("--bind", "127.0.0.1:70000", "a port 0..65535 is expected")
+        >>> print(error, "|", error.field, "|", error.value)
+        --bind 127.0.0.1:70000: a port 0..65535 is expected | --bind | 127.0.0.1:70000
+        """
+        begin = f"{file}: " if str(file) else ""
+        text = f"{begin}{option} {value if shown is None else shown}: {allowed}"
+        return cls(text, file=file, field=option, value=value, allowed=allowed)
+
+    @classmethod
+    def from_error(cls, error: "PlanflyError", file: str | Path = "", field: str = "", value: Any = None) -> Self:
+        """The same error as one of this kind, told of another place: what is known apart goes with it.
+
+        file, field, value: the place that led to it, which the message begins with; none leaves the message as it is.
+        They stand where the error itself names no field; else its own do, and its file if it has one.
+
+        >>> inner = FlightError("mine.toml: mass_kg = -1", file="mine.toml", field="mass_kg", value=-1)
+        >>> found = ScenarioError.from_error(inner, "tight", "flight.aircraft", "./mine")
+        >>> print(found, "|", found.file, found.field, found.value)
+        tight: flight.aircraft: mine.toml: mass_kg = -1 | mine.toml mass_kg -1
+        """
+        text = ": ".join(part for part in (str(file), field, str(error)) if part)
+        if field and not error.field:
+            return cls(text, file=file, field=field, value=value, allowed=error.allowed)
+        return cls(text, file=error.file or file, field=error.field, value=error.value, allowed=error.allowed)
 
 
 class ScenarioError(PlanflyError):
@@ -74,19 +110,19 @@ class ParameterError(PlanflyError):
 class StartError(FlightError):
     """A flight cannot begin as its mission has it: the aircraft and the place are known, and no flight begins there.
 
-    source: what asks for it.  reason: why not.
+    source: what asks for it.  reason: why not.  field, value, allowed: as of `PlanflyError`.
 
     >>> str(StartError("a.plan", "no way made"))
     'a.plan: no way made'
     """
 
-    def __init__(self, source: str, reason: str) -> None:
-        super().__init__(f"{source}: {reason}", file=source)
+    def __init__(self, source: str, reason: str, *, field: str = "", value: Any = None, allowed: str = "") -> None:
+        super().__init__(f"{source}: {reason}", file=source, field=field, value=value, allowed=allowed)
         self.reason = reason
 
-    def __reduce__(self) -> tuple[type["StartError"], tuple[str, str]]:
+    def __reduce__(self) -> tuple[type["StartError"], tuple[str, str], dict[str, Any]]:
         """What makes it again, in another process."""
-        return type(self), (self.file, self.reason)
+        return type(self), (self.file, self.reason), vars(self)
 
 
 class LogError(PlanflyError):

@@ -61,9 +61,8 @@ def open_raster(path: str, base: Path | None = None) -> RasterFile:
     if path in EMBEDDED:
         return open_npz(_OWN_FILES / EMBEDDED[path], path)
     if path.startswith("/vsi") or "://" in path:
-        raise TerrainError(
-            f"{path}: terrain path: only local files are read, not URLs or virtual file systems", file=path
-        )
+        allowed = "only local files are read, not URLs or virtual file systems"
+        raise TerrainError(f"{path}: terrain path: {allowed}", file=path, allowed=allowed)
     file = Path(path) if base is None else base / path
     if not file.is_file():
         known = ", ".join(sorted(EMBEDDED))
@@ -107,6 +106,8 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
             f"{raster.name}: area east {box[0, 0]:.0f}..{box[0, 1]:.0f} m, north {box[1, 0]:.0f}..{box[1, 1]:.0f} m "
             f"reaches beyond the tile, which covers {_tile_cover(raster, origin)}",
             file=raster.name,
+            field="area",
+            value=box.tolist(),
         )
     c0, c1, r0, r1 = _outline_window(raster, origin, box, buffer)
     left, right = max(0, math.floor(c0) - 1), min(cols, math.ceil(c1) + 2)
@@ -162,7 +163,8 @@ def _refuse_holes(terrain: Terrain, box: Floats, per_metre: Floats) -> None:
             east, north = place[:, int(np.argmax(inside))]
             raise TerrainError(
                 f"{terrain.source}: no data at east {east:.0f} m, north {north:.0f} m ({rows.size:,} of "
-                f"{terrain.heights.size:,} pixels in and about the area have none); choose an area with data"
+                f"{terrain.heights.size:,} pixels in and about the area have none); choose an area with data",
+                file=terrain.source,
             )
 
 
@@ -263,17 +265,17 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
     except (RasterioError, RasterioIOError, ValueError, TypeError, OSError) as error:
         raise TerrainError(f"{file}: not a readable {driver} file: {one_line(error)}", file=file) from error
     if bands != 1 or kind not in "iuf":
-        found = f"{bands} of kind {kind!r}"
-        raise TerrainError(f"{file}: bands: {found}; an elevation file has 1 band of numbers", file=file)
+        allowed = "an elevation file has 1 band of numbers"
+        raise TerrainError.at(file, "bands", bands, allowed, shown=f"{bands} of kind {kind!r}")
     if transformer is None or forward.determinant == 0.0:
         raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
     if (unit or "m").lower() not in METRES or metres != 1.0:
-        raise TerrainError(f"{file}: heights in {stated if metres != 1.0 else unit}: metres are expected", file=file)
+        raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
     if block > MOST_BLOCK:
         allowed = f"at most {MOST_BLOCK:,} are; tile the file"
-        raise TerrainError(f"{file}: blocks of {block:,} pixels, read whole: {allowed}", file=file, allowed=allowed)
+        raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
     if min(rows, cols) < 2:
-        raise TerrainError(f"{file}: size {cols} x {rows}: at least 2 x 2 pixels are expected", file=file)
+        raise TerrainError.at(file, "rows, columns", (rows, cols), "at least 2 x 2 pixels are expected")
 
     inverse = ~forward
     middle = _applied(forward, cols / 2, rows / 2)[0] if crs.is_geographic else math.nan

@@ -85,13 +85,14 @@ def open_npz(file: Path, name: str) -> RasterFile:
     if heights.ndim != 2 or min(heights.shape) < 2 or heights.dtype.kind not in "iuf":
         raise TerrainError(
             f"{name}: elevation: a 2-D array of numbers of at least 2 x 2 is expected,"
-            f" got {heights.dtype} of shape {heights.shape}"
-        )
+            f" got {heights.dtype} of shape {heights.shape}",
+            file=name, field="elevation", value=heights.shape,
+            allowed="a 2-D array of numbers of at least 2 x 2 is expected",
+        )  # fmt: skip
     west, east, south, north = _edges(edges, heights.shape[0])
     if not (-180.0 <= west < east <= 360.0 and -90.0 <= south < north <= 90.0):
-        raise TerrainError(
-            f"{name}: xmin..ymax: {edges}: degrees of longitude -180..360 and latitude -90..90 are expected"
-        )
+        allowed = "degrees of longitude -180..360 and latitude -90..90 are expected"
+        raise TerrainError.at(name, "xmin..ymax", edges, allowed)
     rows, cols = heights.shape
     pitch_x, pitch_y = (east - west) / cols, (north - south) / rows
 
@@ -131,15 +132,19 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
             # A few kilobytes of zeros unpack to gigabytes: ask before unpacking.
             size = max((entry.file_size for entry in archive.infolist()), default=0)
         if size > 8 * MOST_PIXELS:
-            raise TerrainError(f"{name}: {size:,} bytes unpacked: at most {8 * MOST_PIXELS:,} are read")
+            allowed = f"at most {8 * MOST_PIXELS:,} are read"
+            raise TerrainError(f"{name}: {size:,} bytes unpacked: {allowed}", file=name, value=size, allowed=allowed)
         with np.load(file, allow_pickle=False) as data:
             for key in ("elevation", *edges):
                 if key not in data.files:
-                    raise TerrainError(f"{name}: field {key}: missing (elevation, xmin, xmax, ymin, ymax)")
+                    message = f"{name}: field {key}: missing (elevation, xmin, xmax, ymin, ymax)"
+                    raise TerrainError(message, file=name, field=key)
             heights = np.asarray(data["elevation"])
             return heights, [float(np.asarray(data[key]).item()) for key in edges]
     # RuntimeError and NotImplementedError: an encrypted entry, an unknown compression.
     except MemoryError:
-        raise TerrainError(f"{name}: elevation: claims more than fits into memory") from None
+        raise TerrainError(
+            f"{name}: elevation: claims more than fits into memory", file=name, field="elevation"
+        ) from None
     except (OSError, ValueError, TypeError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error) as error:
-        raise TerrainError(f"{name}: not a readable .npz elevation file: {one_line(error)}") from error
+        raise TerrainError(f"{name}: not a readable .npz elevation file: {one_line(error)}", file=name) from error

@@ -237,7 +237,7 @@ def _open_terrain(table: TerrainTable, source: str, base: Path | None) -> tuple[
     try:
         raster = open_raster(path, base)
     except TerrainError as error:
-        raise TerrainError(f"{source}: terrain.path: {error}", file=source, field="terrain.path") from error
+        raise TerrainError.from_error(error, source, "terrain.path", path) from error
     if table.sha256 not in (None, raster.sha256):
         raise ScenarioError.at(source, "terrain.path", path, "the file has changed since (its SHA-256 differs)")
     if path not in EMBEDDED:

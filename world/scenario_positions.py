@@ -32,6 +32,7 @@ def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, gr
             f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
             " no terrain there to count a height from; give amsl_m",
             file=source,
+            field=key,
         )
     return np.array([east, north, under + (table.height_m or 0.0)])
 
@@ -43,19 +44,17 @@ def check_inside(
     for axis, name in enumerate(("east", "north")):
         low, high = bounds[axis]
         if not low <= point[axis] <= high:
-            raise ScenarioError(
-                f"{source}: {key}: {name} {point[axis]:.0f} m: outside the area {low:.0f}..{high:.0f}", file=source
-            )
+            shown, allowed = f"{name} {point[axis]:.0f} m", f"outside the area {low:.0f}..{high:.0f}"
+            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=shown)
+    amsl = f"{point[2]:.0f} m AMSL"
     if not floor <= point[2] <= ceiling:
-        raise ScenarioError(
-            f"{source}: {key}: {point[2]:.0f} m AMSL: outside floor..ceiling {floor:.0f}..{ceiling:.0f}", file=source
-        )
+        allowed = f"outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+        raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
     if ground is not None:
         under = float(ground.height(point[0], point[1]))
         if point[2] <= under:
-            raise ScenarioError(
-                f"{source}: {key}: {point[2]:.0f} m AMSL: not above the terrain, which is at {under:.0f} m", file=source
-            )
+            allowed = f"not above the terrain, which is at {under:.0f} m"
+            raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
 
 
 def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:

@@ -83,15 +83,14 @@ def _entry(line: str, where: TextLine) -> Entry:
     else:
         fields = _BETWEEN.split(line)
         if len(fields) != 2:
-            raise ParameterError(
-                f"{where}: {_shown(line)}: a name and a value are expected, or QGroundControl's five columns",
-                file=where.file,
-            )
+            allowed = "a name and a value are expected, or QGroundControl's five columns"
+            message = f"{where}: {_shown(line)}: {allowed}"
+            raise ParameterError(message, file=where.file, value=line, allowed=allowed)
         name, text = fields
     if not _NAME.fullmatch(name):
-        raise ParameterError(
-            f"{where}: name {_shown(name)}: up to 16 capitals, digits and _ are expected", file=where.file
-        )
+        allowed = "up to 16 capitals, digits and _ are expected"
+        message = f"{where}: name {_shown(name)}: {allowed}"
+        raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
     value = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(value):
         allowed = "a finite number is expected"

@@ -37,6 +37,7 @@ from flight.dynamics.jsbsim_properties import (
 from flight.dynamics.load_model import load_model
 from flight.dynamics.property_access import Getter, PropertyAccess, Setter
 from flight.dynamics.silence import silence
+from flight.dynamics.start_place import check_place
 from flight.dynamics.state import STATE
 from flight.dynamics.trim import Floats, Trim, air_velocity, body_axes, euler, first_guess, from_vector, solve
 from world.atomic_files import temporary_folder
@@ -109,7 +110,7 @@ class Fdm:
         tried: bool = False,
     ) -> None:
         if not 0.0 < rate_hz < math.inf:
-            raise FlightError(f"rate_hz = {rate_hz} is not a positive number")
+            raise FlightError(f"rate_hz = {rate_hz} is not a positive number", field="rate_hz", value=rate_hz)
         self.aircraft = aircraft
         self.dt = 1.0 / rate_hz
         self._exec = _load(aircraft, self.dt, flat_earth, tried or aircraft.embedded)
@@ -163,11 +164,9 @@ class Fdm:
         wind = np.array(wind_ned, dtype=np.float64)
         numbers = (lat_deg, lon_deg, amsl, course, airspeed, climb_angle, *wind.tolist(), terrain_amsl)
         if len(numbers) != 10 or not all(math.isfinite(number) for number in numbers):
-            raise FlightError(f"the start takes ten finite numbers, three of them the wind, and has {numbers}")
-        if abs(lat_deg) >= 90.0 or abs(lon_deg) > 180.0:
-            raise FlightError(f"start at latitude {lat_deg}, longitude {lon_deg}: not within +-90 and +-180 degrees")
-        if not terrain_amsl < amsl < 11000.0:
-            raise FlightError(f"start at {amsl} m above sea level: not between ground ({terrain_amsl} m) and 11000 m")
+            message = f"the start takes ten finite numbers, three of them the wind, and has {numbers}"
+            raise FlightError(message, field="start", value=numbers)
+        check_place(lat_deg, lon_deg, amsl, terrain_amsl)
         velocity = air_velocity(course, climb_angle, airspeed, wind)
         climb = math.asin(-velocity[2] / airspeed)
         self._at = (lat_deg, lon_deg, terrain_amsl)
@@ -178,8 +177,9 @@ class Fdm:
         if values is None:
             raise FlightError(
                 f"{self.aircraft.name} holds no steady flight at {airspeed:.1f} m/s,"
-                f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level"
-            )
+                f" {math.degrees(climb):+.1f} degrees to the air and {amsl:.0f} m above sea level",
+                file=self.aircraft.name, field="airspeed", value=airspeed,
+            )  # fmt: skip
         self.balance(values)
         if self._engine:
             self._engine.release()

@@ -39,7 +39,7 @@ class _Reader:
         self.data = b""
         self.read_names: dict[str, int] = {}  # with the line of the first use
         self.made_names: set[str] = set()
-        self.brings: dict[str, str] = {}  # file names, and where they are named
+        self.brings: dict[str, str] = {}  # file names, and where in this file they are named
         self.has_parts = False
         self._main, self._remove_channels = main, remove_channels
         self._channel_start = -1  # the byte at which the channel that is being removed begins
@@ -74,7 +74,8 @@ class _Reader:
         return bytes(data)
 
     def _refuse(self, what: str) -> None:
-        raise FlightError(f"{self.file}:{self._parser.CurrentLineNumber}: {what}; the model is refused")
+        where = f"{self.file}:{self._parser.CurrentLineNumber}"
+        raise FlightError(f"{where}: {what}; the model is refused", file=self.file)
 
     def _doctype(self, _name: str, _system: object, _public: object, internal: int) -> None:
         # One that only names a document type is never read; JSBSim's own files hold a few harmless entities.
@@ -96,7 +97,7 @@ class _Reader:
             self._channel_start = self._parser.CurrentByteIndex
             return
         if "file" in attributes:
-            where = f'{self.file}:{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
+            where = f'{self._parser.CurrentLineNumber}: <{name} file="{attributes["file"]}">'
             self.brings.setdefault(attributes["file"], where)
         self.has_parts |= name in _PARTS
         # Functions and flight control components make a property of their name; the latter put fcs/ before a bare one.
@@ -140,15 +141,17 @@ def check_model(
     property that is read and that neither JSBSim nor the model makes.
     """
     readers = {file.name: _read(file, main=True, remove_channels=shipped)}
-    waiting = dict(readers[file.name].brings)
+    waiting = [readers[file.name]]
     while waiting:
-        name, where = waiting.popitem()
-        found = _find(name, folders)
-        if found is None:
-            raise FlightError(f"{where} brings in another file, which is not in the aircraft's folder")
-        if found.name not in readers:
-            readers[found.name] = _read(found, main=False, remove_channels=shipped)
-            waiting |= readers[found.name].brings
+        reader = waiting.pop()
+        for name, where in reader.brings.items():
+            found = _find(name, folders)
+            if found is None:
+                message = f"{reader.file}:{where} brings in another file, which is not in the aircraft's folder"
+                raise FlightError(message, file=reader.file, field="file", value=name)
+            if found.name not in readers:
+                readers[found.name] = _read(found, main=False, remove_channels=shipped)
+                waiting.append(readers[found.name])
     if not shipped:
         _check_names(list(readers.values()), provided)
     return {name: reader.without_channels() for name, reader in readers.items()}
@@ -175,6 +178,5 @@ def _check_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) ->
         for name, line in reader.read_names.items():
             if name in made or (parts and _MADE_BY_PARTS.match(name)) or provided(name):
                 continue
-            raise FlightError(
-                f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model makes it"
-            )
+            message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model makes it"
+            raise FlightError(message, file=reader.file, field=name)

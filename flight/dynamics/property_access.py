@@ -24,7 +24,9 @@ class PropertyAccess:
         # A node that is asked for is made, so that it is looked for first.
         node = self._manager.get_node(name) if self._manager.hasNode(name) else None
         if node is None:
-            raise FlightError(f"{self._model_file}: property {name} is needed and not defined", file=self._model_file)
+            raise FlightError(
+                f"{self._model_file}: property {name} is needed and not defined", file=self._model_file, field=name
+            )
         return node
 
     def getter(self, name: str) -> Getter:

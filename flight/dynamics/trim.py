@@ -245,7 +245,8 @@ def air_velocity(course: float, climb: float, airspeed: float, wind: Floats) -> 
     if speed <= 0.0:
         raise FlightError(
             f"no way made along the course of {math.degrees(course):.0f} degrees:"
-            f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind"
-        )
+            f" airspeed {airspeed:.1f} m/s in {float(np.hypot(wind[0], wind[1])):.1f} m/s of wind",
+            field="airspeed", value=airspeed,
+        )  # fmt: skip
     velocity: Floats = speed * along - wind
     return velocity

@@ -165,5 +165,6 @@ def load_gains(aircraft: Aircraft) -> Gains:
             f"{file}: missing {', '.join(missing) or 'nothing'}; unknown {', '.join(unknown) or 'nothing'}"
             f"{did_you_mean(unknown[0], sorted(known - set(values))) if unknown else ''}",
             file=file,
+            field=(missing + unknown)[0],
         )
     return Gains(**values)

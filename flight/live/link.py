@@ -101,18 +101,15 @@ def check_access(access: Access) -> None:
         if is_loopback(host) or access.key is not None:
             continue
         if name == "--bind" and not access.allowed:
-            raise FlightError(
-                f"{name} {host}:{port}: beyond this machine: give --sign-key FILE or --allow IP,IP,"
-                " or bind to 127.0.0.1"
-            )
+            allowed = "beyond this machine: give --sign-key FILE or --allow IP,IP, or bind to 127.0.0.1"
+            raise FlightError.of_option(name, f"{host}:{port}", allowed)
         if name == "--to" and host not in access.allowed:
-            raise FlightError(f"{name} {host}:{port}: beyond this machine: give --sign-key FILE or --allow {host}")
+            allowed = f"beyond this machine: give --sign-key FILE or --allow {host}"
+            raise FlightError.of_option(name, f"{host}:{port}", allowed)
     far = [f"{host}:{port}" for host, port in access.to if not is_loopback(host)]
     if far and is_loopback(access.bind[0]):
-        raise FlightError(
-            f"--bind {access.bind[0]}:{access.bind[1]}: cannot reach {far[0]} from there; bind to an address of this"
-            " machine's network, or 0.0.0.0"
-        )
+        allowed = f"cannot reach {far[0]} from there; bind to an address of this machine's network, or 0.0.0.0"
+        raise FlightError.of_option("--bind", f"{access.bind[0]}:{access.bind[1]}", allowed)
 
 
 def is_loopback(host: str) -> bool:
@@ -148,7 +145,8 @@ class Link:
         except OSError as error:
             self._socket.close()
             host, port = access.bind
-            raise FlightError(f"--bind {host}:{port}: {error.strerror}") from error
+            message = f"--bind {host}:{port}: {error.strerror}"
+            raise FlightError(message, field="--bind", value=f"{host}:{port}") from error
         self._socket.setblocking(False)
 
     def close(self) -> None:

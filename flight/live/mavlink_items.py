@@ -8,7 +8,7 @@ import math
 from enum import IntEnum
 from typing import Any
 
-from flight.mission.items import FENCES, Command, MissionItem, is_located, item_problem, on_grid
+from flight.mission.items import FENCES, Command, ItemProblem, MissionItem, is_located, item_problem, on_grid
 from world.errors import MissionError
 
 _INT32_MAX = 2**31 - 1
@@ -84,8 +84,9 @@ def from_message(message: Any, source: str) -> MissionItem:
     )
     for name, value in (*zip(("p1", "p2", "p3", "p4"), params, strict=True), ("altitude", item.alt)):
         if math.isinf(value):
-            raise MissionError(f"{source}: item {item.seq}: {name} {value:g}: a finite number, or NaN for unset")
-    problem = item_problem(item)
-    if problem is not None:
-        raise MissionError(f"{source}: item {item.seq}: {problem}")
+            problem = ItemProblem(name, value, "a finite number, or NaN for unset")
+            raise MissionError(**problem.at(source, f"{source}: item {item.seq}"))
+    fault = item_problem(item)
+    if fault is not None:
+        raise MissionError(**fault.at(source, f"{source}: item {item.seq}"))
     return item

@@ -47,17 +47,20 @@ def read_key(path: Path) -> bytes:
         with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                raise FlightError(f"{path}: not a plain file: a signing key is expected")
+                raise FlightError(f"{path}: not a plain file: a signing key is expected", file=path)
             own = getattr(os, "getuid", None)
             # Where users have no numbers, modes do not say who reads a file.
             if own is not None and (status.st_uid != own() or stat.S_IMODE(status.st_mode) & 0o077):
                 mode = stat.S_IMODE(status.st_mode)
-                raise FlightError(f"{path}: mode {mode:03o}: a signing key is its owner's alone to read (chmod 600)")
+                allowed = "a signing key is its owner's alone to read (chmod 600)"
+                message = f"{path}: mode {mode:03o}: {allowed}"
+                raise FlightError(message, file=path, field="mode", value=f"{mode:03o}", allowed=allowed)
             data = file.read(_LARGEST_KEY + 1).strip()
     except OSError as error:
-        raise FlightError(f"{path}: cannot be read: {error.strerror}") from error
+        raise FlightError(f"{path}: cannot be read: {error.strerror}", file=path) from error
     if not 8 <= len(data) <= _LARGEST_KEY:
-        raise FlightError(f"{path}: {len(data)} bytes: a key of 64 hexadecimal digits or a passphrase of 8..1024")
+        allowed = "a key of 64 hexadecimal digits or a passphrase of 8..1024"
+        raise FlightError(f"{path}: {len(data)} bytes: {allowed}", file=path, value=len(data), allowed=allowed)
     if re.fullmatch(rb"[0-9a-fA-F]{64}", data):
         return bytes.fromhex(data.decode())
     return hashlib.sha256(data).digest()

@@ -32,7 +32,8 @@ def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str 
                 east, north = to_map(origin, first.lat_deg, first.lon_deg)
                 shape = make_cylinder(float(east), float(north), first.params[0])
         except ValueError as error:
-            raise MissionError(f"{source}: fence item {first.seq}: {error}", file=source) from error
+            item = f"fence item {first.seq}"
+            raise MissionError(f"{source}: {item}: {error}", file=source, field=item) from error
         kind: ZoneKind = "inclusion" if first.command in INCLUSIONS else "exclusion"
         zones.append(Zone(f"fence item {first.seq}", kind, shape))
     return tuple(zones)

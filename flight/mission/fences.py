@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem
+from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem
 from flight.mission.zone_fences import fence_item, zone_fences
 from world.airspace.zones import Zone, make_cylinder
 from world.errors import MissionError
@@ -37,9 +37,8 @@ def fence_shapes(fences: tuple[MissionItem, ...], source: str = "fence") -> list
         if len(shape) < count or any(
             corner.command != item.command or (count > 1 and corner.params[0] != item.params[0]) for corner in shape
         ):
-            raise MissionError(
-                f"{source}: fence item {item.seq}: p1 {item.params[0]:g}: fewer corners follow than it counts"
-            )
+            problem = ItemProblem("p1", item.params[0], "fewer corners follow than it counts")
+            raise MissionError(**problem.at(source, f"{source}: fence item {item.seq}"))
         shapes.append(shape)
         k += count
     return shapes

@@ -91,9 +91,9 @@ def mission_origin(mission: Mission, stops: tuple[ItineraryStop, ...]) -> GeoOri
     positions = [item for item in mission.items if item.has_position and item.seq >= first.item]
     lat, lon = (positions[0].lat_deg, positions[0].lon_deg) if positions else (first.lat_deg, first.lon_deg)
     if abs(lat) > 89.0:
-        raise MissionError(
-            f"{mission.source}: latitude {lat:.7f}: a mission is flown within -89..89 degrees", file=mission.source
-        )
+        allowed = "a mission is flown within -89..89 degrees"
+        message = f"{mission.source}: latitude {lat:.7f}: {allowed}"
+        raise MissionError(message, file=mission.source, field="latitude", value=lat, allowed=allowed)
     origin = GeoOrigin(lat, lon)
     home = mission.home
     if home is not None and abs(home.lat_deg) <= 89.0:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
+from typing import Any, NamedTuple
 
 # Most items that a mission file may hold, and the largest file (bytes): far beyond what any autopilot stores.
 MOST_ITEMS = 20_000
@@ -229,55 +230,71 @@ def renumbered(mission: Mission) -> Mission:
     return replace(mission, items=tuple(items))
 
 
-def position_problem(lat_deg: float, lon_deg: float) -> str | None:
-    """Fault of a latitude and longitude in degrees, as "field value: allowed range"; None if nothing is."""
+class ItemProblem(NamedTuple):
+    """Fault of an item: the field, the value there, and what is allowed or amiss; as text "field value: allowed"."""
+
+    field: str
+    value: float
+    allowed: str
+
+    def __str__(self) -> str:
+        return f"{self.field} {self.value:.10g}: {self.allowed}"
+
+    def at(self, file: str, where: object) -> dict[str, Any]:
+        """What makes a `MissionError` of it: file: that holds the item.  where: what the message begins with."""
+        return {"message": f"{where}: {self}", "file": file, **self._asdict()}
+
+
+def position_problem(lat_deg: float, lon_deg: float) -> ItemProblem | None:
+    """Fault of a latitude and longitude in degrees; None if nothing is."""
     if abs(lat_deg) > 90.0:
         swapped = " (latitude and longitude swapped?)" if abs(lon_deg) <= 90.0 else ""
-        return f"latitude {lat_deg:.10g}: allowed -90..90 degrees{swapped}"
+        return ItemProblem("latitude", lat_deg, f"allowed -90..90 degrees{swapped}")
     if abs(lon_deg) > 180.0:
-        return f"longitude {lon_deg:.10g}: allowed -180..180 degrees"
+        return ItemProblem("longitude", lon_deg, "allowed -180..180 degrees")
     return None
 
 
-def item_problem(item: MissionItem) -> str | None:
-    """Fault of an item that no autopilot could make sense of, as "field value: allowed"; None if nothing is.
+def item_problem(item: MissionItem) -> ItemProblem | None:
+    """Fault of an item that no autopilot could make sense of; None if nothing is.
 
-    >>> item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0))
-    'latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)'
+    >>> print(item_problem(MissionItem(1, 16, 0, (0.0,) * 4, 91.0, 8.0, 75.0)))
+    latitude 91: allowed -90..90 degrees (latitude and longitude swapped?)
     """
     if item.frame not in _FRAMES:
-        return f"frame {item.frame}: allowed {', '.join(map(str, _FRAMES))}"
+        return ItemProblem("frame", item.frame, f"allowed {', '.join(map(str, _FRAMES))}")
     for k, value in enumerate(item.params, 1):
         if abs(value) > _FLOAT32:
-            return f"p{k} {value:g}: beyond what MAVLink carries (3.4e38)"
+            return ItemProblem(f"p{k}", value, "beyond what MAVLink carries (3.4e38)")
     if is_located(item.command, item.frame):
         wrong = position_problem(item.lat_deg, item.lon_deg)
         if wrong is None and not (_LOWEST <= item.alt <= _HIGHEST or math.isnan(item.alt)):
-            wrong = f"altitude {item.alt:.10g}: allowed {_LOWEST:.0f}..{_HIGHEST:.0f} m"
+            wrong = ItemProblem("altitude", item.alt, f"allowed {_LOWEST:.0f}..{_HIGHEST:.0f} m")
         return wrong or _count_problem(item)
     for name, value in (("latitude", item.lat_deg), ("longitude", item.lon_deg)):
         if abs(value) > _INT32:
-            return f"{name} {value:g}: beyond what MISSION_ITEM_INT carries (2147483647)"
+            return ItemProblem(name, value, "beyond what MISSION_ITEM_INT carries (2147483647)")
     if abs(item.alt) > _FLOAT32:
-        return f"altitude {item.alt:g}: beyond what MAVLink carries (3.4e38)"
+        return ItemProblem("altitude", item.alt, "beyond what MAVLink carries (3.4e38)")
     if item.command in PLACES | TAKEOFFS | LANDINGS and (item.lat_deg or item.lon_deg):
-        return f"frame {item.frame}: has no coordinates, and {command_name(item.command)} gives some; 2 is for the rest"
+        allowed = f"has no coordinates, and {command_name(item.command)} gives some; 2 is for the rest"
+        return ItemProblem("frame", item.frame, allowed)
     return _count_problem(item)
 
 
-def _count_problem(item: MissionItem) -> str | None:
+def _count_problem(item: MissionItem) -> ItemProblem | None:
     """Fault of the parameters that count something."""
     p1, p2 = item.params[:2]
     if item.command == Command.DO_JUMP:
         if not (p1 >= 0 and p1 == int(p1)):
-            return f"p1 {p1:g}: a jump's target is an item's number"
+            return ItemProblem("p1", p1, "a jump's target is an item's number")
         if not (p2 >= -1 and p2 == int(p2)):
-            return f"p2 {p2:g}: a jump's count is a whole number, or -1 for without end"
+            return ItemProblem("p2", p2, "a jump's count is a whole number, or -1 for without end")
     if item.command in (Command.NAV_LOITER_TURNS, Command.NAV_LOITER_TIME) and p1 < 0:
-        return f"p1 {p1:g}: turns and seconds to loiter cannot be negative"
+        return ItemProblem("p1", p1, "turns and seconds to loiter cannot be negative")
     if item.command in (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION):
         if not (p1 >= 3 and p1 == int(p1)):
-            return f"p1 {p1:g}: a fence polygon has a whole number of corners, at least 3"
+            return ItemProblem("p1", p1, "a fence polygon has a whole number of corners, at least 3")
     elif item.command in FENCES and not p1 > 0:
-        return f"p1 {p1:g}: a fence circle's radius is above 0 m"
+        return ItemProblem("p1", p1, "a fence circle's radius is above 0 m")
     return None

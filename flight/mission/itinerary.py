@@ -12,6 +12,7 @@ from flight.mission.items import (
     Command,
     Frame,
     Home,
+    ItemProblem,
     Mission,
     MissionItem,
     command_name,
@@ -122,6 +123,7 @@ def make_itinerary(mission: Mission) -> Itinerary:
             raise MissionError(
                 f"{mission.source}: item {item.seq}: more than {MOST_STOPS:,} places to fly to, jumps unrolled",
                 file=mission.source,
+                field=f"item {item.seq}",
             )
         if walk.ended:
             break
@@ -146,6 +148,7 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
             raise MissionError(
                 f"{mission.source}: item {item.seq}: jumps lead through more than {_MOST_STEPS:,} items",
                 file=mission.source,
+                field=f"item {item.seq}",
             )
         k += 1
         yield item
@@ -153,10 +156,8 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
             continue
         target, repeats = int(item.params[0]), int(item.params[1])
         if target not in index:
-            raise MissionError(
-                f"{mission.source}: item {item.seq}: DO_JUMP p1 {target}: the mission has no item {target}",
-                file=mission.source,
-            )
+            problem = ItemProblem("DO_JUMP p1", target, f"the mission has no item {target}")
+            raise MissionError(**problem.at(mission.source, f"{mission.source}: item {item.seq}"))
         if repeats < 0 and item.seq in jumped:
             walk.notes.add("DO_JUMP without end: taken once; the flight ends there", item.seq)
             walk.endless = item.seq
@@ -213,9 +214,8 @@ class _Walk:
                 self.notes.add(f"{name} in the air: not flown", item.seq)
             return
         if math.isnan(item.alt):
-            raise MissionError(
-                f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected", file=self.source
-            )
+            message = f"{self.source}: item {item.seq}: {name} has no altitude: a number is expected"
+            raise MissionError(message, file=self.source, field="altitude", allowed="a number is expected")
         self.takeoff = item
         over_home = replace(self._stop(item), lat_deg=self.home.lat_deg, lon_deg=self.home.lon_deg)
         goes_on = item.has_position and (item.lat_deg, item.lon_deg) != (self.home.lat_deg, self.home.lon_deg)

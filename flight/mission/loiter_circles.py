@@ -100,9 +100,9 @@ def lay_circles(
         up = laid[-1].position[2]
         points += laid
         if len(points) > MOST_STOPS:
-            raise MissionError(
-                f"{source}: item {node.stop.item}: more than {MOST_STOPS:,} places, circles laid out", file=source
-            )
+            item = f"item {node.stop.item}"
+            message = f"{source}: {item}: more than {MOST_STOPS:,} places, circles laid out"
+            raise MissionError(message, file=source, field=item)
     return points
 
 
@@ -137,9 +137,9 @@ def _turn(source: str, stop: ItineraryStop, loiter: Loiter, up: float, notes: No
     """Signed radius of a loiter, m."""
     radius = abs(loiter.radius)
     if radius > WIDEST:
-        raise MissionError(
-            f"{source}: item {stop.item}: loiter radius {radius:g} m: allowed up to {WIDEST:,.0f}", file=source
-        )
+        allowed = f"allowed up to {WIDEST:,.0f}"
+        message = f"{source}: item {stop.item}: loiter radius {radius:g} m: {allowed}"
+        raise MissionError(message, file=source, field="loiter radius", value=radius, allowed=allowed)
     if radius == 0.0:
         radius = own_radius(stop.airspeed, up)
         notes.add(f"loiter without a radius: flown with {radius:.0f} m", stop.item)
@@ -197,11 +197,9 @@ def _around(
         part = (side * (onward - into)) % (2.0 * math.pi)
         sweep = part + 2.0 * math.pi * max(0, math.ceil((wanted - part) / (2.0 * math.pi) - 1e-9))
     if sweep > MOST_STOPS * CORNER:
-        raise MissionError(
-            f"{source}: item {node.stop.item}: {sweep / (2.0 * math.pi):,.0f} turns to loiter: at most"
-            f" {MOST_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown",
-            file=source,
-        )
+        turns, allowed = sweep / (2.0 * math.pi), f"at most {MOST_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
+        item = f"item {node.stop.item}"
+        raise MissionError.at(source, item, turns, allowed, shown=f"{turns:,.0f} turns to loiter")
     count = max(1, math.ceil(sweep / CORNER - 1e-9))
     step = sweep / count
     points = []

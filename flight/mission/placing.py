@@ -114,6 +114,8 @@ def on_map(source: str, stops: tuple[ItineraryStop, ...], origin: GeoOrigin) -> 
             f" {MAP_EXTENT / 1000:.0f} km from the map's origin at {origin.lat_deg:.5f}, {origin.lon_deg:.5f}"
             " (columns swapped, or a sign lost?)",
             file=source,
+            field=_name(stop),
+            value=(stop.lat_deg, stop.lon_deg),
         )
     return points
 
@@ -135,9 +137,8 @@ class _Heights:
         """Height of a stop; ``last``: the one before, NaN at the first."""
         if math.isnan(stop.alt):
             if math.isnan(last):
-                raise MissionError(
-                    f"{self.source}: {_name(stop)}: no altitude, and none before to keep", file=self.source
-                )
+                message = f"{self.source}: {_name(stop)}: no altitude, and none before to keep"
+                raise MissionError(message, file=self.source, field="altitude")
             return last
         if stop.frame in AMSL:
             height = stop.alt
@@ -146,19 +147,17 @@ class _Heights:
         else:
             height = self._ground(stop, east, north) + stop.alt
         if not LOWEST <= height <= HIGHEST:
-            raise MissionError(
-                f"{self.source}: {_name(stop)}: {height:.1f} m AMSL: allowed {LOWEST:.0f}..{HIGHEST:.0f}",
-                file=self.source,
-            )
+            allowed = f"allowed {LOWEST:.0f}..{HIGHEST:.0f}"
+            raise MissionError.at(self.source, _name(stop), height, allowed, shown=f"{height:.1f} m AMSL")
         return height
 
     def _ground(self, stop: ItineraryStop, east: float, north: float) -> float:
-        asked = f"{self.source}: {_name(stop)}: height above terrain (frame {stop.frame})"
-        if self.terrain is None:
-            raise MissionError(f"{asked}: no terrain is given to count from")
-        under = float(self.terrain.height(east, north))
+        terrain = self.terrain
+        under = math.nan if terrain is None else float(terrain.height(east, north))
         if math.isnan(under):
-            raise MissionError(f"{asked}: {self.terrain.source} has no data there")
+            asked = f"{self.source}: {_name(stop)}: height above terrain (frame {stop.frame})"
+            lacks = "no terrain is given to count from" if terrain is None else f"{terrain.source} has no data there"
+            raise MissionError(f"{asked}: {lacks}", file=self.source, field="frame", value=stop.frame)
         return under
 
     def _over_home(self, stop: ItineraryStop) -> float:
@@ -231,6 +230,7 @@ def _merge(source: str, kept: PlacedStop, new: PlacedStop, notes: Notes) -> Itin
                 f"{source}: {_name(after)}: {abs(climb):.1f} m straight {side} {_name(before)}:"
                 " no fixed wing flies that; places differ by 1 m or more across the ground, or in nothing",
                 file=source,
+                field=_name(after),
             )
         notes.add(f"the {abs(climb):.0f} m to climb or sink on the spot are flown on the leg that follows", after.item)
     else:

@@ -10,6 +10,7 @@ import math
 from flight.mission.fences import numbered
 from flight.mission.items import Command, Frame, MissionItem, on_grid, position_problem
 from world.errors import MissionError
+from world.text_files import TextLine
 
 # Corners of such a fence at most: ArduPilot numbered them in a byte.
 MOST_POINTS = 255
@@ -38,7 +39,7 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     >>> [(item.command, item.params[0], item.lat_deg) for item in parse_fence_points("\n".join(square), "fence.txt")]
     [(5001, 4.0, 36.5), (5001, 4.0, 36.5), (5001, 4.0, 36.51), (5001, 4.0, 36.51)]
     """
-    points = [_point(f"{source}:{number}", line) for number, line in _lines(text)]
+    points = [_point(TextLine(source, number), line) for number, line in _lines(text)]
     if len(points) > MOST_POINTS:
         raise MissionError(f"{source}: {len(points)} points: at most {MOST_POINTS} are read", file=source)
     ring = points if points[0] == points[-1] else points[1:]
@@ -59,14 +60,15 @@ def _lines(text: str) -> list[tuple[int, str]]:
     return [(number, line.strip()) for number, line in lines if line.strip() and not line.lstrip().startswith("#")]
 
 
-def _point(where: str, line: str) -> tuple[float, float]:
+def _point(where: TextLine, line: str) -> tuple[float, float]:
     try:
         lat, lon = (float(part) for part in line.split())
     except ValueError:
         lat = lon = math.nan
     if not (math.isfinite(lat) and math.isfinite(lon)):
-        raise MissionError(f"{where}: {line[:40]!r}: a latitude and a longitude are expected")
+        allowed = "a latitude and a longitude are expected"
+        raise MissionError(f"{where}: {line[:40]!r}: {allowed}", file=where.file, value=line, allowed=allowed)
     problem = position_problem(lat, lon)
     if problem is not None:
-        raise MissionError(f"{where}: {problem}")
+        raise MissionError(**problem.at(where.file, where))
     return on_grid(lat), on_grid(lon)

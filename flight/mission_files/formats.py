@@ -119,5 +119,5 @@ def _read_text(path: Path) -> str:
         raise MissionError(f"{path}: text in UTF-16: a mission file is UTF-8 or ASCII", file=path)
     if b"\0" in data:
         line = data.count(b"\n", 0, data.index(b"\0")) + 1
-        raise MissionError(f"{path}:{line}: a NUL byte: a text file is expected")
+        raise MissionError(f"{path}:{line}: a NUL byte: a text file is expected", file=path)
     return utf8_text(data, path, MissionError)

@@ -12,6 +12,7 @@ from world.errors import MissionError
 
 _TRANSECTS = ("survey", "CorridorScan")
 _LANDING = "fwLandingPattern"
+_COORDINATE = "latitude, longitude and altitude are expected"
 
 
 def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any]:
@@ -25,30 +26,29 @@ def expand_items(items: list[Any], source: str, warnings: list[str]) -> list[Any
         if kind == "SimpleItem":
             out.append(item)
             continue
-        where = f"{source}: mission.items.{k}"
+        place = f"mission.items.{k}"
         name = str(item.get("complexItemType", ""))[:40] if kind == "ComplexItem" else ""
         if name in _TRANSECTS:
-            made = _transects(item, where, name)
+            made = _transects(item, source, place, name)
         elif name == _LANDING:
-            made = _landing(item, where, _last_number(out) + 1)
+            made = _landing(item, source, place, _last_number(out) + 1)
         else:
-            raise MissionError(
-                f"{where}.type: {json.dumps(kind)[:40]} {name!r}: only SimpleItem, {', '.join(_TRANSECTS)} and"
-                f" {_LANDING} are read; have the ground station turn it into items first"
-            )
-        warnings.append(f"{where}: {name} taken as the {len(made)} simple items that it stands for")
+            known = f"only SimpleItem, {', '.join(_TRANSECTS)} and {_LANDING} are read"
+            allowed = f"{known}; have the ground station turn it into items first"
+            shown = f"{json.dumps(kind)[:40]} {name!r}"
+            raise MissionError.at(source, f"{place}.type", name or kind, allowed, shown=shown)
+        warnings.append(f"{source}: {place}: {name} taken as the {len(made)} simple items that it stands for")
         out += made
     return out
 
 
-def _transects(item: dict[str, Any], where: str, name: str) -> list[Any]:
+def _transects(item: dict[str, Any], source: str, place: str, name: str) -> list[Any]:
     held = item.get("TransectStyleComplexItem")
     items = held.get("Items") if isinstance(held, dict) else None
     if not isinstance(items, list) or not items:
-        raise MissionError(
-            f"{where}.TransectStyleComplexItem.Items: {name!r} without its items: a list is expected;"
-            " have the ground station save the plan anew"
-        )
+        field, shown = f"{place}.TransectStyleComplexItem.Items", f"{name!r} without its items"
+        allowed = "a list is expected; have the ground station save the plan anew"
+        raise MissionError.at(source, field, items, allowed, shown=shown)
     return items
 
 
@@ -58,18 +58,23 @@ def _last_number(items: list[Any]) -> int:
     return number if isinstance(number, int) else len(items)
 
 
-def _landing(item: dict[str, Any], where: str, number: int) -> list[Any]:
+def _landing(item: dict[str, Any], source: str, place: str, number: int) -> list[Any]:
     """DO_LAND_START, the way in (a spiral down, or a waypoint), and LAND, as QGC sends them."""
-    approach = _coordinate(item, "landingApproachCoordinate", where) or _coordinate(item, "loiterCoordinate", where)
-    land = _coordinate(item, "landCoordinate", where)
+
+    def read(key: str) -> list[Any] | None:
+        return _coordinate(item, key, source, place)
+
+    approach = read("landingApproachCoordinate") or read("loiterCoordinate")
+    land = read("landCoordinate")
     if approach is None or land is None:
         key = "landCoordinate" if land is None else "landingApproachCoordinate"
-        raise MissionError(f"{where}.{key}: missing: latitude, longitude and altitude are expected")
+        raise MissionError.at(source, f"{place}.{key}", None, _COORDINATE, shown="missing")
     relative = item.get("altitudesAreRelative", True)
     frame = Frame.GLOBAL_RELATIVE_ALT if relative else Frame.GLOBAL
     radius = item.get("loiterRadius", 0.0)
     if isinstance(radius, bool) or not isinstance(radius, int | float) or not 0.0 <= radius <= 1e5:
-        raise MissionError(f"{where}.loiterRadius: {json.dumps(radius)[:40]}: 0..100000 m is expected")
+        shown = json.dumps(radius)[:40]
+        raise MissionError.at(source, f"{place}.loiterRadius", radius, "0..100000 m is expected", shown=shown)
     turn = float(radius) if item.get("loiterClockwise", True) else -float(radius)
     spiral = item.get("useLoiterToAlt", True)
     into = (
@@ -93,10 +98,10 @@ def _landing(item: dict[str, Any], where: str, number: int) -> list[Any]:
     ]
 
 
-def _coordinate(item: dict[str, Any], key: str, where: str) -> list[Any] | None:
+def _coordinate(item: dict[str, Any], key: str, source: str, place: str) -> list[Any] | None:
     value = item.get(key)
     if value is None:
         return None
     if not isinstance(value, list) or len(value) != 3:
-        raise MissionError(f"{where}.{key}: {json.dumps(value)[:40]}: latitude, longitude and altitude are expected")
+        raise MissionError.at(source, f"{place}.{key}", value, _COORDINATE, shown=json.dumps(value)[:40])
     return value

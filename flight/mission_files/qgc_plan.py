@@ -113,12 +113,11 @@ def parse_plan_file(text: str, source: str) -> Mission:
         raise MissionError(**first_fault(error, data).at(source)) from error
     items = [_read_item(item, k, source) for k, item in enumerate(file.mission.items)]
     if not items:
-        raise MissionError(f"{source}: mission.items: no items")
+        raise MissionError(f"{source}: mission.items: no items", file=source, field="mission.items")
     for k, (before, after) in enumerate(pairwise(items), 1):
         if after.seq <= before.seq:
-            raise MissionError(
-                f"{source}: mission.items.{k}.doJumpId: {after.seq}: must be above the one before, {before.seq}"
-            )
+            allowed = f"must be above the one before, {before.seq}"
+            raise MissionError.at(source, f"mission.items.{k}.doJumpId", after.seq, allowed)
     lost = [item for item in items if item.command in PLACES | LANDINGS and not item.has_position]
     if lost:
         name = command_name(lost[0].command)
@@ -137,9 +136,10 @@ def parse_plan_file(text: str, source: str) -> Mission:
 def _check_kind(data: Any, source: str) -> list[str]:
     """Refuse what is no plan before its missing keys are named, and expand its items; returns warnings."""
     if not isinstance(data, dict):
-        raise MissionError(f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}')
-    if data.get("fileType") != "Plan":
-        raise MissionError(f'{source}: fileType: {json.dumps(data.get("fileType"))[:60]}: "Plan" is expected')
+        message = f'{source}: a JSON object with fileType "Plan" is expected, got {type(data).__name__}'
+        raise MissionError(message, file=source, field="fileType")
+    if (kind := data.get("fileType")) != "Plan":
+        raise MissionError.at(source, "fileType", kind, '"Plan" is expected', shown=json.dumps(kind)[:60])
     warnings: list[str] = []
     mission = data.get("mission")
     if isinstance(mission, dict) and isinstance(mission.get("items"), list):
@@ -160,7 +160,7 @@ def _read_item(item: _Item, k: int, source: str) -> MissionItem:
     read = MissionItem(seq, item.command, item.frame, (p1, p2, p3, p4), lat, lon, alt, item.autoContinue)
     problem = item_problem(read)
     if problem is not None:
-        raise MissionError(f"{source}: mission.items.{k} (item {seq}): {problem}")
+        raise MissionError(**problem.at(source, f"{source}: mission.items.{k} (item {seq})"))
     return read
 
 
@@ -171,7 +171,7 @@ def _read_home(values: list[float | None] | None, source: str) -> Home | None:
     read = MissionItem(0, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0, 0.0, 0.0, 0.0), lat, lon, alt + 0.0)
     problem = item_problem(read)
     if problem is not None:
-        raise MissionError(f"{source}: mission.plannedHomePosition: {problem}")
+        raise MissionError(**problem.at(source, f"{source}: mission.plannedHomePosition"))
     return Home(on_grid(lat), on_grid(lon), alt + 0.0) if read.has_position else None
 
 
@@ -184,7 +184,7 @@ def _read_fences(fence: _GeoFence, source: str) -> tuple[MissionItem, ...]:
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(f"{source}: geoFence.{where}: {problem}")
+            raise MissionError(**problem.at(source, f"{source}: geoFence.{where}"))
         found.append(item)
 
     for k, shape in enumerate(fence.polygons):
@@ -209,7 +209,7 @@ def _read_rally(rally: _Rally, source: str) -> tuple[MissionItem, ...]:
         )
         problem = item_problem(item)
         if problem is not None:
-            raise MissionError(f"{source}: rallyPoints.points.{k}: {problem}")
+            raise MissionError(**problem.at(source, f"{source}: rallyPoints.points.{k}"))
         found.append(item)
     return tuple(found)
 

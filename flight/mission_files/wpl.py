@@ -129,7 +129,7 @@ def _row(where: TextLine, line: str) -> _Row:
     )
     problem = item_problem(item)
     if problem is not None:
-        raise MissionError(f"{where}: {problem}", file=where.file)
+        raise MissionError(**problem.at(where.file, where))
     return _Row(where, bool(whole["current"]), item)
 
 

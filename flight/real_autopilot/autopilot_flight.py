@@ -110,8 +110,8 @@ class AutopilotFlight(Airborne):
         try:
             yield
         except FlightError as error:
-            text = str(error)
-            raise FlightError(text if text.startswith(str(self._binary)) else f"{self._binary}: {text}") from error
+            named = str(error).startswith(str(self._binary))
+            raise FlightError.from_error(error, "" if named else self._binary) from error
 
     def _make_rail(self, setup: FlightSetup) -> RailEnd:
         """Trim the aircraft where it is let go: before the first waypoint, straight and level, over no ground."""

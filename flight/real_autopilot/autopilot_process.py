@@ -128,13 +128,13 @@ class AutopilotProcess:
         """Raise FlightError where the program has panicked or ended, with its last words."""
         panic = self._panic()
         if panic:
-            raise FlightError(f"panicked: {panic}")
+            raise FlightError(f"panicked: {panic}", file=self.binary)
         code = self._process.poll()
         if code is None:
             return
         how = f"was ended by {signal.Signals(-code).name}" if code < 0 else f"ended with exit code {code}"
         words = self._lines()
-        raise FlightError(how + (f": {words[-1]}" if words else ""))
+        raise FlightError(how + (f": {words[-1]}" if words else ""), file=self.binary, field="exit code", value=code)
 
     def end(self, answer: Callable[[], bool]) -> None:
         """Ask the program to end, so that it closes its log; kill it where it does not.

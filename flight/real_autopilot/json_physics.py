@@ -73,11 +73,12 @@ def parse_servo_packet(data: bytes) -> ServoPacket:
     magic = int.from_bytes(data[:2], "little")
     form = _OUTPUTS.get(magic)
     if form is None or len(data) != form.size:
-        allowed = " or ".join(f"{magic} with {count} outputs" for magic, count in MAGIC.items())
+        allowed = " or ".join(f"{known} with {count} outputs" for known, count in MAGIC.items())
         raise FlightError(
             f"speaks another version of the physics interface: a packet of {len(data)} bytes that begins with {magic};"
-            f" allowed: {allowed}"
-        )
+            f" allowed: {allowed}",
+            field="packet", value=magic, allowed=allowed,
+        )  # fmt: skip
     numbers = form.unpack(data)
     return ServoPacket(numbers[2], numbers[3:])
 

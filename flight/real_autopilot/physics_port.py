@@ -61,7 +61,8 @@ class PhysicsPort:
                     self._frame = packet.frame
                     return packet
                 if packet.frame < self._frame:
-                    raise FlightError(f"began anew in the air: frame {packet.frame} after frame {self._frame}")
+                    message = f"began anew in the air: frame {packet.frame} after frame {self._frame}"
+                    raise FlightError(message, field="frame", value=packet.frame)
                 # What was asked while the answer was on its way has had it.
                 if self._clock() - self._answered > _ON_ITS_WAY:
                     self._send(self._last)
@@ -72,9 +73,10 @@ class PhysicsPort:
                 if data:
                     raise FlightError(
                         f"does not understand the physics it is sent: asked for frame {self._frame} again for"
-                        f" {SILENCE:.0f} s (another version of the interface?)"
-                    )
-                raise FlightError(f"silent for {SILENCE:.0f} s; ended")
+                        f" {SILENCE:.0f} s (another version of the interface?)",
+                        field="frame", value=self._frame,
+                    )  # fmt: skip
+                raise FlightError(f"silent for {SILENCE:.0f} s; ended", field="frame", value=self._frame)
 
     def answer(self, data: bytes) -> None:
         """Tell the autopilot of the aircraft after the frame received last."""

@@ -6,6 +6,7 @@ what has been told meanwhile.
 
 import time
 from collections.abc import Callable, Generator, Iterable
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -57,6 +58,17 @@ class _Since:
         return self._now() - began > seconds and self._clock() - by_clock > min(seconds, _BY_THE_CLOCK)
 
 
+class _Awaited(NamedTuple):
+    """Something that an autopilot has to come to.
+
+    field: its name.  seconds: within so many.  failed: what is said where it does not.
+    """
+
+    field: str
+    seconds: float
+    failed: str
+
+
 class Preflight:
     """The conversation with one autopilot.
 
@@ -72,11 +84,13 @@ class Preflight:
     def meet(self, parameters: Iterable[str]) -> Talk:
         """Learn who it is and which of these parameters it has; raises FlightError for what is no ArduPlane."""
         news = self._news
-        yield from self._until(lambda: news.vehicle is not None, SPEAKS, "said nothing over MAVLink", self._say_hello)
+        heard = _Awaited("heartbeat", SPEAKS, "said nothing over MAVLink")
+        yield from self._until(lambda: news.vehicle is not None, heard, self._say_hello)
         if news.vehicle != mavlink.MAV_TYPE_FIXED_WING:
             raise FlightError(
-                f"is no ArduPlane: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies"
-            )
+                f"is no ArduPlane: its heartbeat says vehicle type {news.vehicle}; 1, a fixed wing, flies",
+                field="vehicle type", value=news.vehicle, allowed="1, a fixed wing, flies",
+            )  # fmt: skip
         for message, interval in _WANTED.items():
             self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, message, interval)
         self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
@@ -93,8 +107,7 @@ class Preflight:
         news = self._news
         yield from self._until(
             lambda: news.ekf & _EKF_NEEDED == _EKF_NEEDED and not news.ekf & _EKF_LOST,
-            KNOWS,
-            "did not come to know where it is (EKF)",
+            _Awaited("EKF", KNOWS, "did not come to know where it is (EKF)"),
             lambda: self._command(
                 mavlink.MAV_CMD_SET_MESSAGE_INTERVAL,
                 mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT,
@@ -113,16 +126,16 @@ class Preflight:
             lambda: self._command(Command.DO_SET_MODE, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, AUTO),
             "AUTO",
         )
-        yield from self._until(lambda: news.mode == AUTO and news.armed, ANSWERS, "is not in AUTO, armed")
+        under_way = _Awaited("AUTO", ANSWERS, "is not in AUTO, armed")
+        yield from self._until(lambda: news.mode == AUTO and news.armed, under_way)
 
-    def _until(
-        self, done: Callable[[], bool], seconds: float, failed: str, again: Callable[[], None] | None = None
-    ) -> Talk:
+    def _until(self, done: Callable[[], bool], awaited: _Awaited, again: Callable[[], None] | None = None) -> Talk:
         """Wait until something holds, asking for it each second; raise FlightError where it does not come to."""
         started, asked = self._since(), None
         while not done():
-            if started.longer_than(seconds):
-                raise FlightError(f"{failed} within {seconds:.0f} s{self._last_text()}")
+            if started.longer_than(awaited.seconds):
+                message = f"{awaited.failed} within {awaited.seconds:.0f} s{self._last_text()}"
+                raise FlightError(message, field=awaited.field)
             if again is not None and (asked is None or asked.longer_than(_AGAIN)):
                 asked = self._since()
                 again()
@@ -159,8 +172,7 @@ class Preflight:
         acknowledged.pop(int(command), None)
         yield from self._until(
             lambda: acknowledged.get(int(command)) == mavlink.MAV_RESULT_ACCEPTED,
-            ANSWERS,
-            f"refused {what} ({command_name(int(command))})",
+            _Awaited(what, ANSWERS, f"refused {what} ({command_name(int(command))})"),
             ask,
         )
 
@@ -189,7 +201,8 @@ class Preflight:
                     else (f" at item {asked} ({command_name(items[asked].command)})")
                 )
                 name = "no answer" if result is None else _MISSION_RESULTS.get(result, str(result))
-                raise FlightError(f"refused the mission{item}: {name}{self._last_text()}")
+                message = f"refused the mission{item}: {name}{self._last_text()}"
+                raise FlightError(message, field="mission", value=name)
             yield from self._wait(_AGAIN)
 
     def _offer(self, items: list[MissionItem]) -> Talk:

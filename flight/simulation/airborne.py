@@ -133,7 +133,7 @@ class Airborne(ABC):
         under = self._ground.height(east, north)
         if not math.isnan(under) and up <= under:
             reason = f"start at {up:.0f} m AMSL: not above the terrain, which is at {under:.0f} m"
-            raise StartError(setup.mission.source, reason)
+            raise StartError(setup.mission.source, reason, field="start", value=up)
         lat, lon = (float(value) for value in to_geo(setup.scenario.origin, east, north))
         step = points[1] - points[0]
         # A map course is the true course and this.
@@ -163,7 +163,8 @@ class Airborne(ABC):
             try:
                 trimmed = self.fdm.start(*begin, 0.0, start.wind, start.ground)
             except FlightError as error:
-                raise StartError(source, str(error)) from error
+                known = {"field": error.field, "value": error.value, "allowed": error.allowed}
+                raise StartError(source, str(error), **known) from error
         self._work.commands = tuple(trimmed.commands())
         self._work.air.wind_north, self._work.air.wind_east = start.wind[:2]
         # All that blows is set as a gust.

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from aircraft.catalog import load_aircraft
 from flight.simulation.track import Track
+from world.errors import FlightError
 
 # A control counts as at its limit within this share of its range.
 _EDGE = 1e-3
@@ -24,7 +25,7 @@ def control_limits(aircraft: str) -> list[tuple[str, float]]:
     """
     try:
         known = load_aircraft(aircraft)
-    except ValueError:
+    except FlightError:
         limits = (math.nan, math.nan, math.nan)
     else:
         limits = (known.max_elevator, known.max_aileron, known.max_rudder)

@@ -156,7 +156,8 @@ class Flight(Airborne):
             start = replace(start, slope=0.0, airspeed=min(self.fdm.aircraft.airspeed_max, true))
         level = straight(model, reference, start.amsl)
         if level is None:
-            raise StartError(setup.aircraft, f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL")
+            reason = f"no level flight at {reference:.1f} m/s and {start.amsl:.0f} m AMSL"
+            raise StartError(setup.aircraft, reason, field="airspeed", value=reference)
         self._trim(setup.mission.source, start)
         memory = self.memory
         memory.trim_elevator, memory.trim_alpha = level.elevator, level.alpha

@@ -62,7 +62,8 @@ def parquet_bytes(log: FlightLog) -> bytes:
         import pyarrow as pa
         from pyarrow import parquet
     except ImportError as error:
-        raise PlanflyError(".parquet: the package pyarrow is not installed (extra: planfly[tables])") from error
+        allowed = "the package pyarrow is not installed (extra: planfly[tables])"
+        raise PlanflyError(f".parquet: {allowed}", field="suffix", value=".parquet", allowed=allowed) from error
     scenario = log.setup.scenario
     about = {
         "planfly.scenario": scenario.name,

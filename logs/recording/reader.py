@@ -238,7 +238,7 @@ def read_log(path: Path | str) -> FlightLog:
 
 def _check_magic(magic: bytes, path: Path) -> None:
     if not magic:
-        raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path, field="empty")
+        raise LogError(f"{path}: empty: a flight log (.mcap) is expected", file=path)
     if magic != MAGIC:
         raise LogError(f"{path}: not an MCAP file (it starts with {magic!r}): a flight log is expected", file=path)
 

@@ -171,9 +171,10 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         raise LogError(**first_fault(error).at(source, SETUP_FILE)) from error
     for name, digest in file.sha256.items():
         if name not in attachments:
-            raise LogError(f"{source}: {name}: missing; {SETUP_FILE} lists it", file=source)
+            raise LogError(f"{source}: {name}: missing; {SETUP_FILE} lists it", file=source, field=name)
         if hashlib.sha256(attachments[name]).hexdigest() != digest:
-            raise LogError(f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}", file=source)
+            message = f"{source}: {name}: altered: its SHA-256 is not the one in {SETUP_FILE}"
+            raise LogError(message, file=source, field=name)
     listed = {name: attachments[name] for name in file.sha256}
     terrain = unpack_terrain(listed, source) if TERRAIN_FILE in listed else None
     scenario = _scenario(listed, source, terrain, file.external)
@@ -218,9 +219,10 @@ def _text(attachments: dict[str, bytes], name: str, source: str) -> str:
     try:
         return attachments[name].decode()
     except KeyError:
-        raise LogError(f"{source}: {name}: missing", file=source) from None
+        raise LogError(f"{source}: {name}: missing", file=source, field=name) from None
     except UnicodeDecodeError as error:
-        raise LogError(f"{source}: {name}: not a text in UTF-8 (byte {error.start})", file=source) from error
+        message = f"{source}: {name}: not a text in UTF-8 (byte {error.start})"
+        raise LogError(message, file=source, field=name) from error
 
 
 def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | None, external: bool) -> Scenario:
@@ -228,12 +230,12 @@ def _scenario(attachments: dict[str, bytes], source: str, terrain: Terrain | Non
     try:
         spec = json.loads(_text(attachments, SCENARIO_FILE, source))
     except (ValueError, RecursionError) as error:
-        raise LogError(f"{where}: not valid JSON: {error}") from error
+        raise LogError(f"{where}: not valid JSON: {error}", file=where) from error
     _refuse_outside_terrain(spec, terrain, where)
     try:
         return from_spec(spec, where, ground=terrain, external=external)
     except PlanflyError as error:
-        raise LogError(str(error)) from error
+        raise LogError.from_error(error) from error
 
 
 def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -> Plan:
@@ -242,12 +244,12 @@ def _plan(attachments: dict[str, bytes], source: str, terrain: Terrain | None) -
     try:
         data = json.loads(text)
     except (ValueError, RecursionError) as error:
-        raise LogError(f"{where}: not valid JSON: {error}") from error
+        raise LogError(f"{where}: not valid JSON: {error}", file=where) from error
     _refuse_outside_terrain(data.get("scenario") if isinstance(data, dict) else None, terrain, where)
     try:
         return parse_plan(text, where, ground=terrain)
     except PlanflyError as error:
-        raise LogError(str(error)) from error
+        raise LogError.from_error(error) from error
 
 
 def _refuse_outside_terrain(spec: Any, terrain: Terrain | None, where: str) -> None:
@@ -255,4 +257,4 @@ def _refuse_outside_terrain(spec: Any, terrain: Terrain | None, where: str) -> N
     table = spec.get("terrain") if isinstance(spec, dict) else None
     kind = table.get("kind") if isinstance(table, dict) else None
     if terrain is None and kind != "none":
-        raise LogError(f"{where}: terrain.kind: {kind!r}: the log holds no {TERRAIN_FILE}")
+        raise LogError.at(where, "terrain.kind", kind, f"the log holds no {TERRAIN_FILE}", shown=repr(kind))

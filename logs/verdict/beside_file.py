@@ -89,7 +89,7 @@ def parse_beside(text: str | bytes, source: str) -> FlownBeside:
     rules = [rule for rule, _ in airframe.failed] if airframe is not None else []
     unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULES]
     if unknown:
-        raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source)
+        raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])
     return FlownBeside(
         None if airframe is None else airframe.answer(),
         None if deciding is None else deciding.parameter(),

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import overload
 
 from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft
-from world.errors import FlightError
 
 
 @overload
@@ -25,7 +24,4 @@ def aircraft(name: str | Path | None = None) -> Aircraft | dict[str, Aircraft]:
     """
     if name is None:
         return {known: load_aircraft(known) for known in aircraft_names()}
-    try:
-        return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)
-    except ValueError as error:
-        raise FlightError(str(error), file=name) from error
+    return find_aircraft(str(name.resolve()) if isinstance(name, Path) else name)

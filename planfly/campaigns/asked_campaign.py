@@ -25,7 +25,8 @@ def campaign_goal(args: argparse.Namespace) -> Goal:
     try:
         return make_goal(args.flights, args.prove, args.at_least, args.confidence)
     except ValueError as error:
-        raise PlanflyError(f"--{error}") from error
+        name = str(error).partition(":")[0]
+        raise PlanflyError(f"--{error}", field=f"--{name}", value=getattr(args, name, None)) from error
 
 
 def campaign_spread(args: argparse.Namespace) -> FlightSpread:

@@ -35,7 +35,8 @@ def aircraft(args: argparse.Namespace) -> int:
     if args.new is not None:
         return _make_folder(args)
     if args.source is not None:
-        raise PlanflyError("--from: goes with --new FOLDER, the folder to make")
+        allowed = "goes with --new FOLDER, the folder to make"
+        raise PlanflyError(f"--from: {allowed}", field="--from", value=args.source, allowed=allowed)
     if args.name is None:
         for name in aircraft_names():
             known = load_aircraft(name)
@@ -82,19 +83,18 @@ def _find(name: str) -> "tuple[Aircraft, str]":
     from world.text_files import whole_path
 
     if names_folder(name) and not Path(name).exists():
-        raise PlanflyError(f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it")
-    try:
-        chosen = find_aircraft(whole_path(Path(name)) if names_folder(name) else name)
-        return chosen, model_hash(chosen)
-    except ValueError as error:
-        raise PlanflyError(str(error)) from error
+        message = f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it"
+        raise PlanflyError(message, file=name)
+    chosen = find_aircraft(whole_path(Path(name)) if names_folder(name) else name)
+    return chosen, model_hash(chosen)
 
 
 def _make_folder(args: argparse.Namespace) -> int:
     from aircraft.own_folder import make_own_folder
 
     if args.name is not None:
-        raise PlanflyError(f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with")
+        message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
+        raise PlanflyError(message, field="--new", value=args.new)
     folder = Path(args.new)
     source, _ = _find(args.source or "aerosonde")
     files = make_own_folder(folder, source)

@@ -36,7 +36,7 @@ def campaign(args: argparse.Namespace) -> int:
     base = open_base(args, campaign_spread(args), folder, DATABASE, again=again)
     if args.refly is not None:
         if args.json:
-            raise PlanflyError("--json: goes with a campaign, not with --refly")
+            raise PlanflyError("--json: goes with a campaign, not with --refly", field="--json", value=args.json)
         return _refly(base, goal, folder, args.refly)
     return _fly(args, base, goal, folder)
 
@@ -60,7 +60,8 @@ def _refly(base: CampaignBase, goal: Goal, folder: Path, index: int) -> int:
     with open_store(base, goal, folder, resume=True) as store:
         row = store.flight(index)
         if row is None:
-            raise PlanflyError(f"{store.path}: --refly {index}: no such flight; it has {store.tally().flown}, from 0")
+            allowed = f"no such flight; it has {store.tally().flown}, from 0"
+            raise PlanflyError.of_option("--refly", index, allowed, file=store.path)
     target = folder / "flights" / f"flight-{index:06d}.mcap"
     target.parent.mkdir(exist_ok=True)
     again = fly_row_again(base, row, target)

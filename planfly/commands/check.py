@@ -24,7 +24,8 @@ def check(args: argparse.Namespace) -> int:
     source = Path(args.file)
     if is_field_log(source):
         if args.fence:
-            raise ScenarioError(f"{source}: --fence: goes with a log of planfly's: import this one first")
+            allowed = "goes with a log of planfly's: import this one first"
+            raise ScenarioError.at(source, "--fence", args.fence, allowed, shown="")
         return _check_field_log(source, args)
     _refuse_field_options(source, args)
     fences = read_named_fences(args.fence)
@@ -60,8 +61,9 @@ def _check_field_log(source: Path, args: argparse.Namespace) -> int:
 def _refuse_field_options(source: Path, args: argparse.Namespace) -> None:
     """Refuse what only a log of the field can take.  Raises ScenarioError."""
     for name in ("plan", "flight", "datum"):
-        if getattr(args, name, None) is not None:
-            raise ScenarioError(f"{source}: --{name}: goes with a log of the field, not with this file")
+        if (value := getattr(args, name, None)) is not None:
+            allowed = "goes with a log of the field, not with this file"
+            raise ScenarioError.at(source, f"--{name}", value, allowed, shown="")
 
 
 def _open_log(source: Path, args: argparse.Namespace, fences: NamedFences) -> FlightLog:
@@ -72,14 +74,11 @@ def _open_log(source: Path, args: argparse.Namespace, fences: NamedFences) -> Fl
     names = ("aircraft", "airspeed", "wind", "turbulence", "params", "guidance")
     given = [name for name in names if getattr(args, name) is not None]
     if given:
-        raise ScenarioError(
-            f"{source}: --{given[0]}: a log is judged with the aircraft, the speeds, the wind and the autopilot it was"
-            " flown with"
-        )
+        allowed = "a log is judged with the aircraft, the speeds, the wind and the autopilot it was flown with"
+        raise ScenarioError.at(source, f"--{given[0]}", getattr(args, given[0]), allowed, shown="")
     if args.scenario:
-        raise ScenarioError(
-            f"{source}: --scenario: a log is judged in the scenario it carries; only --terrain replaces its ground"
-        )
+        allowed = "a log is judged in the scenario it carries; only --terrain replaces its ground"
+        raise ScenarioError.at(source, "--scenario", args.scenario, allowed, shown="")
     log = read_log(source)
     setup = log.setup
     if args.terrain:

@@ -58,7 +58,8 @@ def export(args: argparse.Namespace) -> int:
     fences = read_named_fences(args.fence)
     if path.is_file() and is_log(path):
         if args.fence:
-            raise MissionError(f"{path}: --fence: a log is exported with the fence that it was flown with")
+            allowed = "a log is exported with the fence that it was flown with"
+            raise MissionError.at(path, "--fence", args.fence, allowed, shown="")
         source = _read_log(path)
     else:
         _refuse_flown(path, targets)
@@ -87,15 +88,18 @@ def _refuse_unknown(target: Path) -> None:
     try:
         mission_kind(target)
     except MissionError:
-        allowed = ", ".join([*KINDS, *MAPS, *LOGS])
-        raise MissionError(f"{target}: suffix {target.suffix!r}: allowed {allowed}") from None
+        allowed = f"allowed {', '.join([*KINDS, *MAPS, *LOGS])}"
+        message = f"{target}: suffix {target.suffix!r}: {allowed}"
+        raise MissionError(message, file=target, field="suffix", value=target.suffix, allowed=allowed) from None
 
 
 def _refuse_flown(path: Path, targets: list[Path]) -> None:
     """Refuse to write of a plan or a mission what is about a flight."""
     for target in targets:
-        if target.suffix.lower() in LOGS:
-            raise MissionError(f"{target}: {target.suffix} is written of a flight log (.mcap), and {path} is none")
+        suffix = target.suffix
+        if suffix.lower() in LOGS:
+            message = f"{target}: {suffix} is written of a flight log (.mcap), and {path} is none"
+            raise MissionError(message, file=target, field="suffix", value=suffix)
 
 
 def _kind(target: Path) -> str:
@@ -130,7 +134,7 @@ def _read_log(path: Path) -> _Source:
 def _read_mission(path: Path, maps: bool, fences: NamedFences) -> _Source:
     """A plan or a mission file; a map, zones and a plan's fence want its place, too, which not every mission has."""
     if not path.is_file():
-        raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected")
+        raise MissionError(f"{path}: no such file; a plan.json, mission file or log is expected", file=path)
     is_plan = path.suffix.lower() == ".json"
     if not (maps or is_plan or fences.zones):
         return _Source(fences.on_mission(read_mission(path)), path.stem)
@@ -161,7 +165,7 @@ def _text(source: _Source, target: Path) -> tuple[str | bytes, str]:
     if kind in _HOLDS:
         count = len(mission.fences if kind == "fence" else mission.rally)
         if not count:
-            raise MissionError(f"{mission.source}: no {_HOLDS[kind]} to write to {target}")
+            raise MissionError(f"{mission.source}: no {_HOLDS[kind]} to write to {target}", file=mission.source)
         return mission_text(mission, kind), f"{count} {_HOLDS[kind]}"
     extra = ""
     if kind == "plan" and (mission.fences or mission.rally):

@@ -102,16 +102,19 @@ def _prepare(args: argparse.Namespace, scenario: Scenario) -> tuple[Scenario, Pl
         scenario = with_planner(scenario, "--budget", budget=evaluations)
     if args.old is None:
         if args.at_leg is not None or args.add_threat:
-            option = "--at-leg" if args.at_leg is not None else "--add-threat"
-            raise ScenarioError(f"{option}: only with --from PLAN.json, the plan that is being flown")
+            option, value = ("--at-leg", args.at_leg) if args.at_leg is not None else ("--add-threat", args.add_threat)
+            allowed = "only with --from PLAN.json, the plan that is being flown"
+            raise ScenarioError(f"{option}: {allowed}", field=option, value=value, allowed=allowed)
         return scenario, None
     if args.at_leg is None:
-        raise ScenarioError("--from: --at-leg K is missing: the leg that is about to be flown")
+        message = "--from: --at-leg K is missing: the leg that is about to be flown"
+        raise ScenarioError(message, field="--from", value=args.old)
     old = read_plan(Path(args.old))
     same_mission(scenario, old)
     for east, north, _, _ in args.add_threat or ():
         if scenario.terrain is not None and math.isnan(scenario.terrain.height(east, north)):
-            raise ScenarioError(f"--add-threat: east {east:g} m, north {north:g} m: outside the terrain that is known")
+            message = f"--add-threat: east {east:g} m, north {north:g} m: outside the terrain that is known"
+            raise ScenarioError(message, field="--add-threat", value=(east, north))
     kept = [table for table in old.scenario.spec.threats if table not in scenario.spec.threats]
     return with_threats(scenario, args.add_threat or [], "--add-threat", kept), old
 

@@ -18,7 +18,7 @@ def recover(args: argparse.Namespace) -> int:
     source = Path(args.log)
     target = Path(args.out) if args.out else source.with_name(f"{source.stem}-recovered.mcap")
     if args.out is None and target.exists() and not args.overwrite:
-        raise PlanflyError(f"{target}: exists; --overwrite replaces it, --out names another")
+        raise PlanflyError(f"{target}: exists; --overwrite replaces it, --out names another", file=target)
     refuse_existing(target, args.overwrite)
     recovered = recover_log(source)
     if recovered is None:

@@ -24,7 +24,8 @@ _HOME, _TO_LINE_END, _TO_END = "\x1b[H", "\x1b[K", "\x1b[J"
 def replay(args: argparse.Namespace) -> int:
     """Instruments on a terminal, the timeline elsewhere, or what the options name; 3 for a log that is cut short."""
     if bool(args.foxglove) + bool(args.movie) + isinstance(args.to, str) > 1:
-        raise PlanflyError("--foxglove, --movie, --to IP:PORT: one of them is expected")
+        options = "--foxglove, --movie, --to IP:PORT"
+        raise PlanflyError(f"{options}: one of them is expected", field=options, allowed="one of them is expected")
     log = read_log(Path(args.log))
     # Each target loads what it alone needs.
     if isinstance(args.to, str):
@@ -68,15 +69,15 @@ def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
     """Start and end of what is replayed, s of the flight.  Raises LogError where there is nothing between them."""
     start = args.start if args.start is not None else float(log.track.time[0])
     end = log.end_time if args.to is None else min(args.to, log.end_time)
+    ends = f"the log ends at {log.end_time:.1f} s"
     if args.to is not None and args.to > log.end_time and args.to in _PORTS:
-        raise LogError(
-            f"{args.log}: --to {args.to:g}: the log ends at {log.end_time:.1f} s; if a port is meant, name its address,"
-            f" too: --to 127.0.0.1:{args.to:g}"
-        )
+        allowed = f"{ends}; if a port is meant, name its address, too: --to 127.0.0.1:{args.to:g}"
+        raise LogError.of_option("--to", args.to, allowed, shown=f"{args.to:g}", file=args.log)
     if start > log.end_time:
-        raise LogError(f"{args.log}: --from {start:g}: the log ends at {log.end_time:.1f} s")
+        raise LogError.of_option("--from", start, ends, shown=f"{start:g}", file=args.log)
     if end < start:
-        raise LogError(f"{args.log}: --to {end:g}: at or after --from, {start:g} s, is expected")
+        allowed = f"at or after --from, {start:g} s, is expected"
+        raise LogError.of_option("--to", end, allowed, shown=f"{end:g}", file=args.log)
     return start, end
 
 

@@ -56,7 +56,8 @@ def _answer(files: list[Path], verdict: Verdict | None, code: int) -> object:
 
 def _write_layout(target: Path, args: argparse.Namespace) -> int:
     if args.log is not None:
-        raise PlanflyError(f"{args.log}: --layout writes the layout alone; name no log with it")
+        message = f"{args.log}: --layout writes the layout alone; name no log with it"
+        raise PlanflyError(message, file=args.log, field="--layout", value=str(target))
     refuse_existing(target, args.overwrite)
     write_whole(target, layout_text())
     print(f"layout    {target}")

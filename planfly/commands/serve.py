@@ -35,7 +35,7 @@ def serve(args: argparse.Namespace) -> int:
     options = ServeOptions(mission, args.scenario, args.terrain, args.speed, logs, flight_entries(args), fences)
     served = open_served(options)
     if options.logs.exists() and not options.logs.is_dir():
-        raise PlanflyError(f"--log {options.logs}: is a file; a folder is expected")
+        raise PlanflyError.of_option("--log", options.logs, "is a file; a folder is expected")
     parameters = vehicle_parameters(
         airspeed=served.airframe.airspeed,
         slowest=served.airframe.aircraft.airspeed_min,

@@ -62,5 +62,5 @@ def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
     found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
     if not found:
         name = "the log" if source is None else source.file
-        raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again")
+        raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again", file=name)
     return sorted(found, key=lambda legs: legs.first - legs.last)

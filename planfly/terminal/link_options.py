@@ -54,9 +54,9 @@ def link_access(args: argparse.Namespace) -> Access:
 def _address(option: str, text: str) -> tuple[str, int]:
     host, colon, port = text.strip().rpartition(":")
     if not colon and port.isdigit():
-        raise FlightError(f"{option} {text}: IP:PORT is expected, such as 127.0.0.1:{port}")
+        raise FlightError.of_option(option, text, f"IP:PORT is expected, such as 127.0.0.1:{port}")
     if not port.isdigit() or not 0 <= int(port) <= 65535:
-        raise FlightError(f"{option} {text}: IP:PORT is expected, with a port 0..65535")
+        raise FlightError.of_option(option, text, "IP:PORT is expected, with a port 0..65535")
     return _ip(option, host.strip("[]")), int(port)
 
 
@@ -64,4 +64,4 @@ def _ip(option: str, text: str) -> str:
     try:
         return str(ipaddress.ip_address(text))
     except ValueError as error:
-        raise FlightError(f"{option} {text}: an IP address is expected") from error
+        raise FlightError.of_option(option, text, "an IP address is expected") from error

@@ -154,6 +154,7 @@ def _check_options(scenario: Scenario, airspeed: float) -> None:
                 f"{scenario.name}: {name}: {-outside[unit]:.0f} m inside the kill radius of {threats.names[unit]} "
                 f"({threats.kill_radius[unit]:.0f} m): no path from there is safe",
                 file=scenario.name,
+                field=name,
             )
 
 

@@ -59,7 +59,7 @@ def replan(
     """
     count = len(old.waypoints)
     if not 0 <= leg < count - 1:
-        raise MissionError(f"{scenario.name}: leg {leg}: the plan has legs 0..{count - 2}", file=scenario.name)
+        raise MissionError.of_option("leg", leg, f"the plan has legs 0..{count - 2}", file=scenario.name)
     same_mission(scenario, old)
     _outside(scenario, old, leg)
     rest = with_waypoints(old.waypoints[leg:], max(FEWEST, count - leg))
@@ -96,6 +96,7 @@ def same_mission(scenario: Scenario, old: Plan) -> None:
             raise MissionError(
                 f"{scenario.name}: {name}: {away:.0f} m from that of the plan; it is another mission's",
                 file=scenario.name,
+                field=name,
             )
 
 
@@ -109,11 +110,14 @@ def _outside(scenario: Scenario, old: Plan, leg: int) -> None:
             f"{scenario.name}: leg {leg}: waypoint {leg}, where it begins, is {inside[unit]:.0f} m inside the kill "
             f"radius of {threats.names[unit]} ({threats.kill_radius[unit]:.0f} m): no path from there is safe",
             file=scenario.name,
+            field="leg",
+            value=leg,
         )
     forbidden = zones_entered(scenario, old.waypoints[[leg, leg]])
     if forbidden:
         begins = f"waypoint {leg}, where it begins, does not keep to {forbidden[0]}"
-        raise MissionError(f"{scenario.name}: leg {leg}: {begins}: no path from there does", file=scenario.name)
+        message = f"{scenario.name}: leg {leg}: {begins}: no path from there does"
+        raise MissionError(message, file=scenario.name, field="leg", value=leg)
 
 
 def with_waypoints(path: Floats, count: int) -> Floats:

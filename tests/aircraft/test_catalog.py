@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft, model_hash, read_aircraft
+from world.errors import FlightError
 
 
 @pytest.fixture
@@ -49,7 +50,7 @@ def test_limits_of_the_metadata_are_those_of_the_model() -> None:
 
 @pytest.mark.parametrize("name", ["", "zeppelin", "../aircraft/aerosonde", "aerosonde.xml"])
 def test_unknown_name_lists_the_known_ones(name: str) -> None:
-    with pytest.raises(ValueError, match=r"no aircraft called .*known are aerosonde"):
+    with pytest.raises(FlightError, match=r"no aircraft called .*known are aerosonde"):
         load_aircraft(name)
 
 
@@ -73,7 +74,7 @@ def test_names() -> None:
 )
 def test_bad_metadata_is_one_line_with_the_file(folder: Path, old: str, new: str, message: str) -> None:
     _edit(folder, old, new)
-    with pytest.raises(ValueError, match=message) as caught:
+    with pytest.raises(FlightError, match=message) as caught:
         read_aircraft(folder)
     assert "\n" not in str(caught.value)
     assert str(folder / "aerosonde.toml") in str(caught.value)
@@ -81,10 +82,10 @@ def test_bad_metadata_is_one_line_with_the_file(folder: Path, old: str, new: str
 
 def test_missing_and_undecodable_metadata(folder: Path) -> None:
     (folder / "aerosonde.toml").write_bytes(b"\xff\xfe")
-    with pytest.raises(ValueError, match=r"aerosonde\.toml: .*decode"):
+    with pytest.raises(FlightError, match=r"aerosonde\.toml: .*decode"):
         read_aircraft(folder)
     (folder / "aerosonde.toml").unlink()
-    with pytest.raises(ValueError, match=r"aerosonde\.toml: No such file"):
+    with pytest.raises(FlightError, match=r"aerosonde\.toml: No such file"):
         read_aircraft(folder)
 
 
@@ -107,7 +108,7 @@ def test_a_battery_or_fuel(folder: Path) -> None:
     assert cessna.battery_voltage == 0.0
     assert cessna.battery_energy == pytest.approx(117.9 * 43.5e6)
     _edit(folder, "battery_v = 44.4", "fuel_kg = 2")
-    with pytest.raises(ValueError, match=r"missing fuel_mj_per_kg$"):
+    with pytest.raises(FlightError, match=r"missing fuel_mj_per_kg$"):
         read_aircraft(folder)
 
 
@@ -130,7 +131,7 @@ def test_bad_model_tables(folder: Path, text: str, message: str) -> None:
     file = folder / "aerosonde.toml"
     # A top-level key has to stand before the first table.
     file.write_text(text + "\n" + file.read_text() if text.startswith("model") else file.read_text() + "\n" + text)
-    with pytest.raises(ValueError, match=message) as caught:
+    with pytest.raises(FlightError, match=message) as caught:
         read_aircraft(folder)
     assert str(caught.value).startswith(f"{file}: ")
 
@@ -138,10 +139,10 @@ def test_bad_model_tables(folder: Path, text: str, message: str) -> None:
 def test_names_and_folders(tmp_path: Path, folder: Path) -> None:
     assert find_aircraft("aerosonde").embedded
     assert not find_aircraft(str(folder)).embedded
-    with pytest.raises(ValueError, match=r"nowhere\.toml: No such file"):
+    with pytest.raises(FlightError, match=r"nowhere\.toml: No such file"):
         find_aircraft(str(tmp_path / "nowhere"))
     (folder / "aerosonde.xml").unlink()
-    with pytest.raises(ValueError, match=r"aerosonde\.xml: the aircraft model cannot be read"):
+    with pytest.raises(FlightError, match=r"aerosonde\.xml: the aircraft model cannot be read"):
         model_hash(read_aircraft(folder))
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from aircraft.jsbsim_model import OURS, CommandProperty, Reading, read_model
+from world.errors import FlightError
 
 ORDER = ("elevator", "aileron", "rudder", "throttle")
 
@@ -64,6 +65,6 @@ def test_what_kind_of_model_it_is() -> None:
     ],
 )
 def test_each_fault_begins_with_its_key(table: Any, message: str) -> None:
-    with pytest.raises(ValueError, match=message) as caught:
+    with pytest.raises(FlightError, match=message) as caught:
         read_model(table, "a")
     assert "\n" not in str(caught.value)

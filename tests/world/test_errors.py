@@ -63,6 +63,44 @@ def test_an_error_of_one_value_holds_the_four_and_says_them(kind: type[PlanflyEr
     assert str(kind.at("a.toml", "seed", -1, "0 or more")) == "a.toml: seed: -1: 0 or more"
 
 
+def test_a_value_that_is_not_there_is_left_out_of_the_line() -> None:
+    error = ScenarioError.at("a.toml", "name", None, "missing", shown="")
+    assert (str(error), error.value) == ("a.toml: name: missing", None)
+
+
+@pytest.mark.parametrize(("file", "begin"), [("", ""), (Path("a.mcap"), "a.mcap: ")])
+def test_an_error_of_an_option_names_it_and_its_file(file: str | Path, begin: str) -> None:
+    error = LogError.of_option("--to", 5.0, "the log ends at 4.0 s", shown="5", file=file)
+    assert str(error) == f"{begin}--to 5: the log ends at 4.0 s"
+    assert (error.file, error.field, error.value) == (str(file), "--to", 5.0)
+    assert error.allowed == "the log ends at 4.0 s"
+
+
+@pytest.mark.parametrize(
+    ("error", "file", "field", "value"),
+    [
+        # It knows where the fault lies, and all of it is kept.
+        (TerrainError.at("a.tif", "bands", 2, "1 band"), "a.tif", "bands", 2),
+        # It knows the field alone, or the file alone.
+        (FlightError("bands: 2: 1 band", field="bands", value=2, allowed="1 band"), "b.toml", "bands", 2),
+        (TerrainError("a.tif: no such file", file="a.tif", allowed="1 band"), "b.toml", "terrain.path", "a.tif"),
+    ],
+)
+def test_an_error_told_of_another_place_keeps_what_it_knows(
+    error: PlanflyError, file: str, field: str, value: object
+) -> None:
+    told = ScenarioError.from_error(error, "b.toml", "terrain.path", "a.tif")
+    assert type(told) is ScenarioError
+    assert str(told) == f"b.toml: terrain.path: {error}"
+    assert (told.file, told.field, told.value, told.allowed) == (file, field, value, "1 band")
+
+
+def test_an_error_of_another_kind_alone_is_the_same_else() -> None:
+    error = TerrainError.at("a.tif", "bands", 2, "1 band")
+    again = LogError.from_error(error)
+    assert (type(again), str(again), vars(again)) == (LogError, str(error), vars(error))
+
+
 def test_what_is_not_known_is_empty() -> None:
     error = MissionError("no items")
     assert (error.file, error.field, error.value, error.allowed) == ("", "", None, "")
@@ -70,7 +108,11 @@ def test_what_is_not_known_is_empty() -> None:
 
 @pytest.mark.parametrize(
     "error",
-    [ScenarioError.at("a.toml", "seed", -1, "0 or more"), StartError("a.plan", "no way made"), LogError("empty")],
+    [
+        ScenarioError.at("a.toml", "seed", -1, "0 or more"),
+        StartError("a.plan", "no way made", field="course", value=1.5),
+        LogError("empty"),
+    ],
 )
 def test_errors_come_whole_from_another_process(error: PlanflyError) -> None:
     again = pickle.loads(pickle.dumps(error))

@@ -61,7 +61,7 @@ def _check_crs(data: dict[str, Any], source: str) -> None:
 
 def _zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict[str, Any]]:
     if not isinstance(feature, dict) or feature.get("type") != "Feature":
-        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source)
+        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source, field=where)
     properties, geometry = feature.get("properties"), feature.get("geometry")
     properties = properties if isinstance(properties, dict) else {}
     name = properties.get("name") or f"zone {number + 1}"
@@ -74,24 +74,25 @@ def _zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict
         if kind == "Point":
             lat, lon = _corner(coordinates)
             if "radius_m" not in entries:
-                raise ScenarioError(
-                    f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder", file=source
-                )
+                message = f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder"
+                raise ScenarioError(message, file=source, field="radius_m")
             return label, entries | {"lat_deg": lat, "lon_deg": lon}
         if kind == "Polygon":
             coordinates, kind = [coordinates], "MultiPolygon"
         if kind == "MultiPolygon":
             parts = [_rings(part) for part in coordinates]
             if not all(holes_lie_inside(part) for part in parts if part):
-                raise ScenarioError(f"{source}: {label}: coordinates: a hole lies outside its outline", file=source)
+                message = f"{source}: {label}: coordinates: a hole lies outside its outline"
+                raise ScenarioError(message, file=source, field="coordinates")
             rings = [[list(corner) for corner in ring] for part in parts for ring in part]
             return label, entries | {"rings_deg": rings}
     except (TypeError, ValueError, IndexError) as error:
-        raise ScenarioError(
-            f"{source}: {label}: coordinates: lists of [longitude, latitude] are expected", file=source
-        ) from error
-    known = "Polygon, MultiPolygon or Point is expected"
-    raise ScenarioError(f"{source}: {label}: geometry {json.dumps(kind)[:40]}: a {known}", file=source)
+        allowed = "lists of [longitude, latitude] are expected"
+        message = f"{source}: {label}: coordinates: {allowed}"
+        raise ScenarioError(message, file=source, field="coordinates", allowed=allowed) from error
+    allowed = "a Polygon, MultiPolygon or Point is expected"
+    message = f"{source}: {label}: geometry {json.dumps(kind)[:40]}: {allowed}"
+    raise ScenarioError(message, file=source, field="geometry", value=kind, allowed=allowed)
 
 
 def _rings(coordinates: Any) -> list[list[tuple[float, float]]]:

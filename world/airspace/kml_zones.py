@@ -90,13 +90,12 @@ def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, flo
         return "", 0.0
     key = {"absolute": "ceiling_amsl_m", "relativeToGround": "ceiling_agl_m"}.get(mode)
     if key is None:
-        raise ScenarioError(
-            f"{source}: altitudeMode {mode[:40]!r}: allowed clampToGround, relativeToGround, absolute", file=source
-        )
+        allowed = "allowed clampToGround, relativeToGround, absolute"
+        message = f"{source}: altitudeMode {mode[:40]!r}: {allowed}"
+        raise ScenarioError(message, file=source, field="altitudeMode", value=mode, allowed=allowed)
     if _text(polygon, "extrude") not in ("1", "true"):
-        raise ScenarioError(
-            f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace", file=source
-        )
+        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace"
+        raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
     if not ups or max(ups) - min(ups) > _LEVEL:
         raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
     return key, ups[0]
@@ -110,8 +109,10 @@ def _coordinates(element: _Element, source: str) -> list[tuple[float, float, flo
             try:
                 lon, lat, *rest = (float(part) for part in position.split(","))
             except ValueError as error:
+                allowed = "lon,lat or lon,lat,up is expected"
+                message = f"{source}: coordinates {position[:40]!r}: {allowed}"
                 raise ScenarioError(
-                    f"{source}: coordinates {position[:40]!r}: lon,lat or lon,lat,up is expected", file=source
+                    message, file=source, field="coordinates", value=position, allowed=allowed
                 ) from error
             out.append((lon, lat, rest[0] if rest else 0.0))
     return out
@@ -127,7 +128,8 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
             try:
                 found[key] = float(value)
             except ValueError as error:
-                raise ScenarioError(f"{source}: {key}: {value[:40]!r}: a number is expected", file=source) from error
+                shown = repr(value[:40])
+                raise ScenarioError.at(source, key, value, "a number is expected", shown=shown) from error
         elif value:
             found[key] = value
     return found

@@ -38,36 +38,32 @@ def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
         elif key in _OWN:
             entries[key] = value
         elif key.lower().startswith(_LIKE_OURS):
-            raise ScenarioError(f"{source}: {key}: unknown; known are {', '.join(_OWN)}", file=source)
+            raise ScenarioError.at(source, key, value, f"unknown; known are {', '.join(_OWN)}", shown="")
     return entries
 
 
 def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
     """The entry that one of openAIP's limits comes to; none for the ground as a floor."""
     if not isinstance(value, dict):
-        raise ScenarioError(f"{source}: {key}: a table of value, unit and referenceDatum is expected", file=source)
+        allowed = "a table of value, unit and referenceDatum is expected"
+        raise ScenarioError.at(source, key, value, allowed, shown="")
     height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
     if isinstance(height, bool) or not isinstance(height, int | float):
-        raise ScenarioError(f"{source}: {key}.value: a number is expected", file=source, field=f"{key}.value")
+        raise ScenarioError.at(source, f"{key}.value", height, "a number is expected", shown="")
     # A list, say, is not even looked for.
     if not isinstance(unit, int | str) or unit not in _UNITS:
-        raise ScenarioError(
-            f"{source}: {key}.unit: allowed {', '.join(map(str, _UNITS))}", file=source, field=f"{key}.unit"
-        )
+        allowed = f"allowed {', '.join(map(str, _UNITS))}"
+        raise ScenarioError.at(source, f"{key}.unit", unit, allowed, shown="")
     if not isinstance(datum, int | str) or datum not in _DATUMS:
-        raise ScenarioError(
-            f"{source}: {key}.referenceDatum: allowed {', '.join(map(str, _DATUMS))}",
-            file=source,
-            field=f"{key}.referenceDatum",
-        )
+        allowed = f"allowed {', '.join(map(str, _DATUMS))}"
+        raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
     side, metres, counted = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
     if side == "floor" and counted == "agl" and metres <= 0.0:
         return {}
     if counted == "standard" or _UNITS[unit] == _UNITS["FL"]:
         if kind == "inclusion":
-            raise ScenarioError(
-                f"{source}: {key}: a flight level bounds no inclusion; give a height in metres", file=source
-            )
+            allowed = "a flight level bounds no inclusion; give a height in metres"
+            raise ScenarioError.at(source, key, value, allowed, shown="")
         # Beyond the heights that a table takes there is no flight to bound.
         wider = metres + (FLIGHT_LEVEL_ERROR if side == "ceiling" else -FLIGHT_LEVEL_ERROR)
         return {f"{side}_amsl_m": min(9000.0, max(-500.0, wider))}

@@ -50,9 +50,9 @@ def read_zone_file(path: Path, source: str) -> list[ZoneTable]:
     """
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
-        raise ScenarioError(
-            f"{source}: suffix {path.suffix!r}: a file of zones is .geojson, .json or .kml", file=source
-        )
+        allowed = "a file of zones is .geojson, .json or .kml"
+        message = f"{source}: suffix {path.suffix!r}: {allowed}"
+        raise ScenarioError(message, file=source, field="suffix", value=path.suffix, allowed=allowed)
     tables = []
     for where, entries in reader(_text(path, source), source):
         tables.append(_table(entries, f"{source}: {where}"))

@@ -29,13 +29,14 @@ def make_zones(tables: Sequence[ZoneTable], source: str, origin: GeoOrigin, grou
         try:
             shape = _shape(table, origin)
         except ValueError as error:
-            raise ScenarioError(f"{label}: {error}") from error
+            raise ScenarioError(f"{label}: {error}", file=source, field=f"zones[{k}]") from error
         floor = _level(table.floor_amsl_m, table.floor_agl_m)
         ceiling = _level(table.ceiling_amsl_m, table.ceiling_agl_m)
         zone = Zone(table.name, table.kind, shape, floor, ceiling)
         if zone.above_ground and ground is None:
             key = "floor_agl_m" if table.floor_agl_m is not None else "ceiling_agl_m"
-            raise ScenarioError(f"{label}: {key}: there is no terrain to count it from; give it as amsl")
+            message = f"{label}: {key}: there is no terrain to count it from; give it as amsl"
+            raise ScenarioError(message, file=source, field=key, value=getattr(table, key))
         zones.append(zone)
     return tuple(zones)
 

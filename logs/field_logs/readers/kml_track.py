@@ -74,7 +74,8 @@ def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]
         if len(whens) != len(coords):
             raise LogError(
                 f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): as many of both"
-                " are expected"
+                " are expected",
+                file=path,
             )
         return list(zip(whens, coords, strict=True)), 0
     pairs = [(one, other) for (name, one), (kind, other) in pairwise(marks) if (name, kind) == ("when", "coord")]

@@ -42,7 +42,7 @@ def open_log(path: Path) -> RawLog:
         with path.open("rb") as file:
             head = file.read(_HEAD)
         if not head:
-            raise LogError(f"{path}: empty: a log is expected", file=path, field="empty")
+            raise LogError(f"{path}: empty: a log is expected", file=path)
         # What is no number in a damaged log is left out later, and told.
         with np.errstate(all="ignore"):
             return _reader(path, head)(path)
@@ -76,7 +76,7 @@ def _reader(path: Path, head: bytes) -> Callable[[Path], RawLog]:
 
         return read_gpx
     if text.startswith("fmt, 128,") or text.startswith("fmt,128,"):
-        raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read")
+        raise LogError(f"{path}: a dataflash log as text: the .BIN that it was made of is read", file=path)
     if path.suffix.lower() == ".igc":
         from logs.field_logs.readers.igc_track import read_igc
 

@@ -148,7 +148,7 @@ class _Topics:
     def log(self) -> RawLog:
         series = {name: found for name, found in self._series() if found is not None and len(found.time)}
         if "position" not in series:
-            raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew")
+            raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew", file=self._source)
         return RawLog(
             source=self._source,
             format=FORMAT,

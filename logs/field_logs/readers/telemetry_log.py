@@ -82,7 +82,8 @@ class _Messages:
         beats = [one for _, one in self._own.get("HEARTBEAT", []) if _is_vehicle(one)]
         if "position" not in series:
             raise LogError(
-                f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: nothing says where it flew"
+                f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: nothing says where it flew",
+                file=self._source,
             )
         return RawLog(
             source=self._source,

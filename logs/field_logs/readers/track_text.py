@@ -38,12 +38,14 @@ def _bytes_of(path: Path) -> bytes:
             # Google Earth has one, doc.kml, and reads the first of several (OGC 12-007, "KMZ").
             entry = next((one for one in archive.infolist() if one.filename.lower().endswith(".kml")), None)
             if entry is None:
-                raise LogError(f"{path}: a zipped file without a .kml in it")
+                raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
             with archive.open(entry) as file:
                 # What it claims to hold is not what it holds.
                 data = file.read(MOST_BYTES + 1)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
-        raise LogError(f"{path}: a zipped file that cannot be read: {' '.join(str(error).split())[:120]}") from error
+        why = " ".join(str(error).split())[:120]
+        raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
     if len(data) > MOST_BYTES:
-        raise LogError(f"{path}: more than {MOST_BYTES:,} bytes unpacked: at most as many are read of a track")
+        message = f"{path}: more than {MOST_BYTES:,} bytes unpacked: at most as many are read of a track"
+        raise LogError(message, file=path)
     return data

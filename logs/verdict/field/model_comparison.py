@@ -125,7 +125,7 @@ def compare_with_model(
     demands = route_demands(setup)
     aligned = lay_track(demands, simulated)
     if aligned is None:
-        raise LogError(f"{setup.scenario.name}: the model's flight has too few rows")
+        raise LogError(f"{setup.scenario.name}: the model's flight has too few rows", file=setup.scenario.name)
     pairs = (flown.demands, flown.aligned), (demands, aligned)
     ends = np.cumsum(demands.runs)
     places = [np.arange(0.0, run, STEP) for run in demands.runs]

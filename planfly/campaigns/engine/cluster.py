@@ -65,7 +65,8 @@ def connected(workers: Workers) -> Iterator[Any]:
             try:
                 client = cluster_types.Client(address, timeout=_CONNECT_SECONDS, set_as_default=False)
             except (OSError, TimeoutError, ValueError) as error:
-                raise SchedulerError(f"--scheduler {address}: no scheduler answers: {error}") from error
+                message = f"--scheduler {address}: no scheduler answers: {error}"
+                raise SchedulerError(message, field="--scheduler", value=address) from error
             with client:
                 yield client
             return
@@ -119,7 +120,8 @@ def _local_cluster(cluster_types: Any, count: int | None, folder: Path) -> Any:
             env={"TMPDIR": str(folder)},
         )
     except (RuntimeError, OSError) as error:
-        raise SchedulerError(f"--workers {number}: could not be started: {error}") from error
+        message = f"--workers {number}: could not be started: {error}"
+        raise SchedulerError(message, field="--workers", value=number) from error
 
 
 def checked_address(address: str) -> str:
@@ -141,11 +143,11 @@ def checked_address(address: str) -> str:
     except ValueError:
         host = port = None
     if not host or not port or parts.scheme not in ("tcp", "tls"):
-        raise SchedulerError(f"--scheduler {address}: tcp://HOST:PORT on this machine, or tls://HOST:PORT, is expected")
+        allowed = "tcp://HOST:PORT on this machine, or tls://HOST:PORT, is expected"
+        raise SchedulerError.of_option("--scheduler", address, allowed)
     if parts.scheme == "tcp" and not _is_loopback(host):
-        raise SchedulerError(
-            f"--scheduler {address}: plain TCP beyond loopback; use tls://, with certificates in dask's configuration"
-        )
+        allowed = "plain TCP beyond loopback; use tls://, with certificates in dask's configuration"
+        raise SchedulerError.of_option("--scheduler", address, allowed)
     return whole
 
 

@@ -39,7 +39,7 @@ def fingerprint(aircraft: str) -> dict[str, str]:
     """
     try:
         model = model_hash(find_aircraft(aircraft))
-    except (PlanflyError, ValueError) as error:
+    except PlanflyError as error:
         model = f"none: {error}"
     return {
         "planfly": __version__,
@@ -60,4 +60,6 @@ def refuse_different(mine: dict[str, str], theirs: dict[str, str], worker: str) 
     """
     for name, value in mine.items():
         if theirs.get(name) != value:
-            raise WorkerError(f"worker {worker}: {name} {theirs.get(name, 'missing')}, not {value} as here")
+            found, allowed = theirs.get(name), f"not {value} as here"
+            message = f"worker {worker}: {name} {found or 'missing'}, {allowed}"
+            raise WorkerError(message, file=f"worker {worker}", field=name, value=found, allowed=allowed)

@@ -85,7 +85,7 @@ def open_campaign(
         kept = planned is not None and planned.is_file()
         plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
         if kept and plan.scenario.to_json() != scenario.to_json():
-            raise MissionError(f"{planned}: is the plan of another scenario than {target}")
+            raise MissionError(f"{planned}: is the plan of another scenario than {target}", file=str(planned))
         if planned is not None and not kept:
             write_whole(planned, plan_json(plan))
         base = _of_plan(plan, spread, choose_seed(scenario, seed))
@@ -140,5 +140,6 @@ def check_middle(base: CampaignBase) -> None:
         )
         raise SpreadError(
             f"{base.spread.name}: {factors}: at the middle of these {aircraft.name} holds no level flight at"
-            f" {base.airframe.airspeed:g} m/s"
-        )
+            f" {base.airframe.airspeed:g} m/s",
+            file=base.spread.name, value=factors,
+        )  # fmt: skip

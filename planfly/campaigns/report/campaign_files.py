@@ -83,5 +83,6 @@ def fly_row_again(base: CampaignBase, row: FlightRow, log: Path) -> FlightRow:
     """
     again = fly_one(base, row.draw.index, log=log)
     if not same_flight(row, again):
-        raise PlanflyError(f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown")
+        message = f"{log}: flight {row.draw.index} comes out otherwise here than where it was flown"
+        raise PlanflyError(message, file=log, field="flight", value=row.draw.index)
     return again

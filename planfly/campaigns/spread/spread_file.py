@@ -124,47 +124,54 @@ def parse_spread(text: str, name: str) -> FlightSpread:
     try:
         tables = toml_table(text)
     except ValueError as error:
-        raise SpreadError(f"{name}: {' '.join(str(error).split())}") from None
+        raise SpreadError(f"{name}: {' '.join(str(error).split())}", file=name) from None
     unknown = [key for key in tables if key not in BY_NAME]
     if unknown:
-        raise SpreadError(f"{name}: {unknown[0]}: unknown; it is one of {', '.join(NAMES)}")
-    varying = tuple(_varying(BY_NAME[key], tables[key], f"{name}: {key}") for key in NAMES if key in tables)
+        allowed = f"unknown; it is one of {', '.join(NAMES)}"
+        raise SpreadError.at(name, unknown[0], tables[unknown[0]], allowed, shown="")
+    varying = tuple(_varying(BY_NAME[key], tables[key], name) for key in NAMES if key in tables)
     if not varying:
-        raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}")
+        raise SpreadError(f"{name}: nothing varies; give at least one of {', '.join(NAMES)}", file=name)
     return FlightSpread(varying, name)
 
 
-def _varying(quantity: Quantity, table: Any, where: str) -> Varying:
+def _varying(quantity: Quantity, table: Any, name: str) -> Varying:
     if not isinstance(table, dict):
-        raise SpreadError(f"{where}: a table is expected, with distribution, its parameters, and source")
+        allowed = "a table is expected, with distribution, its parameters, and source"
+        raise SpreadError.at(name, quantity.name, table, allowed, shown="")
     entries = dict(table)
     distribution, source = entries.pop("distribution", None), entries.pop("source", None)
-    _check_distribution(quantity, distribution, where)
+    _check_distribution(quantity, distribution, name)
     if not isinstance(source, str) or not source.strip():
-        raise SpreadError(f"{where}.source: missing; say where the numbers are from")
-    _check_parameters(str(distribution), entries, where)
+        allowed = "missing; say where the numbers are from"
+        raise SpreadError.at(name, f"{quantity.name}.source", source, allowed, shown="")
+    _check_parameters(str(distribution), entries, name, quantity.name)
     varying = Varying(quantity, str(distribution), tuple((key, float(value)) for key, value in entries.items()), source)
-    share = _share_inside(varying, where)
+    share = _share_inside(varying, name)
     if not share >= INSIDE:
-        raise SpreadError(
-            f"{where}: {_call(varying)}: {100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
+        allowed = (
+            f"{100.0 * share:.1f} % of it lies within {quantity.low:g}..{quantity.high:g}"
             f" {quantity.unit or 'of the nominal'}; at least {100.0 * INSIDE:.0f} % has to"
         )
+        raise SpreadError.at(name, quantity.name, _call(varying), allowed)
     return varying
 
 
-def _check_distribution(quantity: Quantity, name: Any, where: str) -> None:
+def _check_distribution(quantity: Quantity, distribution: Any, name: str) -> None:
     from scipy import stats
 
     kind = stats.rv_discrete if quantity.whole else stats.rv_continuous
-    if not isinstance(name, str):
-        raise SpreadError(f"{where}.distribution: missing; the name of one of scipy.stats' distributions is expected")
-    if not isinstance(getattr(stats, name, None), kind):
+    field = f"{quantity.name}.distribution"
+    if not isinstance(distribution, str):
+        allowed = "missing; the name of one of scipy.stats' distributions is expected"
+        raise SpreadError.at(name, field, distribution, allowed, shown="")
+    if not isinstance(getattr(stats, distribution, None), kind):
         sort = "a discrete one, such as randint" if quantity.whole else "a continuous one, such as norm"
-        raise SpreadError(f"{where}.distribution: {name!r}: no distribution of scipy.stats; {sort}, is expected")
+        allowed = f"no distribution of scipy.stats; {sort}, is expected"
+        raise SpreadError.at(name, field, distribution, allowed, shown=repr(distribution))
 
 
-def _check_parameters(distribution: str, entries: dict[str, Any], where: str) -> None:
+def _check_parameters(distribution: str, entries: dict[str, Any], name: str, quantity: str) -> None:
     from scipy import stats
 
     frozen: Any = getattr(stats, distribution)
@@ -172,18 +179,21 @@ def _check_parameters(distribution: str, entries: dict[str, Any], where: str) ->
     allowed = [*shapes, "loc"] if isinstance(frozen, stats.rv_discrete) else [*shapes, "loc", "scale"]
     for key, value in entries.items():
         if key not in allowed:
-            raise SpreadError(f"{where}.{key}: not a parameter of {distribution}, which has {', '.join(allowed)}")
+            has = f"not a parameter of {distribution}, which has {', '.join(allowed)}"
+            raise SpreadError.at(name, f"{quantity}.{key}", value, has, shown="")
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-            raise SpreadError(f"{where}.{key}: {value!r}: a finite number is expected")
+            raise SpreadError.at(name, f"{quantity}.{key}", value, "a finite number is expected", shown=repr(value))
     missing = [key for key in shapes if key not in entries]
     if missing:
-        raise SpreadError(f"{where}.{missing[0]}: missing; {distribution} needs {', '.join(shapes)}")
+        needs = f"missing; {distribution} needs {', '.join(shapes)}"
+        raise SpreadError.at(name, f"{quantity}.{missing[0]}", None, needs, shown="")
 
 
-def _share_inside(varying: Varying, where: str) -> float:
+def _share_inside(varying: Varying, name: str) -> float:
     share = varying.share_inside
     if math.isnan(share):
-        raise SpreadError(f"{where}: {_call(varying)}: no parameters that {varying.distribution} may have")
+        allowed = f"no parameters that {varying.distribution} may have"
+        raise SpreadError.at(name, varying.quantity.name, _call(varying), allowed)
     return share
 
 

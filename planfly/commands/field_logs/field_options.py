@@ -11,10 +11,9 @@ def field_options(args: argparse.Namespace) -> FieldOptions:
     """Plan, world and aircraft of the options.  Raises ScenarioError for one that a flown log cannot take."""
     source = args.log if hasattr(args, "target") else args.file
     for name in ("params", "guidance", "airspeed"):
-        if getattr(args, name, None) is not None:
-            raise ScenarioError(
-                f"{source}: --{name}: a flight of the field is judged by the autopilot and the speeds of its log"
-            )
+        if (value := getattr(args, name, None)) is not None:
+            allowed = "a flight of the field is judged by the autopilot and the speeds of its log"
+            raise ScenarioError.at(source, f"--{name}", value, allowed, shown="")
     return FieldOptions(
         plan=Path(args.plan) if args.plan else None,
         scenario=args.scenario,

@@ -24,7 +24,8 @@ def refly(args: argparse.Namespace) -> int:
     source = Path(args.log)
     log = read_log(source)
     if log.setup.source is None:
-        raise LogError(f"{source}: flown by planfly itself: refly takes a log that `planfly import` wrote")
+        message = f"{source}: flown by planfly itself: refly takes a log that `planfly import` wrote"
+        raise LogError(message, file=source)
     folder = Path(args.out) if args.out else source.with_name(f"{source.stem}-refly")
     if args.out:
         refuse_folder(folder, args.overwrite)

@@ -35,9 +35,8 @@ def serve_log(args: argparse.Namespace, start: float, end: float) -> None:
     try:
         import foxglove
     except ImportError as error:
-        raise PlanflyError(
-            "--foxglove: the package foxglove-sdk is not installed (extra: planfly[foxglove])"
-        ) from error
+        message = "--foxglove: the package foxglove-sdk is not installed (extra: planfly[foxglove])"
+        raise PlanflyError(message, field="--foxglove") from error
     log = Path(args.log)
     broadcast = _Broadcast(foxglove, log_channels(log))
     try:
@@ -61,7 +60,7 @@ def _wait(broadcast: "_Broadcast", timeout: float | None, stopped: Stopped) -> N
     waited = RunningClock()
     while not broadcast.listeners and not stopped():
         if timeout is not None and waited() > timeout:
-            raise FlightError(f"--foxglove: nobody has subscribed within {timeout:g} s")
+            raise FlightError(f"--foxglove: nobody has subscribed within {timeout:g} s", field="--foxglove")
         time.sleep(_POLL)
 
 

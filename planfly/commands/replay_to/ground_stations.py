@@ -37,7 +37,8 @@ def play(log: FlightLog, args: argparse.Namespace) -> None:
         with stop_signals() as stopped:
             player.wait(wait, stopped)
             if not link.peers:
-                raise FlightError(f"--to {args.to}: no ground station has answered within {wait:g} s")
+                message = f"--to {args.to}: no ground station has answered within {wait:g} s"
+                raise FlightError(message, field="--to", value=args.to)
             begun, k = link.clock(), 0
             player.announce(f"replay of {args.log} at {args.speed or 1.0:g}x")
             while k < len(rows) - 1 and not stopped():

@@ -42,16 +42,17 @@ def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: flo
     if kind in SUFFIXES:
         refuse_existing(target, args.overwrite)
     elif kind:
-        raise PlanflyError(f"{target}: --movie: {', '.join(SUFFIXES)} or a folder is expected")
+        allowed = f"{', '.join(SUFFIXES)} or a folder is expected"
+        raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
     else:
         refuse_folder(target, args.overwrite)
     if kind == ".mp4" and shutil.which("ffmpeg") is None:
-        raise PlanflyError(
-            f"{target}: --movie: an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
-        )
+        allowed = "an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
+        raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
     film = MovieFrames(log.setup, log.track, start, end, args.speed or max(1.0, (end - start) / _LASTS))
     if len(film) > _MOST_FRAMES:
-        raise PlanflyError(f"{target}: --movie: {len(film):,} frames: at most {_MOST_FRAMES:,}; raise --speed")
+        allowed = f"at most {_MOST_FRAMES:,}; raise --speed"
+        raise PlanflyError.at(target, "--movie", len(film), allowed, shown=f"{len(film):,} frames")
     if not kind:
         return _write_folder(target, film)
     write_whole(target, _gif(film) if kind == ".gif" else _mp4(film))

@@ -68,4 +68,4 @@ def _refuse_inputs(target: Path, args: argparse.Namespace) -> None:
     for name in named:
         with contextlib.suppress(OSError):
             if target.exists() and target.samefile(name):
-                raise PlanflyError(f"{target}: is the input itself; name another file to write")
+                raise PlanflyError(f"{target}: is the input itself; name another file to write", file=target)

@@ -22,8 +22,10 @@ def test_a_folder_is_named_as_text_or_path(kind: type, tmp_path: Path) -> None:
     assert (found.name, found.mass, found.folder) == ("mine", load_aircraft("aerosonde").mass, tmp_path / "mine")
 
 
-@pytest.mark.parametrize("name", ["cessna", Path("nowhere")])
-def test_a_name_that_is_none_is_bad_input(name: str | Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "file"), [("cessna", "cessna"), (Path("nowhere"), str(Path("nowhere/nowhere.toml").resolve()))]
+)
+def test_a_name_that_is_none_is_bad_input(name: str | Path, file: str) -> None:
     with pytest.raises(planfly.FlightError) as caught:
         planfly.aircraft(name)
-    assert caught.value.file == str(name)
+    assert caught.value.file == file

@@ -32,7 +32,7 @@ from world.raster import open_raster
 
 def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
     datum = write_in_crs(tmp_path / "datum.tif", "EPSG:32632+6360")
-    assert_refused(datum, "heights in US survey foot: metres are expected")
+    assert_refused(datum, "unit of heights: US survey foot: metres are expected")
     path = write_geotiff(tmp_path / "unit.tif")
     for unit, taken in (("ft", False), ("Meters", True), ("m", True)):
         with rasterio.open(path, "r+") as out:
@@ -40,7 +40,7 @@ def test_heights_that_are_not_in_metres_are_refused(tmp_path: Path) -> None:
         if taken:
             assert read_window(path).heights.size
         else:
-            assert_refused(path, "heights in ft: metres are expected")
+            assert_refused(path, "unit of heights: ft: metres are expected")
 
 
 VRT = """<VRTDataset rasterXSize="2" rasterYSize="2"><VRTRasterBand dataType="Float32" band="1"><SimpleSource>
