@@ -137,6 +137,19 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
             one.kill()
 
 
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a dask scheduler whose worker is a thread of this process: none has to start for it."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1",
+        scheduler_kwargs={"dashboard": False}, dashboard_address="127.0.0.1:0", worker_dashboard_address=None,
+        memory_limit=0,
+    ) as cluster:  # fmt: skip
+        yield cluster.scheduler_address
+
+
 @pytest.fixture
 def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     """See `draw_nothing`."""
