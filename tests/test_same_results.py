@@ -22,6 +22,8 @@ def test_plan_missions_track_and_verdict_of_a_run(name: str, tmp_path: Path) -> 
     log = tmp_path / "flight.mcap"
     done = planfly.plan_then_fly(name.partition("-")[0], seed=RUNS[name], log=log)
     kept = KEPT["runs"][name]
+    assert done.plan.safe
+    assert done.verdict.flyable is name.startswith("jacksboro"), done.verdict.summary
     assert digest(plan_json(done.plan).encode()) == kept["plan.json"]
     assert digest(mission_text(done.mission, "waypoints").encode()) == kept["mission.waypoints"]
     assert digest(mission_text(done.mission, "plan").encode()) == kept["mission.plan"]
@@ -29,6 +31,8 @@ def test_plan_missions_track_and_verdict_of_a_run(name: str, tmp_path: Path) -> 
     assert verdict_digest(json.loads(verdict_json(done.verdict))) == kept["verdict"]
 
 
-def test_tables_of_the_paper(tmp_path: Path) -> None:
+def test_tables_of_the_paper(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The figures are no table, and take longer than they do.
+    monkeypatch.setattr("planfly.commands.paper.write_figures", lambda *_: None)
     assert main(["paper", "--problems", "7,60", "--runs", "3", "--out", str(tmp_path / "paper")]) == 0
     assert {name: digest((tmp_path / "paper" / name).read_bytes()) for name in PAPER_FILES} == KEPT["paper"]

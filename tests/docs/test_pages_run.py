@@ -1,10 +1,11 @@
-"""What a page says to type runs, from its first block to its last."""
+"""What a page says to type runs, from its first block to its last; reports with blank pictures outside the soak."""
 
 from pathlib import Path
 
 import pytest
 
 from tests.docs.page_blocks import PAGES, ROOT, TYPED, Bench, blocks, parse
+from tests.logs.blank_pictures import draw_nothing
 from tests.soak import SOAK
 
 # What other libraries say among themselves is not the reader's fault.
@@ -21,6 +22,8 @@ def test_the_blocks_of_a_page_run(
     page: Path, bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    if not SOAK:
+        draw_nothing(monkeypatch)
     names: dict[str, object] = {"__name__": "__main__"}
     for block in blocks(page):
         if not block.file and block.language not in TYPED:

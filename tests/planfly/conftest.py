@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from planfly.cli import main
+from tests.logs.blank_pictures import draw_nothing
 
 FIELD = """name = "field"
 [terrain]
@@ -136,11 +137,32 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
             one.kill()
 
 
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """The address of a dask scheduler whose worker is a thread of this process: none has to start for it."""
+    from distributed import LocalCluster
+
+    with LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", host="127.0.0.1",
+        scheduler_kwargs={"dashboard": False}, dashboard_address="127.0.0.1:0", worker_dashboard_address=None,
+        memory_limit=0,
+    ) as cluster:  # fmt: skip
+        yield cluster.scheduler_address
+
+
+@pytest.fixture
+def blank_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """See `draw_nothing`."""
+    draw_nothing(monkeypatch)
+
+
 @pytest.fixture(scope="session")
 def flight(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a short flight: plan.json and flight.mcap of the scenario `tight`."""
+    """The folder of a short flight, its pictures blank: plan.json and flight.mcap of the scenario `tight`."""
     folder = tmp_path_factory.mktemp("flight") / "tight"
-    assert main(["run", "tight", "--out", str(folder)]) == 4
+    with pytest.MonkeyPatch.context() as patch:
+        draw_nothing(patch)
+        assert main(["run", "tight", "--out", str(folder)]) == 4
     return folder
 
 

@@ -55,6 +55,7 @@ def rounds_of(folder: Path) -> list[dict[str, object]]:
     return loaded
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_plan_over_the_hill_becomes_one_round_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "hill.toml").write_text(HILL.replace("@@PEAKS@@\n", RIDGE), encoding="utf-8")
     out = tmp_path / "out"
@@ -76,6 +77,7 @@ def test_a_plan_over_the_hill_becomes_one_round_it(tmp_path: Path, capsys: pytes
     assert "rounds\n" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_what_cannot_fly_is_shown_not_to(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     assert main(["run", "tight", "--out", str(out), "--refine", "2"]) == 4

@@ -18,6 +18,7 @@ from planfly.airframe import load_airframe
 from planfly.pipeline import make_setup as setup_of
 from tests.bench.against_arduplane import BINARY, compare, flown_figures
 from tests.setups import MakeSetup
+from tests.soak import SOAK
 from world.scenario import from_spec
 
 # What ArduPlane flew, written by `python -m tests.bench.against_arduplane --plans 3 --from 1001 --keep FILE`.
@@ -126,6 +127,7 @@ def test_it_flies_as_arduplane_flew(kept: dict[str, Any]) -> None:
 
 @pytest.mark.client
 @pytest.mark.skipif(not BINARY.exists(), reason="PLANFLY_ARDUPLANE names no ArduPlane")
+@pytest.mark.skipif(not SOAK, reason="beside flights that are kept of it, above: in make soak")
 def test_it_flies_as_arduplane_flies() -> None:
     compared, _ = compare(7001)
     assert compared.law.ended == compared.real.ended == "completed"

@@ -149,6 +149,7 @@ def test_gains_that_lack_or_are_broken_are_told(capsys: pytest.CaptureFixture[st
     assert [line.split("mine/")[1].split(":")[0] for line in warned] == ["gains.toml", "ardupilot.toml"]
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_a_folder_of_ones_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "fleet" / "mine"
     shutil.copytree(load_aircraft("aerosonde").folder, folder)

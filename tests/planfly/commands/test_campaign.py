@@ -79,10 +79,10 @@ def test_nothing_to_resume(flown: tuple[list[str], Path], tmp_path: Path, capsys
     assert not (tmp_path / "none").exists()
 
 
-def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path) -> None:
+def test_a_planned_scenario_goes_on_with_its_plan(tmp_path: Path, scheduler: str) -> None:
     _, scenario = write_short(tmp_path)
     out = tmp_path / "out"
-    line = ["campaign", str(scenario), "--workers", "1", "--at-least", "0.5", "--out", str(out)]
+    line = ["campaign", str(scenario), "--scheduler", scheduler, "--at-least", "0.5", "--out", str(out)]
     main([*line, "--flights", "1"])
     plan = (out / "plan.json").read_bytes()
     main([*line, "--flights", "2", "--resume"])

@@ -8,7 +8,7 @@ import subprocess
 import sys
 import zipfile
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,34 +22,70 @@ from tests.logs.made_flight import make_setup, make_track, record
 
 ROOT = Path(__file__).parents[3]
 MAGIC = b"\x89MCAP0\r\n"
-# Runs one command under the limits; imports stand before them, since it is the file that is limited, not Python.
+# Runs each command that a line asks for under the limits, in a fork of its own; imports stand before them, since it is
+# the file that is limited, not Python.
 CHILD = """
-import json, resource, sys, time
+import json, os, resource, signal, sys, time, traceback
 import logs.verdict.judge_flight, logs.recording.reader, planfly.commands.check
 import planfly.commands.recover, planfly.commands.replay, planfly.commands.report, world.raster
 from planfly.cli import main
 def kib(name):
     with open("/proc/self/status") as file:
         return next(int(line.split()[1]) for line in file if line.startswith(name))
-before = kib("VmSize:")
-resource.setrlimit(resource.RLIMIT_AS, ((before + 200 * 1024) * 1024,) * 2)
-spent = time.process_time()
-code = main(sys.argv[1:])
-print(json.dumps({"code": code, "seconds": time.process_time() - spent}))
+def meet(folder, said, argv):
+    for number, name in ((1, "out"), (2, "err")):
+        os.dup2(os.open(os.path.join(said, name), os.O_CREAT | os.O_TRUNC | os.O_WRONLY), number)
+    os.chdir(folder)
+    signal.alarm(120)
+    before = kib("VmSize:")
+    resource.setrlimit(resource.RLIMIT_AS, ((before + 200 * 1024) * 1024,) * 2)
+    spent = time.process_time()
+    code = main(argv)
+    print(json.dumps({"code": code, "seconds": time.process_time() - spent}))
+for line in sys.stdin:
+    child = os.fork()
+    if not child:
+        ended = 1
+        try:
+            meet(*json.loads(line))
+            ended = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            sys.stdout.flush()
+            os._exit(ended)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
+Judge = Callable[..., tuple[int, float, str]]
 
 
-def judge(folder: Path, *argv: str) -> tuple[int, float, str]:
+@pytest.fixture(scope="module")
+def judge(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Judge]:
     """Run planfly in a folder: exit code, seconds of work, what it printed on standard error."""
-    before = {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")}
-    result = subprocess.run(
-        [sys.executable, "-c", CHILD, *argv], cwd=folder, capture_output=True, text=True, check=False, timeout=120,
+    said = tmp_path_factory.mktemp("said")
+    process = subprocess.Popen(
+        [sys.executable, "-c", CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         env={**os.environ, "PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    assert result.returncode == 0, result.stderr[-2000:]
-    assert {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")} == before, "a file was written"
-    report = json.loads(result.stdout.splitlines()[-1])
-    return report["code"], report["seconds"], result.stderr
+    assert process.stdin is not None
+    assert process.stdout is not None
+    asked, answers = process.stdin, process.stdout
+
+    def meet(folder: Path, *argv: str) -> tuple[int, float, str]:
+        before = {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")}
+        asked.write(json.dumps([str(folder), str(said), argv]) + "\n")
+        asked.flush()
+        ended = int(answers.readline())
+        out, printed = ((said / name).read_text(encoding="utf-8") for name in ("out", "err"))
+        assert ended == 0, printed[-2000:]
+        assert {path: path.stat().st_mtime_ns for path in folder.parent.rglob("*")} == before, "a file was written"
+        report = json.loads(out.splitlines()[-1])
+        return report["code"], report["seconds"], printed
+
+    yield meet
+    asked.close()
+    assert process.wait(10.0) == 0
+    answers.close()
 
 
 def mcap_record(opcode: int, content: bytes) -> bytes:
@@ -82,7 +118,7 @@ def climber() -> bytes:
     ("make", "command"),
     [(bomb, "check"), (bomb, "report"), (giant, "check"), (giant, "replay"), (climber, "check"), (climber, "recover")],
 )
-def test_hostile_logs(make: Callable[[], bytes], command: str, tmp_path: Path) -> None:
+def test_hostile_logs(make: Callable[[], bytes], command: str, judge: Judge, tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
     folder.mkdir(parents=True)
     (folder / "x.mcap").write_bytes(make())
@@ -93,7 +129,7 @@ def test_hostile_logs(make: Callable[[], bytes], command: str, tmp_path: Path) -
     assert printed.startswith("planfly: x.mcap: ")
 
 
-def test_an_attachment_with_a_climbing_name_in_a_whole_log(tmp_path: Path) -> None:
+def test_an_attachment_with_a_climbing_name_in_a_whole_log(judge: Judge, tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
     folder.mkdir(parents=True)
     log = record(tmp_path / "good.mcap", make_setup(), make_track(2.0)).read_bytes()
@@ -150,7 +186,7 @@ MISSION = "QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t46.05\t8.05\t500\t1\n" + "".joi
         ("/vsicurl/http://127.0.0.1:9/x.tif", None),
     ],
 )
-def test_hostile_terrain(name: str, make: Callable[[Path], None] | None, tmp_path: Path) -> None:
+def test_hostile_terrain(name: str, make: Callable[[Path], None] | None, judge: Judge, tmp_path: Path) -> None:
     folder = tmp_path / "a" / "b"
     folder.mkdir(parents=True)
     (folder / "m.waypoints").write_text(MISSION, encoding="utf-8")

@@ -1,4 +1,7 @@
-"""The same plan, byte for byte, whatever the number of threads, the hash seed and the features of the processor."""
+"""The same plan, byte for byte, whatever the number of threads, the hash seed and the features of the processor.
+
+All changes at once, and threads alone; each by itself with PLANFLY_SOAK=1.
+"""
 
 import hashlib
 import os
@@ -45,7 +48,7 @@ def plain() -> str:
     return found
 
 
-CASES = {
+EACH = {
     "threads 1, hash seed 1": {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
     "threads 2, hash seed 2": {"NUMBA_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONHASHSEED": "2"},
     "threads 4": {"NUMBA_NUM_THREADS": "4", "OMP_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4"},
@@ -54,6 +57,9 @@ CASES = {
     "an older OpenBLAS core": {"OPENBLAS_CORETYPE": "Nehalem"},
     "a C library without AVX2 and FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"},
 }
+# A plan that one change moves is moved with the others, too.
+AT_ONCE = {name: value for changes in EACH.values() for name, value in changes.items()}
+CASES = EACH if SOAK else {"threads 1, hash seed 1": EACH["threads 1, hash seed 1"], "all at once": AT_ONCE}
 
 
 @pytest.mark.parametrize("case", CASES)

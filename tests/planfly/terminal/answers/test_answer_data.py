@@ -26,6 +26,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     Path("field.toml").write_text(FIELD + QUICK, encoding="utf-8")
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_plan_run_and_fly(capsys: Output) -> None:
     plan = answered(capsys, 0, "plan", "field.toml", "--out", "plan.json")
     written = json.loads(Path("plan.json").read_text(encoding="utf-8"))
@@ -40,6 +41,7 @@ def test_plan_run_and_fly(capsys: Output) -> None:
     assert fly["verdict"]["flyable"] is True
 
 
+@pytest.mark.usefixtures("blank_pictures")
 def test_what_is_asked_of_a_log(capsys: Output) -> None:
     write_example_log(Path("a.mcap"))
     log = read_log(Path("a.mcap"))

@@ -1,0 +1,14 @@
+"""Reports with blank pictures, for tests that look at anything else: drawing is most of what a run takes."""
+
+import pytest
+
+from logs.figures import draw_all
+from logs.figures.elements.style import new_figure, png_bytes
+
+NAMES = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy")
+
+
+def draw_nothing(patch: pytest.MonkeyPatch) -> None:
+    """Have a report of a flight all its pictures, each of them blank."""
+    blank = png_bytes(new_figure(1.0))
+    patch.setattr(draw_all, "draw_pictures", lambda *_, **__: {f"{name}.png": blank for name in NAMES})
