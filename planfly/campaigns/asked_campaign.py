@@ -41,7 +41,7 @@ def open_base(args: argparse.Namespace, spread: FlightSpread, folder: Path, tabl
     Raises PlanflyError; a folder that was not ready is as it was then.
     """
     if again and not (folder / table).is_file():
-        raise PlanflyError(f"{folder / table}: no campaign there to go on with")
+        raise PlanflyError(f"{folder / table}: no campaign there to go on with", file=folder / table)
     if not again:
         _refuse_campaign(folder, table, args.overwrite)
     base = _opened(args, spread, folder if again else None)
@@ -55,14 +55,16 @@ def open_base(args: argparse.Namespace, spread: FlightSpread, folder: Path, tabl
 def _refuse_campaign(folder: Path, table: str, overwrite: bool) -> None:
     """Refuse a folder that is a file, or that holds a campaign or anything else.  Raises PlanflyError."""
     if folder.exists() and not folder.is_dir():
-        raise PlanflyError(f"{folder}: is a file; a folder is expected")
+        raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
     if overwrite or not folder.is_dir() or not any(folder.iterdir()):
         return
     if (folder / table).exists():
-        raise PlanflyError(f"{folder}: holds a campaign; --resume goes on with it, --overwrite replaces it")
+        raise PlanflyError(
+            f"{folder}: holds a campaign; --resume goes on with it, --overwrite replaces it", file=folder
+        )
     if any((folder / name).exists() for name in CAMPAIGN_FILES):
-        raise PlanflyError(f"{folder}: holds another campaign; --overwrite replaces it")
-    raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results")
+        raise PlanflyError(f"{folder}: holds another campaign; --overwrite replaces it", file=folder)
+    raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results", file=folder)
 
 
 def tell_interrupted(stop: KeyboardInterrupt, folder: Path, flights: int) -> int:

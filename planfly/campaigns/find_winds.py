@@ -13,12 +13,14 @@ from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.flights.varied_flight import GivenWind
-from planfly.campaigns.statistics.wind_boundary import Direction, WindBoundary, needs_more
+from planfly.campaigns.statistics.wind_boundary import BATCH, Direction, WindBoundary, needs_more
 from planfly.campaigns.storage.held_table import StoreError
 from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, WindsStore
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction.
 ACCURACY, FEWEST = 0.4, 30
+# Flights of a round, about, where few directions are open, and the most of one direction: workers wait for each round.
+_ROUND, _MOST_EACH = 48, 12
 # Of a spread, what the wind that is asked about takes the place of.
 ASKED = ("wind_speed", "wind_from")
 
@@ -108,11 +110,12 @@ class _Search:
     def next_round(self) -> list[AskedFlight]:
         """The flights to fly next; none where all is known or used up."""
         self.open = [number for number, one in enumerate(self.directions) if self._is_open(one)]
+        each = max(BATCH, min(_MOST_EACH, _ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
         for number in self.open:
             direction = self.directions[number]
-            for k, speed in enumerate(direction.next_speeds()):
-                draw = len(direction.speeds) + k
+            speed, before = direction.next_speed(), len(direction.speeds)
+            for draw in range(before, before + each):
                 asked.append(AskedFlight(len(self.flown) + len(asked), number, speed, draw))
         return asked[: max(0, self.goal.flights - len(self.flown))]
 

@@ -108,6 +108,6 @@ def wind_lines(found: WindsFound) -> list[str]:
         f" from {least.from_deg:g}° (the least), {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
         *_open_lines(found),
         *_lost_lines(found),
-        f"{len(found.flights)} flights; intervals at {100 * found.goal.confidence:g} %, by probit regression"
+        f"{len(found.flights)} flights; intervals at {100 * found.goal.confidence:g} %, by the flights"
         " of each direction",
     ]

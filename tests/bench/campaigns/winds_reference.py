@@ -23,6 +23,7 @@ from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
+from planfly.campaigns.statistics.wind_boundary import WindBoundary
 
 REFERENCE = Path(__file__).parents[2] / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
@@ -64,7 +65,7 @@ def winds_row() -> dict[str, float]:
     """Flights that the boundaries take, and of the reference's directions those that are right within 0.5 m/s."""
     found = found_winds()
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
-    right = sum(_is_right(found.boundaries[int(direction)].estimate, points) for direction, points in kept.items())
+    right = sum(_is_right(found.boundaries[int(direction)], points) for direction, points in kept.items())
     return {
         "winds of the demo, 16 directions: flights": len(found.flights),
         "winds: directions with a reference": len(kept),
@@ -72,13 +73,16 @@ def winds_row() -> dict[str, float]:
     }
 
 
-def _is_right(boundary: float, points: list[dict[str, Any]]) -> bool:
-    """Whether no point further than half a metre a second from a boundary contradicts it."""
+def _is_right(boundary: WindBoundary, points: list[dict[str, Any]]) -> bool:
+    """Whether no point further than half a metre a second from a boundary contradicts it.
+
+    Above a boundary beyond all that was looked at nothing does.
+    """
     for point in points:
         share = point["flyable"] / point["flights"]
-        if point["speed"] <= boundary - WITHIN + 0.05 and share < GOAL.target:
+        if point["speed"] <= boundary.estimate - WITHIN + 0.05 and share < GOAL.target:
             return False
-        if point["speed"] >= boundary + WITHIN - 0.05 and share > GOAL.target:
+        if point["speed"] >= boundary.estimate + WITHIN - 0.05 and share > GOAL.target and not boundary.beyond:
             return False
     return True
 
@@ -91,15 +95,16 @@ def main() -> None:
     parser.add_argument("--winds", type=Path, help="winds.json of a run of `planfly winds`; else they are found here")
     args = parser.parse_args()
     if args.winds is None:
-        boundaries = [one.estimate for one in found_winds().boundaries]
+        boundaries = [(one.estimate, one.beyond) for one in found_winds().boundaries]
     else:
         table = json.loads(args.winds.read_text(encoding="utf-8"))
-        boundaries = [float(one["boundary_mps"]) for one in table["directions"]]
+        boundaries = [(float(one["boundary_mps"]), bool(one["beyond"])) for one in table["directions"]]
     base = demo(_SEED)
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     for direction in args.directions:
         points = []
-        for speed in (boundaries[direction] - WITHIN, boundaries[direction] + WITHIN):
+        boundary, beyond = boundaries[direction]
+        for speed in (boundary - WITHIN,) if beyond else (boundary - WITHIN, boundary + WITHIN):
             speed = round(max(0.0, speed), 2)
             tally = share_at(base, GivenWind(speed, 360.0 * direction / GOAL.directions), args.flights)
             points.append({"speed": speed, "flights": tally.flown, "flyable": tally.flyable})

@@ -16,7 +16,8 @@ from planfly.campaigns.engine.flight_loop import Flown, Order
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.find_winds import ASKED, FEWEST, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import fly_one, lost_row
+from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.storage.held_table import StoreError
 from planfly.campaigns.storage.row_values import row_of
@@ -149,12 +150,19 @@ def test_a_table_whose_flights_do_not_follow_is_refused(wind_base: CampaignBase,
     assert len(table(tmp_path / WINDS_DATABASE)) == 1
 
 
+def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """A made flight; in a wind from W flights begin to fail in winds that are 6 m/s apart, elsewhere 1 m/s."""
+    if wind is None or wind.from_deg != 270.0:
+        return made_flight(base, index, wind)
+    return made_flight(base, index, GivenWind(12.0 + (wind.speed - 12.0) / 6.0, wind.from_deg))
+
+
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planfly.campaigns.engine.flight_rate.TOLD_EVERY", 0.0)
     told: list[tuple[float, float, str]] = []
     with open_winds_store(wind_base, GOAL, tmp_path, resume=False) as store:
-        found = find_winds(wind_base, GOAL, Workers(1), store, lambda *one: told.append(one), made_flight)
+        found = find_winds(wind_base, GOAL, Workers(1), store, lambda *one: told.append(one), surer_but_in_the_west)
     pattern = r"(\d) of 4 directions settled, (\d+) flights, \d+ a minute(, \d+ s left at least)?"
     lines = [re.fullmatch(pattern, remark) for _, _, remark in told]
     assert all(lines)
