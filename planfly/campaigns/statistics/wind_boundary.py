@@ -113,7 +113,7 @@ class Direction:
         >>> for k in range(200):
         ...     direction.add(8.0 + 0.02 * k, 8.0 + 0.02 * k < 10.0)
         >>> found = direction.boundary()
-        >>> 9.5 < found.low < found.estimate <= found.high < 10.1
+        >>> 9.3 < found.low < found.estimate <= found.high < 10.1
         True
         """
         order = np.argsort(self._quantiles, kind="stable")
