@@ -1,8 +1,8 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
-``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [airspace] [--runs N]
-[--seconds S] [--seeds N]``: parts to measure (default: all), seeds of each whole planner run (15), what OMPL is given
-(10 s), and seeds of flights (20).
+``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [airspace] [start]
+[--runs N] [--seconds S] [--seeds N]``: parts to measure (default: all), seeds of each whole planner run (15), what OMPL
+is given (10 s), and seeds of flights (20).
 """
 
 import argparse
@@ -15,7 +15,7 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = ("chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace")
+PARTS = ("chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace", "start")
 TARGET = Path("runs") / "bench.json"
 
 
@@ -30,7 +30,7 @@ def main() -> None:
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f"{', '.join(sorted(unknown))}: not a part")
     # Imported here: the setting above must come first.
-    from tests.bench import aircraft, autopilot, chain, flight, peers, planner
+    from tests.bench import aircraft, autopilot, chain, flight, peers, planner, start
     from tests.bench.airspace import check_log
     from tests.bench.planning import ablation
 
@@ -47,6 +47,7 @@ def main() -> None:
         "aircraft": aircraft.run,
         "autopilot": autopilot.run,
         "airspace": check_log.run,
+        "start": start.run,
     }
     for part in args.parts or PARTS:
         record[part] = work[part]()
