@@ -16,7 +16,7 @@ from numba.core import event
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
-from world.compiling import kernel_is_compiled
+from world.compilation.announcement import kernel_is_compiled
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])
@@ -59,7 +59,11 @@ cast("Any", event).register("numba:compile", _Compiling())
 
 
 def cache_folder() -> Path:
-    """Where compiled kernels are kept."""
+    """Where compiled kernels are kept.
+
+    >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
+    True
+    """
     return Path(_settings.CACHE_DIR)
 
 

@@ -11,7 +11,7 @@ from typing import ParamSpec, TypeVar
 from planfly.first_start.sharing import compile_units
 from planfly.kernel_units.unit_kernels import kernels_of
 from planfly.terminal.progress import progress, say
-from world.compiling import tell_before_compiling
+from world.compilation.announcement import tell_before_compiling
 
 _Taken = ParamSpec("_Taken")
 _Given = TypeVar("_Given")

@@ -11,7 +11,7 @@ import sys
 import threading
 
 
-def main() -> int:
+def answer_requests() -> int:
     """Do what is asked for until nothing more is."""
     # Ctrl-C reaches all processes of a terminal: this one ends with the one that started it.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -41,4 +41,4 @@ def _tell(line: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(answer_requests())

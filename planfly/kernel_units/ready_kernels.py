@@ -5,7 +5,7 @@ from importlib import import_module
 
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
 from planfly.kernel_units.units import UNITS
-from world.compiling import tell_before_compiling
+from world.compilation.announcement import tell_before_compiling
 
 
 def do_unit(unit: str, tell: Callable[[str], None]) -> None:

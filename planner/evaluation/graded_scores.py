@@ -108,8 +108,7 @@ def score_path(
     count = path.shape[0]
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
-    # No literal: numba would compile what it is handed to for each of them.
-    graded = count > 0
+    graded = count > 0  # no literal: numba would compile what takes it for each
     add_leg_violations(data, limits, path, legs, corners, graded, violations)
     if strays:
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)

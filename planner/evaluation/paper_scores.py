@@ -90,8 +90,7 @@ def _score_paths(
                 measure_legs(path, legs)
                 if data.legs_hold_turns:
                     measure_corners(data, limits.wind, path, legs, corners)
-                # No literal: numba would compile what it is handed to for each of them.
-                graded = size < 0
+                graded = size < 0  # no literal: numba would compile what takes it for each
                 add_leg_violations(data, limits, path, legs, corners, graded, violation)
             violation.terrain = sums.below[b]
             objective.length_ratio = sums.length[b] / limits.straight_distance

@@ -12,7 +12,7 @@ from planfly.first_start import announcing
 from planfly.first_start.announcing import announced_kernels
 from planfly.kernel_units.unit_kernels import kernels_of
 from planfly.terminal.progress import silent_progress
-from world.compiling import kernel_is_compiled
+from world.compilation.announcement import kernel_is_compiled
 
 ROOT = Path(__file__).parents[3]
 CODE = """

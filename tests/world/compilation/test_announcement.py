@@ -4,7 +4,7 @@ import numba
 import pytest
 
 import world.kernels  # noqa: F401  # whoever compiles has imported it
-from world.compiling import tell_before_compiling
+from world.compilation.announcement import tell_before_compiling
 
 
 def test_the_innermost_is_told_before_a_kernel_is_compiled() -> None:
