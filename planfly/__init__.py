@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from planfly.api.optimising import Optimiser as Optimiser
     from planfly.api.optimising import optimise as optimise
     from planfly.api.planning import plan as plan
+    from planfly.api.planning import plan_then_fly as plan_then_fly
     from planfly.api.planning import scenarios as scenarios
     from planfly.api.reporting import compare as compare
     from planfly.api.reporting import export as export
@@ -57,7 +58,6 @@ if TYPE_CHECKING:
     from planfly.campaigns.find_winds import WindsFound as WindsFound
     from planfly.campaigns.spread.spread_file import SpreadError as SpreadError
     from planfly.pipeline import PlanThenFly as PlanThenFly
-    from planfly.pipeline import plan_then_fly as plan_then_fly
     from planner.plan import Plan as Plan
     from world.errors import FlightError as FlightError
     from world.errors import LogError as LogError
@@ -79,7 +79,7 @@ _HOMES = {
         "planfly.api.aircraft_data": ("aircraft",),
         "planfly.api.flying": ("check", "fly"),
         "planfly.api.optimising": ("BestFound", "Optimiser", "optimise"),
-        "planfly.api.planning": ("plan", "scenarios"),
+        "planfly.api.planning": ("plan", "plan_then_fly", "scenarios"),
         "planfly.api.reporting": ("compare", "export", "figures", "report"),
         "planfly.api.results": ("ExportedFiles", "FlownMission", "WrittenReport"),
         "planfly.api.wind_limits": ("winds",),
@@ -87,7 +87,7 @@ _HOMES = {
         "planfly.campaigns.engine.cluster": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),
         "planfly.campaigns.spread.spread_file": ("SpreadError",),
-        "planfly.pipeline": ("PlanThenFly", "plan_then_fly"),
+        "planfly.pipeline": ("PlanThenFly",),
         "planner.plan": ("Plan",),
         "world.errors": (
             *("FlightError", "LogError", "MissionError", "ParameterError", "PlanflyError", "ScenarioError"),

@@ -12,10 +12,14 @@ from typing import Any, TypeAlias, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import event
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
+from world.compilation.announcement import kernel_is_compiled
+
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
+_Array = TypeVar("_Array", bound=NDArray[Any])
 # A record of named fields, as `record_dtype` makes: mypy cannot know which.
 Record: TypeAlias = Any
 # An array of them.
@@ -38,6 +42,29 @@ def _sources_hash() -> str:
 _settings: Any = numba.config
 if not _settings.CACHE_DIR:
     _settings.CACHE_DIR = str(Path(user_cache_dir("planfly")) / f"kernels-{_sources_hash()}")
+
+
+class _Compiling(event.Listener):
+    """Passes on that numba compiles, which it does only what its cache does not have."""
+
+    def on_start(self, event: Any) -> None:
+        """Before a kernel is compiled."""
+        kernel_is_compiled()
+
+    def on_end(self, event: Any) -> None:
+        """After it."""
+
+
+cast("Any", event).register("numba:compile", _Compiling())
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept.
+
+    >>> cache_folder().is_absolute() or bool(_settings.CACHE_DIR)
+    True
+    """
+    return Path(_settings.CACHE_DIR)
 
 
 def compiled(kernel: _Kernel) -> _Kernel:
@@ -66,6 +93,20 @@ def inlined(kernel: _Kernel) -> _Kernel:
     -2.283185
     """
     return cast("_Kernel", numba.njit(cache=True, error_model="numpy", inline="always")(kernel))
+
+
+def read_only(array: _Array) -> _Array:
+    """The same numbers as an array that cannot be written.
+
+    Numba compiles a kernel anew for arrays that can be written and for those that cannot: one that is called with both
+    is called with this.
+
+    >>> read_only(np.zeros(2)).flags.writeable
+    False
+    """
+    view = array.view()
+    view.setflags(write=False)
+    return view
 
 
 def record_dtype(*entries: str | tuple[Any, ...]) -> np.dtype[np.record]:

@@ -71,7 +71,13 @@ def read_mission(path: Path) -> Mission:
 
 
 def parse_mission(text: str, source: str) -> Mission:
-    """Read the text of a mission in either form; a `.plan` is the one that starts with a brace or bracket."""
+    """Read the text of a mission in either form; a `.plan` is the one that starts with a brace or bracket.
+
+    >>> parse_mission('{"fileType": "Plan"}', "a mission")
+    Traceback (most recent call last):
+        ...
+    world.errors.MissionError: a mission: ...
+    """
     if text.removeprefix("\ufeff").lstrip()[:1] in ("{", "["):
         return parse_plan_file(text, source)
     if source.lower().endswith(".plan") and not text.removeprefix("\ufeff").lstrip().startswith("QGC"):

@@ -11,7 +11,9 @@ from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.api.changed_scenario import Wind, changed_scenario
 from planfly.api.results import FlownMission
+from planfly.first_start.announcing import announcing
 from planfly.flight_limits import MOST_HOURS, MOST_MEGABYTES, FlightLimits
+from planfly.kernel_units.unit_kernels import FLYING
 from planfly.named_fences import NamedFences, read_named_fences
 from planfly.open_mission import OpenedMission, ScenarioChange, is_log, open_mission, open_planned
 from planfly.pipeline import fly_and_judge
@@ -24,6 +26,7 @@ from world.scenario_variants import over_terrain
 FencePaths = str | Path | Sequence[str | Path]
 
 
+@announcing(*FLYING)
 def fly(
     mission: Plan | str | Path,
     *,
@@ -79,6 +82,7 @@ def fly(
     return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, kept)
 
 
+@announcing()
 def check(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,

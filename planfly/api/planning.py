@@ -3,8 +3,11 @@
 import time
 from pathlib import Path
 
+from planfly import pipeline
 from planfly.airframe import choose_seed, load_airframe
 from planfly.api.changed_scenario import Wind, changed_scenario, opened_scenario
+from planfly.first_start.announcing import announcing
+from planfly.kernel_units.unit_kernels import BOTH, PLANNING
 from planner.plan import Plan, plan_json
 from planner.search.plan_path import plan_path
 from world.atomic_files import write_whole
@@ -12,7 +15,10 @@ from world.scenario import Scenario, embedded_scenarios
 from world.scenario_types import Guidance, Navigation
 from world.scenario_variants import with_planner
 
+plan_then_fly = announcing(*BOTH)(pipeline.plan_then_fly)
 
+
+@announcing(*PLANNING)
 def plan(
     scenario: Scenario | str | Path,
     *,

@@ -27,6 +27,12 @@ def _say_nothing(_done: float, _whole: float, _remark: str = "") -> None:
     pass
 
 
+def say(line: str) -> None:
+    """A line about the work, where progress is reported."""
+    if not _silent.get():
+        print(line, file=sys.stderr, flush=True)
+
+
 @contextmanager
 def progress(title: str) -> Iterator["Advance"]:
     """Report a stage of work; the caller reports how much of how much is done, and a remark."""

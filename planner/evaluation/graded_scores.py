@@ -108,7 +108,8 @@ def score_path(
     count = path.shape[0]
     measure_legs(path, legs)
     measure_corners(data, limits.wind, path, legs, corners)
-    add_leg_violations(data, limits, path, legs, corners, True, violations)
+    graded = count > 0  # no literal: numba would compile what takes it for each
+    add_leg_violations(data, limits, path, legs, corners, graded, violations)
     if strays:
         measure_lags(data.tracking, aircraft, limits.wind, path, legs, lags)
         _measure_strayed(corners, flown, extents)

@@ -90,7 +90,8 @@ def _score_paths(
                 measure_legs(path, legs)
                 if data.legs_hold_turns:
                     measure_corners(data, limits.wind, path, legs, corners)
-                add_leg_violations(data, limits, path, legs, corners, False, violation)
+                graded = size < 0  # no literal: numba would compile what takes it for each
+                add_leg_violations(data, limits, path, legs, corners, graded, violation)
             violation.terrain = sums.below[b]
             objective.length_ratio = sums.length[b] / limits.straight_distance
             objective.kill_exposure, objective.detection_exposure = sums.kill[b], sums.detection[b]

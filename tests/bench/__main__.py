@@ -1,7 +1,7 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
 ``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [airspace] [campaigns]
-[--runs N] [--seconds S] [--seeds N] [--flights N] [--long]``: parts to measure (default: all), seeds of each whole
+[start] [--runs N] [--seconds S] [--seeds N] [--flights N] [--long]``: parts to measure (default: all), seeds of each whole
 planner run (15), what OMPL is given (10 s), seeds of flights (20), flights of a campaign (90), and the rows of
 campaigns that take an hour.
 """
@@ -16,7 +16,9 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = ("chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace", "campaigns")
+PARTS = tuple(
+    ["chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace", "campaigns", "start"]
+)
 TARGET = Path("runs") / "bench.json"
 
 
@@ -33,7 +35,7 @@ def main() -> None:
     if unknown := set(args.parts) - set(PARTS):
         parser.error(f"{', '.join(sorted(unknown))}: not a part")
     # Imported here: the setting above must come first.
-    from tests.bench import aircraft, autopilot, chain, flight, peers, planner
+    from tests.bench import aircraft, autopilot, chain, flight, peers, planner, start
     from tests.bench.airspace import check_log
     from tests.bench.campaigns import campaign_rows
     from tests.bench.planning import ablation
@@ -52,6 +54,7 @@ def main() -> None:
         "autopilot": autopilot.run,
         "airspace": check_log.run,
         "campaigns": lambda: campaign_rows.run(args.flights, whole=args.long),
+        "start": start.run,
     }
     for part in args.parts or PARTS:
         record[part] = work[part]()

@@ -1,7 +1,8 @@
 """``python -m tests.kernels``: compile what most tests run, once, before each of pytest's workers would.
 
-The planner's kernels in one process and those of flights, verdicts and reports in another: they are not each other's.
-They stay in the cache for all later processes; where they are there already this takes seconds.
+First what a first start compiles, in the same two processes; then the planner's other kernels in one process, and those
+of other flights, verdicts and reports in another: they are not each other's.  They stay in the cache for all later
+processes; where they are there already this takes seconds.
 """
 
 import os
@@ -9,6 +10,10 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+
+from planfly.first_start.sharing import compile_units
+from planfly.kernel_units.unit_kernels import BOTH
+from world.kernels import cache_folder
 
 # A climb and a corner over the level field of FIELD.
 MISSION = """QGC WPL 110
@@ -86,6 +91,7 @@ def main() -> int:
         folder = Path(name)
         (folder / "field.toml").write_text(FIELD, encoding="utf-8")
         (folder / "field.waypoints").write_text(MISSION, encoding="utf-8")
+        compile_units(list(BOTH), cache_folder(), lambda _: None)
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-m", "tests.kernels"]
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]

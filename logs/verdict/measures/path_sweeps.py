@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from logs.verdict.tolerances import FAR
 from world.frames import PolyMapRecord
 from world.geometry import segment_exposure, sphere_window
-from world.kernels import compiled
+from world.kernels import compiled, read_only
 from world.terrain import segment_clearance
 
 Floats = NDArray[np.float64]
@@ -25,14 +25,19 @@ _BLOCK = 256
 _JOINED = 16
 
 
-@compiled
-def path_clearance(
-    heights: Heights, to_pixel: PolyMapRecord, points: Floats
-) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
+def path_clearance(heights: Heights, to_pixel: PolyMapRecord, points: Floats) -> tuple[Floats, Floats]:
     """Smallest height above ground on each segment and the fraction of it where that is, (n - 1,) each.
 
     NaN where a segment leaves the raster or its data.
     """
+    low, at = _path_clearance(read_only(heights), to_pixel, read_only(points))
+    return low, at
+
+
+@compiled
+def _path_clearance(
+    heights: Heights, to_pixel: PolyMapRecord, points: Floats
+) -> tuple[Floats, Floats]:  # pragma: no cover - compiled
     count = max(0, points.shape[0] - 1)
     low, at = np.empty(count), np.empty(count)
     for k in range(count):
@@ -65,14 +70,20 @@ class _Boxes(NamedTuple):
     diagonal: Floats
 
 
-@compiled
-def path_spheres(
-    points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats
-) -> SphereVisits:  # pragma: no cover - compiled
+def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats) -> SphereVisits:
     """How a path meets each of m spheres.  A radius of 0 is no sphere.
 
     points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
     """
+    given = (read_only(array) for array in (points, time, centres, radii, scales))
+    visits: SphereVisits = _path_spheres(*given)
+    return visits
+
+
+@compiled
+def _path_spheres(
+    points: Floats, time: Floats, centres: Floats, radii: Floats, scales: Floats
+) -> SphereVisits:  # pragma: no cover - compiled
     boxes = _boxes(points)
     count = centres.shape[0]
     out = SphereVisits(

@@ -1,0 +1,107 @@
+"""The kernels that each unit of work calls from Python, which is what a first start counts.
+
+Those that they call themselves are compiled with them.  `tests/planfly/kernel_units` holds this to what is called.
+"""
+
+_WORLD = (
+    "world.frames._least_squares",
+    "world.frames._polymap_many",
+    "world.terrain._heights_many",
+    "flight.ardupilot.tracking_error._fill",
+)
+_PROBLEM = (
+    *_WORLD,
+    "world.terrain.steepest_slopes",
+    "planner.airspace.kept_zones._give_way",
+    "planner.evaluation.threat_grid._fill_cells",
+    "planner.evaluation.threat_grid._lists",
+)
+_CERTIFY = "planner.evaluation.certify_kernels."
+_SIDES = "planner.seeding.side_kernels."
+_LAYOUT = "logs.recording.chunk_layout."
+
+UNIT_KERNELS: dict[str, tuple[str, ...]] = {
+    "scores": (
+        *_PROBLEM,
+        "planner.evaluation.graded_scores._score_paths",
+        "planner.optimisers.preference._rank_rows",
+        "planner.seeding.pattern_search._search",
+    ),
+    "certificates": (
+        *_PROBLEM,
+        "aircraft.path_limits.arc_slope",
+        "aircraft.path_limits.turn_tangents",
+        _CERTIFY + "heights_above_ground",
+        _CERTIFY + "leg_slope_limits",
+        _CERTIFY + "missile_distance",
+        _CERTIFY + "turn_and_roll_lengths",
+        _CERTIFY + "with_courses",
+        "planner.evaluation.fly_by_corners.fly_by_radii",
+        "planner.evaluation.leg_geometry.settling_length",
+    ),
+    "shortening": (
+        *_PROBLEM,
+        "planner.seeding.shortening_kernels.begin_shortening",
+        "planner.seeding.shortening_kernels.shorten_on",
+    ),
+    "routes": (
+        *_PROBLEM,
+        "planner.evaluation.leg_constraints.slope_limits",
+        "planner.seeding.grid_kernels.cheapest_route",
+        "planner.seeding.waypoint_fitting._choose",
+        "planner.seeding.grid_prices.find_obstacles",
+        _SIDES + "cheapest_passings",
+        _SIDES + "grid_costs",
+        _SIDES + "route_through",
+    ),
+    "paper": (*_PROBLEM, "planner.evaluation.paper_scores._score_paths"),
+    "flight": (
+        *_WORLD,
+        "aircraft.envelope.ground_speed",
+        "aircraft.path_limits.aircraft_slopes",
+        "aircraft.path_limits.arc_slope",
+        "aircraft.path_limits.ground_speed_on",
+        "aircraft.path_limits.turn_radius_between",
+        "flight.ardupilot.lateral_law.turn_distance",
+        "flight.ardupilot.pilot.true_by_equivalent",
+        "flight.guidance.path_kernels.profile",
+        "flight.simulation.tick.tick_in_block",
+        "flight.simulation.track._round_to_steps",
+        _LAYOUT + "_fill",
+        _LAYOUT + "_index",
+        _LAYOUT + "_order",
+        _LAYOUT + "_put_head",
+        _LAYOUT + "_stamped",
+        _LAYOUT + "last_log_time",
+        "logs.verdict.measures.path_sweeps._path_clearance",
+        "logs.verdict.measures.path_sweeps._path_spheres",
+        "logs.verdict.measures.slopes.lifted_speed",
+        "logs.verdict.measures.track_alignment._align",
+        "world.wind._mean_wind_speeds",
+        "world.wind.mean_wind_speed",
+    ),
+}
+
+# What a default plan and a flight call, the longest first: whoever shares units out begins with those.
+PLANNING = ("scores", "shortening", "certificates", "routes", "paper")
+FLYING = ("flight",)
+BOTH = ("scores", "flight", "shortening", "certificates", "routes", "paper")
+# Of the commands; what no unit compiles is compiled where it is called.
+COMMAND_UNITS: dict[str, tuple[str, ...]] = {
+    "run": BOTH,
+    "plan": PLANNING,
+    "fly": FLYING,
+    "serve": FLYING,
+    "refly": FLYING,
+    "campaign": BOTH,
+    "winds": BOTH,
+}
+
+
+def kernels_of(units: tuple[str, ...]) -> frozenset[str]:
+    """All kernels of units, each once.
+
+    >>> len(kernels_of(("scores", "paper")))
+    12
+    """
+    return frozenset(name for unit in units for name in UNIT_KERNELS[unit])

@@ -1,0 +1,84 @@
+"""Small work that calls the kernels of a part of planning, with the types that a search calls them with."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from planner.evaluation.certify import certify
+from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rotated_vectors
+from planner.evaluation.graded_scores import graded_scores
+from planner.evaluation.paper_scores import paper_scores
+from planner.evaluation.problem import Problem, make_problem
+from planner.search.score_table import best_first, score_table
+from planner.seeding.grid_routes import GridRoute, grid_route, make_grid
+from planner.seeding.path_shortening import evenly, shorten_path
+from planner.seeding.pattern_search import search_patterns
+from planner.seeding.side_routes import optimistic_grid, side_routes
+from planner.seeding.waypoint_fitting import fit_waypoints
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+PARTS = ("scores", "certificates", "shortening", "routes", "paper")
+WAYPOINTS = 8
+STAGES, MOST_ROUTES, FEW = 12, 2, 4
+# How far the path passes aside of the middle, and above it, m.
+ASIDE, ABOVE = 300.0, 20.0
+
+
+class _Task(NamedTuple):
+    """A small problem, and a path (w, 3) about its middle."""
+
+    problem: Problem
+    encoding: Encoding
+    path: Floats
+
+
+def call_kernels(part: str, scenario: Scenario, limits: Limits) -> None:
+    """Call the kernels of a part of planning, one of `PARTS`, in a scenario that should be small.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("hard-07")
+    >>> call_kernels("paper", scenario, load_airframe(scenario).limits)
+    """
+    problem = make_problem(scenario, limits)
+    space = problem.space
+    aside = 0.5 * (space.start + space.destination) + [0.0, ASIDE, ABOVE]
+    path = evenly(np.array([space.start, aside, space.destination]), WAYPOINTS)
+    _CALLS[part](_Task(problem, ENCODINGS["rotated"](space, WAYPOINTS), path))
+
+
+def _score(task: _Task) -> None:
+    scores = score_table(*graded_scores(task.problem.search, np.stack([task.path, task.path])))
+    best_first(scores)
+    vector = rotated_vectors(task.problem.space, task.encoding, task.path[None])[0]
+    search_patterns(task.problem.search, task.encoding, vector, FEW)
+
+
+def _certify(task: _Task) -> None:
+    certify(task.problem, task.path)
+
+
+def _shorten(task: _Task) -> None:
+    shorten_path(task.problem.search, task.path)
+
+
+def _route(task: _Task) -> None:
+    data, space, lower, upper = task.problem.search, task.problem.space, task.encoding.lower, task.encoding.upper
+    frame = rotated_frame(space.start, space.destination)
+    span = (float(lower[1::3].min()), float(upper[1::3].max()))
+    found = grid_route(data, frame, make_grid(data, frame, span, STAGES))
+    for route in [found] if isinstance(found, GridRoute) else []:
+        fit_waypoints(data, frame, route.points, WAYPOINTS)
+    grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
+    side_routes(data, frame, grid, 2.0 * frame.length, MOST_ROUTES)
+
+
+def _score_as_the_paper(task: _Task) -> None:
+    paper_scores(task.problem.certified, task.path[None])
+
+
+_CALLS = dict(zip(PARTS, (_score, _certify, _shorten, _route, _score_as_the_paper), strict=True))

@@ -1,0 +1,71 @@
+"""What starting takes: the first start after an install, and a new process whose kernels are in the cache.
+
+Wall seconds count only on a quiet machine; CPU seconds are of all processes, compiling ones too.
+"""
+
+import os
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+ROUNDS = 5
+# What a first start may take, s by the clock on two quiet cores, and a first safe path in a new process, CPU s.
+MOST_COLD, MOST_WARM = 30.0, 0.6
+COLD = {
+    "planfly plan jacksboro": ("plan", "jacksboro", "--seed", "1", "--out", "plan.json"),
+    "planfly run jacksboro": ("run", "jacksboro", "--seed", "1", "--out", "run"),
+}
+FIRST_SAFE = """
+from planfly.airframe import load_airframe
+from planner.search.plan_path import plan_path
+from world.scenario import load_scenario
+scenario = load_scenario("jacksboro")
+plan = plan_path(scenario, load_airframe(scenario).limits, seed=1, first_safe=True)
+raise SystemExit(not plan.safe)
+"""
+
+
+class Spent(NamedTuple):
+    """Seconds by the clock, and of all cores."""
+
+    wall: float
+    cpu: float
+
+
+def spent_on(arguments: tuple[str, ...], folder: Path, **environment: str) -> Spent:
+    """What a Python process and its children take.  Raises CalledProcessError for one that fails by no verdict."""
+    began, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [sys.executable, *arguments], cwd=folder, env=os.environ | environment, capture_output=True, check=False
+    )
+    if done.returncode not in (0, 4):
+        raise subprocess.CalledProcessError(done.returncode, arguments, done.stdout, done.stderr)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+    return Spent(time.perf_counter() - began, cpu)
+
+
+def run() -> dict[str, dict[str, float]]:
+    """Measure, print a table, and return it."""
+    print("\nstarting, s by the clock; CPU s of all processes")
+    record: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        for title, command in COLD.items():
+            cache = folder / f"kernels-{command[0]}"
+            spent = spent_on(("-m", "planfly", *command), folder, NUMBA_CACHE_DIR=str(cache))
+            record[f"{title}, empty cache"] = spent._asdict()
+            print(f"  {title}, empty cache: {spent.wall:.1f} (at most {MOST_COLD:g}); {spent.cpu:.1f}")
+        cache = folder / "kernels-plan"
+        warm = [spent_on(("-c", FIRST_SAFE), folder, NUMBA_CACHE_DIR=str(cache)) for _ in range(ROUNDS + 1)][1:]
+        spent = Spent(statistics.median(one.wall for one in warm), statistics.median(one.cpu for one in warm))
+        record["a first safe path of jacksboro, full cache"] = spent._asdict()
+        print(
+            f"  a first safe path of jacksboro, full cache: {spent.wall:.2f}; {spent.cpu:.2f} (at most {MOST_WARM:g})"
+        )
+    return record

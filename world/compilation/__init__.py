@@ -1,0 +1,1 @@
+"""Compiling kernels: who is told of it."""
