@@ -11,7 +11,7 @@ LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/fligh
 	tests/flight/live tests/logs/recording tests/logs/verdict
 # What pyproject.toml names.
 DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
-	platformdirs|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
+	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
 READY := $(VENV)/.ready
 TESTED := $(VENV)/.ready-test
 
@@ -79,13 +79,14 @@ $(TESTED): $(READY)
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test]'
 	touch $(TESTED)
 
-# Other people's MCAP readers for Node, for the tests alone; without npm their tests say so.
+# Other people's MCAP readers for Node and the judge of accessible pages, for the tests alone; without npm their tests say so.
 clients: .node/.ready
 
 .node/.ready: Makefile
 	@if command -v npm >/dev/null; then \
 	npm install --silent --no-audit --no-fund --no-package-lock --no-save --prefix .node @mcap/core@2.2.2 @mcap/support@1.1.0 \
-	&& touch $@; else echo "npm is not installed: the tests with Node's MCAP reader will be skipped"; fi
+	axe-core@4.14.1 \
+	&& touch $@; else echo "npm is not installed: the tests with Node's MCAP reader and with axe will be skipped"; fi
 
 clean:
 	rm -rf $(VENV) .node runs build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -11,7 +11,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
 from logs.figures.elements.legend import NamedWind
-from logs.figures.elements.panels import Axis, Panel, Series, doubles, draw_panels
+from logs.figures.elements.panels import Axis, Panel, Series, Stack, doubles, draw_stack
 from logs.figures.map import DrawnTrack, draw_tracks_on_map
 from logs.verdict.measures.airspace import with_fence_zones
 
@@ -57,7 +57,12 @@ def draw_both_on_map(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
 
 
 def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
-    """Six panels over the distance flown: height, height above ground, airspeed, bank, cross-track, throttle.
+    """Six panels over the distance flown, those of `comparison_stack`."""
+    return draw_stack(comparison_stack(flights))
+
+
+def comparison_stack(flights: tuple[NamedFlight, NamedFlight]) -> Stack:
+    """Height, height above ground, airspeed, bank, cross-track and throttle of both over the distance flown.
 
     Without terrain, that of the height above it is left out.
     """
@@ -83,9 +88,7 @@ def draw_both_over_distance(flights: tuple[NamedFlight, NamedFlight]) -> Figure:
         Panel("cross-track,\nright + (m)", series([doubles(track.cross_track) for track in tracks]), least_span=0.1),
         Panel("throttle\n(%)", series([100.0 * doubles(_throttle(track)) for track in tracks])),
     ]
-    return draw_panels(
-        "Two flights along their way", panels, Axis("distance flown over the ground (km)", along / 1e3), None
-    )
+    return Stack("Two flights along their way", panels, Axis("distance flown over the ground (km)", along / 1e3), None)
 
 
 def _roll(track: Track) -> NDArray[np.float32]:

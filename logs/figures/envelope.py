@@ -1,5 +1,6 @@
 """The aircraft's envelope and a flight in it: climb and descent over airspeed, and bank over airspeed."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -59,28 +60,54 @@ def draw_envelope_and_flight(setup: FlightSetup, track: Track | None) -> Figure:
     return figure
 
 
-def _limits(axes: Any, setup: FlightSetup) -> None:
+@dataclass(frozen=True, slots=True)
+class EnvelopeLine:
+    """Steepest steady path angles (°) at one height (m AMSL) over true airspeed (m/s), (120,); descents negative."""
+
+    amsl: int
+    airspeed: Floats
+    climb: Floats
+    descent: Floats
+
+
+def envelope_lines(setup: FlightSetup) -> list[EnvelopeLine]:
+    """The envelope at the lowest and the highest height of the route."""
     envelope, up = setup.envelope, setup.route.waypoints[:, 2]
     speeds = np.linspace(envelope.airspeed[0], envelope.airspeed[-1], 120)
-    heights = sorted({round(float(up.min())), round(float(up.max()))})
-    for amsl, dashes in zip(heights, ("-", (0, (5, 2))), strict=False):
+    lines = []
+    for amsl in sorted({round(float(up.min())), round(float(up.max()))}):
         climb, descent = np.degrees([envelope.air_angles(float(speed), float(amsl)) for speed in speeds]).T
-        axes.plot(
-            speeds,
-            climb,
-            linestyle=dashes,
-            color=style.MISSILE,
-            linewidth=1.8,
-            label=f"steepest climb at {amsl} m",
-        )
-        axes.plot(
-            speeds,
-            -descent,
-            linestyle=dashes,
-            color=style.BLUE,
-            linewidth=1.8,
-            label=f"steepest descent at {amsl} m",
-        )
+        lines.append(EnvelopeLine(amsl, speeds, climb, -descent))
+    return lines
+
+
+@dataclass(frozen=True, slots=True)
+class FlownMoments:
+    """True airspeed (m/s), path angle through the air and bank to either side (°) at moments of a flight, (n,) each."""
+
+    airspeed: Floats
+    angle: Floats
+    bank: Floats
+
+
+def flown_moments(track: Track, most: int = _MOST_DOTS) -> FlownMoments:
+    """At most so many moments of a track, those that are numbers."""
+    rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), most)).astype(np.intp))
+    air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
+    east, north, up = air.T
+    angle = np.degrees(np.arctan2(up, np.hypot(east, north)))
+    speed = track.airspeed[rows].astype(np.float64)
+    roll, _, _ = track.attitude[rows].T
+    bank = np.degrees(np.abs(roll.astype(np.float64)))
+    good = np.isfinite(speed) & np.isfinite(angle) & np.isfinite(bank)
+    return FlownMoments(speed[good], angle[good], bank[good])
+
+
+def _limits(axes: Any, setup: FlightSetup) -> None:
+    for line, dashes in zip(envelope_lines(setup), ("-", (0, (5, 2))), strict=False):
+        look: dict[str, Any] = {"linestyle": dashes, "linewidth": 1.8}
+        axes.plot(line.airspeed, line.climb, color=style.MISSILE, label=f"steepest climb at {line.amsl} m", **look)
+        axes.plot(line.airspeed, line.descent, color=style.BLUE, label=f"steepest descent at {line.amsl} m", **look)
     axes.axhline(0.0, color="#777777", linewidth=0.7)
 
 
@@ -91,17 +118,10 @@ def _planned(axes: Any, setup: FlightSetup) -> None:
 
 
 def _flown(slope_axes: Any, bank_axes: Any, track: Track) -> None:
-    rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST_DOTS)).astype(np.intp))
-    air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)
-    east, north, up = air.T
-    angle = np.degrees(np.arctan2(up, np.hypot(east, north)))
-    speed = track.airspeed[rows].astype(np.float64)
-    roll, _, _ = track.attitude[rows].T
-    bank = np.degrees(np.abs(roll.astype(np.float64)))
+    flown = flown_moments(track)
     look: dict[str, Any] = {"markersize": 2.2, "alpha": 0.28, "color": style.FLOWN, "markeredgewidth": 0, "zorder": 3}
-    good = np.isfinite(speed) & np.isfinite(angle) & np.isfinite(bank)
-    slope_axes.plot(speed[good], angle[good], "o", label="flown, moment by moment", **look)
-    bank_axes.plot(speed[good], bank[good], "o", label="flown, moment by moment", **look)
+    slope_axes.plot(flown.airspeed, flown.angle, "o", label="flown, moment by moment", **look)
+    bank_axes.plot(flown.airspeed, flown.bank, "o", label="flown, moment by moment", **look)
 
 
 def _range(slope_axes: Any, bank_axes: Any, envelope: Envelope) -> None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import COLUMNS, Track
 from logs.figures.elements import style
-from logs.figures.elements.panels import Axis, Panel, Series, draw_panels
+from logs.figures.elements.panels import Axis, Panel, Series, Stack, draw_stack
 from world.geometry import segment_exposure
 from world.kernels import compiled
 
@@ -41,6 +41,12 @@ def _rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> 
 
 
 def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
+    """Panels along the flown distance, those of `exposure_stack`; None where the flight was exposed to nothing."""
+    stack = exposure_stack(setup, track)
+    return None if stack is None else draw_stack(stack)
+
+
+def exposure_stack(setup: FlightSetup, track: Track) -> Stack | None:
     """Strength and sum of kill and of detection along the flown distance (km), of those that the flight was exposed to.
 
     None where it was exposed to nothing.
@@ -73,4 +79,4 @@ def draw_exposure(setup: FlightSetup, track: Track) -> Figure | None:
         return None
     whole = Track(*(getattr(track, item)[rows] for item in COLUMNS))
     title = f"{style.shorten(setup.scenario.name, 60)}: exposure along the flown track"
-    return draw_panels(title, panels, Axis("distance flown over the ground (km)", kilometres), whole)
+    return Stack(title, panels, Axis("distance flown over the ground (km)", kilometres), whole)

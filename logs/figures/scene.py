@@ -18,7 +18,7 @@ from logs.figures.elements import style
 from logs.figures.elements.failures import Failures, failures, route_distance, route_samples
 from logs.figures.elements.labels import LabelPlacer
 from logs.figures.elements.legend import draw_legend, failing_handles
-from logs.figures.elements.scene_data import GroundGrid, drawn_positions, exaggeration, ground_grid, scene_bounds
+from logs.figures.elements.scene_data import GroundGrid, drawn_rows, exaggeration, ground_grid, scene_bounds
 from logs.figures.elements.zones import zone_handles
 from logs.verdict.findings import Verdict
 from world.airspace.zone_outlines import zone_walls
@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
 _ELEVATION = math.radians(36.0)
-_MOST_CELLS = 130
+_MOST_CELLS, _MOST_TRACK = 130, 1600
 # Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
 # round, rad.
 _LEAST_SIDE, _ASLANT = 0.3, math.radians(45.0)
@@ -261,7 +261,7 @@ def _paths(
     _line(axes, projection, terrain, samples, style.PLANNED, 3.6, 5)
     handles: list[Any] = [Line2D([], [], color=style.PLANNED, linewidth=3.6, label="planned path")]
     if track is not None:
-        _line(axes, projection, terrain, drawn_positions(track), style.FLOWN, 1.2, 6)
+        _line(axes, projection, terrain, track.position[drawn_rows(track, _MOST_TRACK)], style.FLOWN, 1.2, 6)
         handles.append(Line2D([], [], color=style.FLOWN, linewidth=1.2, label="flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)

@@ -4,31 +4,41 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY
 from flight.simulation.control_limits import control_limits, held_at_limit
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements import style
-from logs.figures.elements.panels import Panel, Series, doubles, draw_panels, time_axis
+from logs.figures.elements.panels import Panel, Series, Stack, doubles, draw_stack, time_axis
 
 # Power is the battery's energy over this long, s: less would show its float32 steps.
 _POWER_WINDOW = 2.0
 
 
 def draw_time_plots(setup: FlightSetup, track: Track) -> Figure:
-    """Five or six panels over time (s): airspeed, bank, load factor, cross-track error, height error, clearance.
+    """Seven or eight panels over time (s), those of `time_stack`.  Grey lines with numbers part the legs."""
+    return draw_stack(time_stack(setup, track))
 
-    Clearance is computed from track and terrain, not read from the log; its panel is missing without terrain.  Grey
-    lines with numbers part the legs.
+
+def time_stack(setup: FlightSetup, track: Track) -> Stack:
+    """Airspeed, bank, climb, load factor, wind, cross-track error, height error and clearance over time.
+
+    Clearance is computed from track and terrain, not read from the log; its panel is missing without terrain.
     """
-    return draw_panels(_title(setup, "the flight over time"), _panels(setup, track), time_axis(track), track)
+    return Stack(_title(setup, "the flight over time"), _panels(setup, track), time_axis(track), track)
 
 
 def draw_controls(setup: FlightSetup, track: Track) -> Figure:
-    """Four panels over time: elevator, aileron, rudder and throttle, as commanded and as they stood.
+    """Four panels over time, those of `control_stack`.  Shaded where a command is at or beyond its control's limit."""
+    return draw_stack(control_stack(setup, track))
 
-    Shaded where the command is at or beyond the control's limit: the aircraft can give no more.
+
+def control_stack(setup: FlightSetup, track: Track) -> Stack:
+    """Elevator, aileron, rudder and throttle over time, as commanded and as they stood.
+
+    Held: the command is at or beyond the control's limit, and the aircraft can give no more.
     """
     commanded: dict[str, Any] = {"color": style.LIMIT, "width": 2.0}
     panels = []
@@ -43,11 +53,16 @@ def draw_controls(setup: FlightSetup, track: Track) -> Figure:
         known = np.isfinite([low, high]).all()
         edges = [("limits", scale * low), ("", scale * high)] if known else []
         panels.append(Panel(f"{name}\n({unit})", series, edges, held=held_at_limit(track, k, low, high)))
-    return draw_panels(_title(setup, "controls and their limits"), panels, time_axis(track), track)
+    return Stack(_title(setup, "controls and their limits"), panels, time_axis(track), track)
 
 
 def draw_energy(setup: FlightSetup, track: Track) -> Figure:
-    """Four panels over time: battery energy used, power, current, and the aircraft's specific energy as a height.
+    """Four panels over time, those of `energy_stack`."""
+    return draw_stack(energy_stack(setup, track))
+
+
+def energy_stack(setup: FlightSetup, track: Track) -> Stack:
+    """Battery energy used, power, current, and the aircraft's specific energy as a height, over time.
 
     Of an aircraft that burns fuel, its heat is shown, and no current.
     """
@@ -75,7 +90,7 @@ def draw_energy(setup: FlightSetup, track: Track) -> Figure:
         ),
     ]
     whole = f"{scale * setup.battery:.0f} {unit} {'in full tanks' if burns else 'in a full battery'}"
-    return draw_panels(_title(setup, f"energy, of {whole}"), panels, time_axis(track), track)
+    return Stack(_title(setup, f"energy, of {whole}"), panels, time_axis(track), track)
 
 
 def _title(setup: FlightSetup, subject: str) -> str:
@@ -98,7 +113,9 @@ def _panels(setup: FlightSetup, track: Track) -> list[Panel]:
             [Series("flown", bank)],
             [("limit of planned turns;\ncorrections may pass it", limit), ("", -limit)],
         ),
+        Panel("climb rate\n(m/s)", [Series("flown", doubles(_up(track.velocity)))], least_span=1.0),
         Panel("load factor\n(g)", [Series("flown", doubles(track.load_factor))], least_span=0.2),
+        Panel("wind, with\ngusts (m/s)", [Series("flown", _wind_speed(track))], least_span=1.0),
         Panel("cross-track,\nright + (m)", [Series("as guidance saw it", doubles(track.cross_track))], least_span=0.1),
         Panel("height error,\nhigh + (m)", [Series("as guidance saw it", doubles(track.height_error))], least_span=0.1),
     ]
@@ -108,3 +125,16 @@ def _panels(setup: FlightSetup, track: Track) -> list[Panel]:
         above = Series("from track and terrain", track.position[:, 2] - ground)
         panels.append(Panel("height above\nground (m)", [above], [("required", setup.scenario.limits.min_clearance_m)]))
     return panels
+
+
+def _up(vectors: NDArray[np.float32]) -> NDArray[np.float32]:
+    up: NDArray[np.float32]
+    _, _, up = vectors.T
+    return up
+
+
+def _wind_speed(track: Track) -> NDArray[np.float64]:
+    """Speed of the air over the ground, level part, (t,) m/s."""
+    east, north, _ = doubles(track.wind).T
+    speed: NDArray[np.float64] = np.hypot(east, north)
+    return speed

@@ -30,7 +30,8 @@ class PlaceValue:
     ok: bool | None
 
 
-_PANELS = (
+# Rule, kind of place, and the title with the unit.
+PLACE_PANELS = (
     ("turn", "waypoint", "turn\n(°)"),
     ("slope", "leg", "slope\n(°)"),
     ("clearance", "leg", "least height above\nground (m)"),
@@ -58,7 +59,7 @@ def draw_turns(name: str, verdict: Verdict) -> Figure:
     Bars stand for the plan, dots for the flight, dashes for limits.
     What fails is ringed and its number is written in the same colour.
     """
-    shown = [(*panel, values) for panel in _PANELS if (values := place_values(verdict.findings, panel[0]))]
+    shown = [(*panel, values) for panel in PLACE_PANELS if (values := place_values(verdict.findings, panel[0]))]
     total = _TOP + _BOTTOM + max(1, len(shown)) * _PANEL + max(0, len(shown) - 1) * _GAP
     with style.clean_style():
         figure = style.new_figure(total)

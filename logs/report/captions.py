@@ -5,6 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flight.simulation.flight_setup import FlightSetup
+from logs.figures.elements.style import few_colours
+
+# Bytes from which on a picture is kept with few colours.
+_LARGE = 200_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,11 +47,21 @@ def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, byte
             title=caption.title,
             alternative=caption.alternative,
             caption=caption.caption,
-            data="data:image/png;base64," + base64.b64encode(pictures[f"{name}.png"]).decode("ascii"),
+            data=picture_address(pictures[f"{name}.png"]),
         )
         for name, caption in _captions(setup, flown).items()
         if f"{name}.png" in pictures
     ]
+
+
+def picture_address(png: bytes) -> str:
+    """A picture as an address that holds it; one that is large with few colours, as it is seen on paper alone.
+
+    >>> picture_address(b"PNG")
+    'data:image/png;base64,UE5H'
+    """
+    small = png if len(png) <= _LARGE else few_colours(png)
+    return "data:image/png;base64," + base64.b64encode(small).decode("ascii")
 
 
 def _captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:

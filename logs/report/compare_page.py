@@ -1,18 +1,26 @@
 """The comparison of two flights as files: pictures, and a page that holds them."""
 
-import base64
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
 from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_both_over_distance
+from logs.figures.elements.scene_data import script_json
 from logs.figures.elements.style import png_bytes, svg_bytes
+from logs.report.captions import picture_address
+from logs.report.charts.compare_charts import compare_charts
 from logs.report.compare import Comparison, difference_rows
+from logs.report.page_parts import CHART_SCRIPTS, page_library, script_digest, script_text, style_text
 from world.atomic_files import write_whole
 
-_ALTERNATIVES = {
-    "compare-map.png": "Both flights from above, over the first one's map",
-    "compare-profile.png": "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
+# Name of the chart that stands for each picture, and what it shows.
+_PICTURES = {
+    "compare-map.png": ("map", "Both flights from above, over the first one's map"),
+    "compare-profile.png": (
+        "along",
+        "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
+    ),
 }
 
 
@@ -38,7 +46,7 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     if first.setup.scenario.origin == second.setup.scenario.origin:
         figures = {"compare-map": draw_both_on_map((first, second)), **figures}
     files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
-    page = _page(comparison, files)
+    page = _page(comparison, (first, second), files)
     if svg:
         files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
     files["compare.html"] = page.encode("utf-8")
@@ -48,12 +56,10 @@ def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False
     return [out_dir / name for name in files]
 
 
-def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
-    """The page, its pictures inside."""
-    pictures = [
-        ("data:image/png;base64," + base64.b64encode(data).decode("ascii"), _ALTERNATIVES[name])
-        for name, data in files.items()
-    ]
+def _page(comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], files: dict[str, bytes]) -> str:
+    """The page, its pictures, charts and scripts inside."""
+    pictures = [(*_PICTURES[name], picture_address(data)) for name, data in files.items()]
+    data, script = compare_charts(flights), script_text(CHART_SCRIPTS)
     verdicts = [
         (name, verdict.flyable, verdict.headline)
         for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
@@ -71,4 +77,11 @@ def _page(comparison: Comparison, files: dict[str, bytes]) -> str:
         rows=difference_rows(comparison),
         notes=comparison.notes,
         pictures=pictures,
+        style=Markup(style_text("style", "compare")),
+        scene=Markup(script_json(data["scene"])),
+        flight_data=Markup(script_json(data["flight"])),
+        chart_data=Markup(script_json(data["charts"])),
+        library=page_library(),
+        script=Markup(script),
+        script_digest=script_digest(script),
     )

@@ -1,15 +1,13 @@
 """The report of a flight: one HTML page that needs no other file, and its pictures as files.
 
-The page holds its pictures, its style and one script, that of the 3-D view, which its policy names by hash; it asks
-no network for anything, and without the script a still picture stands in the view's place.
+The page holds its pictures, its style, its data and two scripts, its own and plotly.js, which its policy names by
+hash; it asks no network for anything.  Without the scripts and on paper, still pictures stand in place of 3-D view and
+charts.
 """
 
-import base64
-import hashlib
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
@@ -17,9 +15,11 @@ from markupsafe import Markup
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.elements.failures import failures
-from logs.figures.elements.scene_data import scene_json
+from logs.figures.elements.scene_data import scene_data, script_json
 from logs.report import tables
 from logs.report.captions import report_pictures
+from logs.report.charts.page_charts import report_charts, report_flight
+from logs.report.page_parts import CHART_SCRIPTS, VIEW_SCRIPTS, page_library, script_digest, script_text, style_text
 from logs.report.text import badge_of, count_sentence, finding_rows, level_rows, rule_rows
 from logs.verdict.findings import Verdict
 from logs.verdict.measures.airspace import with_fence_zones
@@ -91,7 +91,7 @@ def _page(
     events: Sequence["LogEvent"] = (),
 ) -> str:
     failed = failures(verdict, len(setup.route.waypoints))
-    rows = finding_rows(verdict.findings)
+    rows = finding_rows(verdict.findings, verdict.deciding)
     environment = Environment(
         loader=PackageLoader("logs.report"),
         autoescape=True,
@@ -99,7 +99,6 @@ def _page(
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    script = "\n" + _script()
     return environment.get_template("report.html").render(
         name=setup.scenario.name,
         badge=badge_of(verdict),
@@ -125,12 +124,24 @@ def _page(
         energy=tables.energy_facts(setup, track),
         command=command,
         origin=tables.origin_facts(setup, versions),
-        # Both are made safe for where they stand: the scene by `scene_json`, the script is ours.
-        scene=Markup(scene_json(with_fence_zones(setup), track, failed)),
-        script=Markup(script),
-        script_hash=base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii"),
+        **_page_data(setup, track, verdict),
     )
 
 
-def _script() -> str:
-    return resources.files("logs.report").joinpath("templates", "view3d.js").read_text(encoding="utf-8")
+def _page_data(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Any]:
+    """What the page's scripts read, made safe for where it stands, and the scripts themselves."""
+    failed = failures(verdict, len(setup.route.waypoints))
+    drawn, script = with_fence_zones(setup), script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
+    flight = report_flight(setup, track)
+    return {
+        "style": Markup(style_text("style", "report")),
+        "scene": Markup(script_json(scene_data(drawn, track, failed))),
+        "flight_data": Markup(script_json(flight)),
+        "chart_data": Markup(script_json(report_charts(drawn, track, verdict, failed))),
+        "threats": len(setup.scenario.threats),
+        "moments": bool(flight["flights"]),
+        "timed": ("time", "controls", "energy") if flight["flights"] else (),
+        "library": page_library(),
+        "script": Markup(script),
+        "script_digest": script_digest(script),
+    }

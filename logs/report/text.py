@@ -4,7 +4,9 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from logs.report.would_pass import WouldPass, would_pass
 from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.levels import DecidingParameter
 from logs.verdict.wording import place_text, suggestions_text
 
 NOTHING = "–"
@@ -13,7 +15,11 @@ _UNITS = {"deg": "°", "none": "", "1": ""}
 
 @dataclass(frozen=True, slots=True)
 class FindingRow:
-    """One finding as text.  state: "fail", "pass" or "unjudged"; sign: the same for people who see no colour."""
+    """One finding as text.
+
+    state: "fail", "pass" or "unjudged"; sign: the same for people who see no colour.
+    would_pass: of a failed one, the number and the changes that would have passed; "" where nothing is known.
+    """
 
     state: str
     sign: str
@@ -28,6 +34,7 @@ class FindingRow:
     method: str
     reason: str
     sentence: str
+    would_pass: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +146,34 @@ def level_rows(verdict: Verdict) -> list[LevelRow]:
     return rows
 
 
-def finding_rows(findings: Iterable[Finding]) -> list[FindingRow]:
-    """All findings as text: failing first, then passed, then not judged; otherwise in the verdict's order."""
+def finding_rows(findings: Iterable[Finding], deciding: DecidingParameter | None = None) -> list[FindingRow]:
+    """All findings as text: failing first, then passed, then not judged; otherwise in the verdict's order.
+
+    deciding: the verdict's parameter, for what would pass.
+    """
     order = {"fail": 0, "pass": 1, "unjudged": 2}
-    return sorted((_row(finding) for finding in findings), key=lambda row: order[row.state])
+    return sorted((_row(finding, deciding) for finding in findings), key=lambda row: order[row.state])
+
+
+def would_pass_text(found: WouldPass, unit: str) -> str:
+    """What would have passed, in words; "" where nothing is known.
+
+    unit: of the finding.
+
+    >>> would_pass_text(WouldPass("at most", 7.8, 3.45, (), None), "deg")
+    'at most 7.80° (misses by 3.45°)'
+    """
+    parts = []
+    if found.bound is not None:
+        value = abs(found.value) if found.value is not None and unit in ("deg", "rad") else found.value
+        parts.append(f"{found.bound} {quantity(value, unit)} (misses by {quantity(found.misses, unit)})")
+    if found.suggestions:
+        parts.append(suggestions_text(found.suggestions))
+    if found.parameter is not None:
+        one = found.parameter
+        unit_text = f"\u00a0{one.unit}" if one.unit else ""
+        parts.append(f"the plan as it is, with {one.name} {one.passing:g}{unit_text} instead of {one.current:g}")
+    return "; ".join(parts)
 
 
 def count_sentence(rows: list[FindingRow]) -> str:
@@ -154,7 +185,7 @@ def count_sentence(rows: list[FindingRow]) -> str:
     return f"{held}{failed}{left}."
 
 
-def _row(finding: Finding) -> FindingRow:
+def _row(finding: Finding, deciding: DecidingParameter | None = None) -> FindingRow:
     state = state_of(finding.ok)
     planned, flown, limit, margin = (
         in_unit(value, finding.unit)[0] for value in (finding.planned, finding.flown, finding.limit, finding.margin)
@@ -176,6 +207,7 @@ def _row(finding: Finding) -> FindingRow:
         method=method,
         reason=finding.reason + (f"; would pass: {mended}" if mended else ""),
         sentence=_sentence(finding),
+        would_pass=would_pass_text(would_pass(finding, deciding), finding.unit) if finding.ok is False else "",
     )
 
 

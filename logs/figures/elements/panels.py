@@ -67,6 +67,31 @@ class Axis:
     values: Floats
 
 
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """What a picture of stacked panels shows, for a figure and for the page's chart alike.
+
+    title: of the whole.
+    panels: from the top.
+    axis: common to all.
+    track: with as many rows as the axis; None where no legs are parted.
+    """
+
+    title: str
+    panels: Sequence[Panel]
+    axis: Axis
+    track: Track | None
+
+    def shown(self) -> list[Panel]:
+        """The panels that have a value; the first where none has any."""
+        return [panel for panel in self.panels if _has_values(panel)] or list(self.panels[:1])
+
+
+def draw_stack(stack: Stack) -> Figure:
+    """Draw a stack, as `draw_panels` does."""
+    return draw_panels(stack.title, stack.panels, stack.axis, stack.track)
+
+
 def time_axis(track: Track) -> Axis:
     """Time since the start."""
     return Axis("time since the start (s)", track.time)
@@ -83,7 +108,7 @@ def draw_panels(title: str, panels: Sequence[Panel], axis: Axis, track: Track | 
     track: with as many rows as the axis; grey lines with numbers then part its legs.
     Where each look means one thing in all panels, and some mean it in several, one legend stands above them.
     """
-    panels = [panel for panel in panels if _has_values(panel)] or panels[:1]
+    panels = Stack(title, panels, axis, track).shown()
     top, right = (_TOP, _RIGHT)
     if shared := shares_legend(panels):
         top, right = _TOP + _LEGEND, _EDGE

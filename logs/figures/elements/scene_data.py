@@ -1,4 +1,4 @@
-"""Ground, threats, plan and flight as the data of the 3-D pictures; for the report's 3-D view as a small JSON text."""
+"""Ground, threats and plan as the data of the 3-D pictures; for the report's page as what JSON can hold."""
 
 import base64
 import json
@@ -15,8 +15,7 @@ from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
-MOST_GROUND = 170  # vertices a side: index numbers of the mesh stay below 65,536
-MOST_TRACK = 1600
+MOST_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536
 MISSING = 65535
 
 
@@ -62,22 +61,32 @@ def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) ->
     return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wanted, 1.0))
 
 
-def drawn_positions(track: Track, most: int = MOST_TRACK) -> Floats:
-    """At most ``most`` positions of the track that are numbers, (n, 3) m."""
-    good = track.position[np.isfinite(track.position).all(axis=1)]
-    rows = np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))
-    return good[rows]
+def drawn_rows(track: Track, most: int) -> NDArray[np.intp]:
+    """At most ``most`` rows of the track at which its position is a number, first and last of those among them."""
+    good = np.flatnonzero(np.isfinite(track.position).all(axis=1))
+    return good[np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))]
 
 
-def scene_json(setup: FlightSetup, track: Track | None, failed: Failures) -> str:
-    """Write the scene as JSON that may stand inside an HTML script element.
+def script_json(data: object) -> str:
+    """JSON that may stand inside an HTML script element: "<" would end that early where a name holds one.
 
+    >>> "<" in script_json({"name": "</script>"}), json.loads(script_json({"name": "</script>"}))
+    (False, {'name': '</script>'})
+    """
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def scene_data(setup: FlightSetup, track: Track | None, failed: Failures) -> dict[str, object]:
+    """The scene as what JSON can hold; the flight itself is not in it.
+
+    track: for how far the scene reaches.
     Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
     """
     bounds = scene_bounds(setup, track)
     grid = ground_grid(setup.scenario.terrain, bounds, MOST_GROUND)
     threats = setup.scenario.threats
-    scene = {
+    return {
         "name": setup.scenario.name,
         "bounds": np.round(bounds, 1).tolist(),
         "stretch": exaggeration(setup, bounds, grid),
@@ -93,12 +102,8 @@ def scene_json(setup: FlightSetup, track: Track | None, failed: Failures) -> str
         ],
         **_zone_walls(setup),
         "plan": np.round(setup.route.waypoints, 1).tolist(),
-        "track": [] if track is None else np.round(drawn_positions(track), 1).tolist(),
         "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
     }
-    # "<" would end the script element early where a name holds one.
-    text = json.dumps(scene, separators=(",", ":"), allow_nan=False)
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _zone_walls(setup: FlightSetup) -> dict[str, object]:

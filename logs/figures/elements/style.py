@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
+from PIL import Image
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -102,6 +103,19 @@ def png_bytes(figure: Figure) -> bytes:
     (1500, 300)
     """
     return _rendered(figure, "png", {"Software": None})
+
+
+def few_colours(png: bytes) -> bytes:
+    """A PNG with 256 colours at most: of shaded ground a fifth of its size, with no difference to see on paper.
+
+    >>> few_colours(png_bytes(new_figure(1.0)))[1:4]
+    b'PNG'
+    """
+    buffer = io.BytesIO()
+    with Image.open(io.BytesIO(png)) as picture:
+        flat = picture.convert("RGB").quantize(256, method=Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE)
+    flat.save(buffer, format="png")
+    return buffer.getvalue()
 
 
 def svg_bytes(figure: Figure) -> bytes:

@@ -26,7 +26,7 @@ def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> li
     radars = np.flatnonzero(threats.detection_radius > 0.0)
     centres = threats.position[:, :2]
     if missiles.size:
-        radii = _kill_radius_at_path(threats, missiles, route)
+        radii = kill_radius_at_path(threats, missiles, route)
         axes.add_collection(
             PatchCollection(
                 [Circle(tuple(centres[k]), float(r)) for k, r in zip(missiles, radii, strict=True) if r > 0.0],
@@ -70,7 +70,7 @@ def draw_threat_circles(axes: Any, threats: Threats, route: Floats | None) -> li
     return handles
 
 
-def _kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
+def kill_radius_at_path(threats: Threats, chosen: NDArray[np.intp], route: Floats | None) -> Floats:
     """Radius (m) of each chosen missile sphere's cut at the height of the path where it passes nearest."""
     radius = threats.kill_radius[chosen]
     if route is None:

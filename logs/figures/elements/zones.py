@@ -1,5 +1,6 @@
 """Zones of airspace on the map (their shapes) and on the profile (what they take of the plane through the path)."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -89,6 +90,40 @@ def name_zones(axes: Any, zones: tuple[Zone, ...], placer: LabelPlacer) -> None:
             )
 
 
+@dataclass(frozen=True, slots=True)
+class ZoneCut:
+    """What a zone forbids of the vertical plane through a path.
+
+    zone: which one.
+    bottom, top: (s,) m AMSL at each of the path's samples.
+    where: (s,) bool, the samples at which that is forbidden.
+    """
+
+    zone: Zone
+    bottom: Floats
+    top: Floats
+    where: NDArray[np.bool_]
+
+
+def zone_cuts(zones: tuple[Zone, ...], points: Floats, ground: Floats | None, low: float, high: float) -> list[ZoneCut]:
+    """What zones forbid between low and high (m AMSL) over the points (s, 3); nothing of those away from the path.
+
+    ground: (s,) m AMSL or None.
+    """
+    under = np.full(len(points), low) if ground is None else np.where(np.isfinite(ground), ground, low)
+    records, cuts = zone_records(zones), []
+    for z, zone in enumerate(zones):
+        over = np.array([edge_distance(records, z, east, north) <= 0.0 for east, north, _ in points])
+        floor = np.clip(level_heights(zone.floor, under, low), low, high)
+        ceiling = np.clip(level_heights(zone.ceiling, under, high), low, high)
+        bands = [(floor, ceiling, over)]
+        if zone.kind == "inclusion":
+            whole = np.full(len(points), low), np.full(len(points), high)
+            bands = [(whole[0], floor, over), (ceiling, whole[1], over), (*whole, ~over)]
+        cuts += [ZoneCut(zone, bottom, top, where & (top > bottom)) for bottom, top, where in bands]
+    return [cut for cut in cuts if cut.where.any()]
+
+
 def draw_zone_cuts(
     axes: Any, zones: tuple[Zone, ...], distance: Floats, points: Floats, ground: Floats | None
 ) -> list[tuple[str, float, float]]:
@@ -98,23 +133,12 @@ def draw_zone_cuts(
     middle of its stretch (km) and the height (m AMSL) to write it at.
     """
     low, high = axes.get_ylim()
-    under = np.full(len(points), low) if ground is None else np.where(np.isfinite(ground), ground, low)
-    kilometres, records = distance / 1000.0, zone_records(zones)
-    names = []
+    kilometres, names = distance / 1000.0, []
     look: dict[str, Any] = {"facecolor": (*style.ZONE_FILL, 0.14), "edgecolor": style.ZONE, "hatch": _HATCH}
-    for z, zone in enumerate(zones):
-        over = np.array([edge_distance(records, z, east, north) <= 0.0 for east, north, _ in points])
-        floor = np.clip(level_heights(zone.floor, under, low), low, high)
-        ceiling = np.clip(level_heights(zone.ceiling, under, high), low, high)
-        bands = [(floor, ceiling, over)]
-        if zone.kind == "inclusion":
-            whole = np.full(len(points), low), np.full(len(points), high)
-            bands = [(whole[0], floor, over), (ceiling, whole[1], over), (*whole, ~over)]
-        for bottom, top, where in bands:
-            shown = where & (top > bottom)
-            if shown.any():
-                axes.fill_between(kilometres, bottom, top, where=shown, linewidth=0.9, zorder=2.4, **look)
-        if over.any() and zone.kind == "exclusion":
-            middle = int(np.flatnonzero(over)[over.sum() // 2])
-            names.append((zone_label(zone), float(kilometres[middle]), 0.5 * float(floor[middle] + ceiling[middle])))
+    for cut in zone_cuts(zones, points, ground, low, high):
+        axes.fill_between(kilometres, cut.bottom, cut.top, where=cut.where, linewidth=0.9, zorder=2.4, **look)
+        if cut.zone.kind == "exclusion":
+            middle = int(np.flatnonzero(cut.where)[cut.where.sum() // 2])
+            height = 0.5 * float(cut.bottom[middle] + cut.top[middle])
+            names.append((zone_label(cut.zone), float(kilometres[middle]), height))
     return names

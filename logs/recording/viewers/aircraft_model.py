@@ -45,6 +45,11 @@ def model_corners() -> Singles:
     return np.array([triangle for triangles, _ in _PARTS for triangle in triangles], dtype=np.float32) * SPAN
 
 
+def model_colours() -> Singles:
+    """(t, 4) colours of the triangles: red, green, blue, opacity, 0 to 1."""
+    return np.array([colour for triangles, colour in _PARTS for _ in triangles], dtype=np.float32)
+
+
 def aircraft_glb() -> bytes:
     """The model as a `.glb` file: one unit wide, in glTF's axes (right-handed, y up), each part with its colour."""
     pieces = b""

@@ -23,7 +23,7 @@ def panel(figure: Any, title: str) -> Any:
 
 def test_bank_and_height_above_ground_are_those_of_track_and_terrain() -> None:
     figure = draw_time_plots(SETUP, TRACK)
-    assert len(figure.axes) == 6
+    assert len(figure.axes) == 8
     bank = panel(figure, "bank")
     # Half a radian to the left at 41 s; the limit is 30 degrees either way.
     assert np.interp(41.0, *line(bank, "flown").get_xydata().T) == pytest.approx(-math.degrees(0.5))
@@ -37,7 +37,7 @@ def test_bank_and_height_above_ground_are_those_of_track_and_terrain() -> None:
 
 def test_without_terrain_there_is_no_panel_of_clearance() -> None:
     figure = draw_time_plots(make_setup(terrain={"kind": "none"}, threats=[]), TRACK)
-    assert len(figure.axes) == 5
+    assert len(figure.axes) == 7
     assert not any("ground" in axes.get_ylabel() for axes in figure.axes)
 
 

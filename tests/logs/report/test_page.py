@@ -15,6 +15,7 @@ from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.draw_all import FIGURE_FILES
 from logs.report.page import write_report
+from logs.report.page_parts import page_library
 from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
 from tests.logs.report.report_data import (
@@ -50,7 +51,8 @@ def test_page_is_whole_and_loads_nothing() -> None:
     page = Page(html)
     names = [name for name, _ in page.tags]
     assert not {"link", "iframe", "object", "form", "base"} & set(names)
-    assert [attributes.get("type") for name, attributes in page.tags if name == "script"] == ["application/json", None]
+    scripts = [attributes.get("type") for name, attributes in page.tags if name == "script"]
+    assert scripts == [*["application/json"] * 3, "application/gzip", None]
     assert dict(page.tags)["html"]["lang"] == "en"
     for name, attributes in page.tags:
         for key in ("src", "href", "srcset", "action"):
@@ -60,11 +62,12 @@ def test_page_is_whole_and_loads_nothing() -> None:
     script = html.rpartition("<script>")[2].partition("</script>")[0]
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     policy = next(str(a["content"]) for _, a in page.tags if a.get("http-equiv") == "Content-Security-Policy")
-    assert f"script-src 'sha256-{digest}'" in policy
+    assert f"script-src 'sha256-{digest}' '{page_library().digest}';" in policy
     assert "default-src 'none'" in policy
-    assert "http:" not in html
-    assert "https:" not in html
-    assert "url(" not in html
+    words = html.replace(page_library().packed, "")
+    assert "http:" not in words
+    assert "https:" not in words
+    assert "url(" not in words
     images = [attributes for name, attributes in page.tags if name == "img"]
     assert [base64.b64decode(str(image["src"]).partition(",")[2]) for image in images] == [PNG] * 9
     assert all(len(str(image["alt"])) > 30 for image in images)
@@ -85,6 +88,7 @@ def test_verdict_comes_first_then_what_fails() -> None:
         "Start: in the air",
         "What fails",
         "leg 1, slope: flown 11.2°, limit 7.80° (aircraft), beyond it by 3.45°; why leg 1",
+        "Would pass: at most 7.80° (misses by 3.45°).",
         "item 9: no loiter",
         "By rule",
         "Leg by leg",
@@ -109,8 +113,8 @@ def test_hostile_names_stay_text() -> None:
     evil = finding("threat", Place("missile", 0, name=EVIL), False, -1.0, reason=EVIL, method=EVIL, unit=EVIL)
     verdict = Verdict((evil,), False, False, (EVIL,), EVIL)
     html = report_html(setup, make_track(), verdict, ended=EVIL, versions={EVIL: EVIL}, command=EVIL)
-    assert len(re.findall("<script", html)) == 2
-    assert len(re.findall("</script", html)) == 2
+    assert len(re.findall("<script", html)) == 5
+    assert len(re.findall("</script", html)) == 5
     assert Page(html).text().count("<script>alert('x')</script>") > 8
     scene = json.loads(html.partition('id="scene-data">')[2].partition("</script>")[0])
     assert scene["name"] == EVIL

@@ -1,24 +1,19 @@
 """The page works in a browser: wide and narrow, with mouse and keys, without a script, on paper."""
 
-import io
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.image import imread
 
 from flight.simulation.flight_setup import FlightSetup
 from flight.simulation.track import Track
 from logs.report.page import write_report
 from logs.verdict.judge_flight import judge_flight
 from tests.browser import Browser
+from tests.logs.report.page_in_browser import own_problems, pixels, spread
 
 pytestmark = [pytest.mark.client, pytest.mark.xdist_group("browser")]
-
-# Messages of a software renderer about a screenshot, not about the page.
-_RENDERER = re.compile(r"GL Driver Message|GPU stall|swiftshader", re.IGNORECASE)
 
 
 @pytest.fixture(scope="module")
@@ -27,19 +22,6 @@ def page(tmp_path_factory: pytest.TempPathFactory, setup: FlightSetup, track: Tr
     verdict = judge_flight(setup, track, "completed")
     arguments: dict[str, Any] = {"ended": "completed", "versions": {"planfly": "0"}, "command": "planfly run small"}
     return write_report(folder, setup, track, verdict, **arguments)[-1]
-
-
-def pixels(png: bytes) -> np.ndarray:
-    return np.asarray(imread(io.BytesIO(png), format="png"))[..., :3]
-
-
-def spread(png: bytes) -> int:
-    """How many clearly different colours a picture has."""
-    return len(np.unique((pixels(png) * 15).astype(int).reshape(-1, 3), axis=0))
-
-
-def own_problems(browser: Browser) -> list[str]:
-    return [text for text in browser.problems if not _RENDERER.search(text)]
 
 
 def test_wide_page_draws_the_view_and_fills_the_tables(page: Path, tmp_path: Path) -> None:
@@ -119,3 +101,6 @@ def test_on_paper_the_still_picture_stands(page: Path, tmp_path: Path) -> None:
         browser.call("Emulation.setEmulatedMedia", media="print")
         assert browser.value("getComputedStyle(document.querySelector('#view3d')).display") == "none"
         assert browser.value("getComputedStyle(document.querySelector('.still')).display") == "block"
+        shown = "[...document.querySelectorAll('SELECTOR')].map(e => getComputedStyle(e).display)"
+        assert set(browser.value(shown.replace("SELECTOR", ".chart, .player, .key"))) == {"none"}
+        assert set(browser.value(shown.replace("SELECTOR", ".picture"))) == {"block"}

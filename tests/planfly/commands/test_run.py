@@ -54,6 +54,7 @@ def test_a_run_leaves_every_file(demo: Path) -> None:
     assert all(path.stat().st_size > 500 for path in demo.iterdir())
     assert (demo / "map.png").read_bytes().startswith(b"\x89PNG")
     page = (demo / "report.html").read_text(encoding="utf-8")
+    assert len(page.encode("utf-8")) < 8e6
     assert not re.search(r"(src|href)=.https?:", page)
 
 

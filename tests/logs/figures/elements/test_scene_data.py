@@ -11,11 +11,12 @@ from logs.figures.elements.failures import Failures
 from logs.figures.elements.scene_data import (
     MISSING,
     MOST_GROUND,
-    drawn_positions,
+    drawn_rows,
     exaggeration,
     ground_grid,
     scene_bounds,
-    scene_json,
+    scene_data,
+    script_json,
 )
 from tests.logs.made_flight import make_setup, make_track
 
@@ -69,17 +70,17 @@ def test_the_track_is_thinned_to_both_its_ends() -> None:
     track = make_track()
     position = track.position.copy()
     position[100:110] = np.nan
-    rows = drawn_positions(replace(track, position=position), 50)
+    rows = position[drawn_rows(replace(track, position=position), 50)]
     assert len(rows) == 50
     assert np.isfinite(rows).all()
     np.testing.assert_array_equal(rows[[0, -1]], track.position[[0, -1]])
-    assert drawn_positions(replace(track, position=np.full_like(position, np.nan))).shape == (0, 3)
+    assert drawn_rows(replace(track, position=np.full_like(position, np.nan)), 50).shape == (0,)
 
 
 def test_the_text_holds_the_scene_and_ends_no_script() -> None:
     evil = "</script><b>&"
     setup = replace(SETUP, scenario=replace(SETUP.scenario, name=evil))
-    text = scene_json(setup, make_track(), Failures({1: ("slope",)}, {2: ("turn",)}))
+    text = script_json(scene_data(setup, make_track(), Failures({1: ("slope",)}, {2: ("turn",)})))
     assert not set("<>&") & set(text)
     scene = json.loads(text)
     assert scene["name"] == evil
@@ -98,17 +99,16 @@ def test_the_text_holds_the_scene_and_ends_no_script() -> None:
     np.testing.assert_allclose(heights[known], terrain.height(east[None, :], north[:, None])[known], atol=0.01)
 
 
-def test_a_scene_without_terrain_and_flight_has_neither() -> None:
+def test_a_scene_without_terrain_has_no_ground() -> None:
     bare = replace(SETUP, scenario=replace(SETUP.scenario, terrain=None, external=True))
-    scene = json.loads(scene_json(bare, None, NOTHING))
-    assert (scene["ground"], scene["track"]) == (None, [])
+    assert scene_data(bare, None, NOTHING)["ground"] is None
 
 
 def test_zones_stand_in_the_scene_where_there_are_any() -> None:
-    assert "zones" not in json.loads(scene_json(SETUP, None, NOTHING))
+    assert "zones" not in scene_data(SETUP, None, NOTHING)
     zone = {"name": "</script>", "kind": "exclusion", "east_m": 0, "north_m": 0, "radius_m": 200, "ceiling_amsl_m": 900}
     setup = make_setup(zones=[zone], terrain={"kind": "flat", "amsl_m": 40})
-    text = scene_json(setup, None, NOTHING)
+    text = script_json(scene_data(setup, None, NOTHING))
     assert "<" not in text
     (found,) = json.loads(text)["zones"]
     ring = np.array(found["rings"][0])

@@ -1,0 +1,78 @@
+// Draws the page's charts: each when it comes near the screen, anew when width or colours change.
+
+function startCharts(charts, world) {
+  const { theme, clock } = world, holders = [...document.querySelectorAll(".chart")].filter((holder) => charts[holder.dataset.chart]);
+  if (!holders.length || !("DecompressionStream" in window)) return; // the pictures stay
+  const drawn = new Map();
+  let library = null;
+  for (const holder of holders) {
+    holder.closest("figure").classList.add("charted");
+    // What follows stays where it is when the chart comes.
+    const { panels, tall } = charts[holder.dataset.chart];
+    holder.style.minHeight = panels ? panels.length * (tall + PANEL_GAP) + 90 + "px" : "300px";
+  }
+  // Without the library the pictures come back.
+  function giveUp(error) {
+    for (const holder of holders) holder.closest("figure").classList.remove("charted");
+    throw error;
+  }
+
+  async function draw(holder) {
+    const chart = charts[holder.dataset.chart], width = Math.floor(holder.clientWidth);
+    if (!width || drawn.get(holder) === width) return;
+    drawn.set(holder, width);
+    library = library || loadPlotly().catch(giveUp);
+    const plotly = await library;
+    const figure = holder.dataset.chart === "map" ? mapFigure(chart, world, theme, width) : panelFigure(chart, theme, width);
+    if (chart.timed && clock) figure.layout.shapes.push(cursor(figure.layout));
+    await plotly.react(holder, figure.traces, figure.layout, CHART_CONFIG);
+    holder.style.minHeight = "";
+    holder.dataset.drawn = String(1 + Number(holder.dataset.drawn || 0));
+    nameButtons(holder);
+    if (chart.timed && clock && !holder.dataset.bound) bind(holder);
+  }
+  // A line at the moment that the page shows.
+  function cursor(layout) {
+    return { type: "line", yref: "paper", y0: 0, y1: 1, x0: clock.now(), x1: clock.now(), line: { color: theme.colour("aircraft"), width: 2 }, name: "now" };
+  }
+  function bind(holder) {
+    holder.dataset.bound = "yes";
+    holder.on("plotly_click", (event) => { clock.play(false); clock.set(event.points[0].x); });
+    let waiting = false;
+    clock.onChange(() => {
+      if (waiting) return;
+      waiting = true;
+      window.setTimeout(() => {
+        waiting = false;
+        const at = holder.layout.shapes.findIndex((shape) => shape.name === "now");
+        const box = holder.getBoundingClientRect();
+        if (at < 0 || box.bottom < 0 || box.top > window.innerHeight) return;
+        window.Plotly.relayout(holder, { [`shapes[${at}].x0`]: clock.now(), [`shapes[${at}].x1`]: clock.now() });
+      }, 120);
+    });
+  }
+  // Buttons say in words what they do; those of older plotly.js are links that lead nowhere, and no keyboard finds them.
+  function nameButtons(holder) {
+    for (const button of holder.querySelectorAll(".modebar-btn")) {
+      button.setAttribute("aria-label", button.getAttribute("data-title") || "");
+      if (button.tagName === "BUTTON" || button.role === "button") continue;
+      button.setAttribute("role", "button");
+      button.tabIndex = 0;
+      button.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); button.click(); } });
+    }
+  }
+  const near = new IntersectionObserver((seen) => {
+    for (const one of seen) if (one.isIntersecting) draw(one.target);
+  }, { rootMargin: "400px" });
+  function again(forget) {
+    for (const holder of holders) {
+      if (!drawn.has(holder)) continue;
+      if (forget) drawn.set(holder, 0);
+      draw(holder);
+    }
+  }
+  holders.forEach((holder) => near.observe(holder));
+  let later = 0;
+  window.addEventListener("resize", () => { window.clearTimeout(later); later = window.setTimeout(() => again(false), 150); });
+  theme.onChange(() => again(true));
+}
