@@ -16,8 +16,17 @@ from pathlib import Path
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-PARTS = tuple(
-    ["chain", "planner", "ablation", "peers", "flight", "aircraft", "autopilot", "airspace", "campaigns", "start"]
+PARTS = (
+    "chain",
+    "planner",
+    "ablation",
+    "peers",
+    "flight",
+    "aircraft",
+    "autopilot",
+    "airspace",
+    "campaigns",
+    "start",
 )
 TARGET = Path("runs") / "bench.json"
 
