@@ -1,8 +1,8 @@
 """``make bench``: measured side by side in one run, printed as tables and written to ``runs/bench.json``.
 
 ``python -m tests.bench [chain] [planner] [ablation] [peers] [flight] [aircraft] [autopilot] [airspace] [campaigns]
-[start] [--runs N] [--seconds S] [--seeds N] [--flights N] [--long]``: parts to measure (default: all), seeds of each whole
-planner run (15), what OMPL is given (10 s), seeds of flights (20), flights of a campaign (90), and the rows of
+[start] [--runs N] [--seconds S] [--seeds N] [--flights N] [--long]``: parts to measure (default: all), seeds of each
+whole planner run (15), what OMPL is given (10 s), seeds of flights (20), flights of a campaign (90), and the rows of
 campaigns that take an hour.
 """
 
