@@ -12,7 +12,6 @@ from flight.dynamics.fdm import Variation
 from flight.simulation.flight_setup import FlightSetup, make_limits
 from planfly.airframe import Airframe
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.step_rate import steps_of
 from planfly.campaigns.spread.draws import Draw
 from planfly.pipeline import OffNominal, make_setup
 from world.scenario import Scenario
@@ -53,8 +52,7 @@ def vary(base: CampaignBase, draw: Draw, wind: GivenWind | None = None) -> Varie
         scenario = replace(scenario, terrain=_raised(scenario.terrain, values["terrain_height"]))
     battery = base.airframe.battery * values["battery"]
     airframe = replace(base.airframe, limits=_limits(base.airframe, scenario), battery=battery)
-    steps = steps_of(airframe.aircraft)
-    setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed, fdm_hz=steps)
+    setup = make_setup(scenario, airframe, base.mission, draw.seed, plan=base.plan, placed=base.placed)
     variation = Variation(mass=values["mass"], drag=values["drag"], control=values["control_power"])
     offset = (values["start_east"], values["start_north"], values["start_up"])
     return VariedFlight(setup, airframe, OffNominal(variation, offset))
