@@ -131,10 +131,12 @@ def _start(log: FlightLog) -> TimelineEntry:
     east, north, up = track.position[0].tolist()
     lat, lon = to_geo(setup.scenario.origin, east, north)
     scenario = "a mission without a scenario" if setup.scenario.external else f"scenario {setup.scenario.name}"
-    text = (
-        f"{setup.aircraft}, {scenario}, seed {setup.seed}; from {float(lat):.5f}, {float(lon):.5f} at {up:.0f} m AMSL. "
-        f"{setup.route.started}"
-    )
+    place = f"from {float(lat):.5f}, {float(lon):.5f} at {up:.0f} m AMSL"
+    if setup.source is None:
+        text = f"{setup.aircraft}, {scenario}, seed {setup.seed}; {place}. {setup.route.started}"
+    else:
+        # A real flight was drawn from no seed, and nobody trimmed it.
+        text = f"{setup.aircraft}, {scenario}; log of the field {setup.source.file}, {place}"
     return TimelineEntry(float(track.time[0]), "start", text.strip())
 
 

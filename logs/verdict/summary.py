@@ -174,7 +174,7 @@ def summary_lines(
             "landing",
         ):
             silent.setdefault(item.rule, item.reason)
-    lines += [f"Not judged: {rule} ({reason})" for rule, reason in silent.items()]
+    lines += [f"Not judged: {RULES[rule]} ({reason})" for rule, reason in silent.items()]
     # Limits of that autopilot's own, which say nothing of the aircraft.
     lines += [
         f"PX4 would not take it: {item.reason}" for item in findings if item.rule == "mission" and item.ok is None

@@ -100,6 +100,7 @@ def _fly_rest(pilots: Pilots, book: _Book, store: Store, pace: "_Pace") -> None:
         pace.tell(book.tally)
         if book.decided:
             break
+    pace.tell(book.tally, last=True)
 
 
 def _take(row: FlightRow, book: _Book, store: Store) -> None:
@@ -114,9 +115,9 @@ class _Pace:
         self._goal, self._estimator, self._advance = goal, estimator, advance
         self._rate = FlightRate(known.flown)
 
-    def tell(self, tally: Tally) -> None:
-        """How far it is: flights, P with its bounds, flights a minute, time left."""
-        if self._advance is None or not tally.flown or not self._rate.due():
+    def tell(self, tally: Tally, last: bool = False) -> None:
+        """How far it is: flights, P with its bounds, flights a minute, time left.  last: whether or not it is due."""
+        if self._advance is None or not tally.flown or not (self._rate.due() or last):
             return
         found = self._estimator.estimate(tally)
         rate = self._rate.a_second(tally.flown)

@@ -52,10 +52,15 @@ def _state(findings: list[Finding]) -> str:
         value = tightest.flown if tightest.flown is not None else tightest.planned
         if value is not None and tightest.limit is not None:
             text += (
-                f"; tightest at {place_text(tightest.place)}: {value:.4g} {tightest.unit}"
-                f" against {tightest.limit:.4g} ({tightest.limit_source})"
+                f"; tightest at {place_text(tightest.place)}: {_figures(value)} {tightest.unit}"
+                f" against {_figures(tightest.limit)} ({tightest.limit_source})"
             )
     return text
+
+
+def _figures(value: float) -> str:
+    # Four figures, and no power of ten: a tank of fuel holds 1140000 Wh.
+    return f"{value:.4g}" if abs(value) < 1e4 else f"{value:.0f}"
 
 
 def print_warnings(warnings: Iterable[str]) -> None:

@@ -24,7 +24,9 @@ TYPED = {"sh", "python"}
 _FENCE = re.compile(r"^```(\w*)$")
 _MARK = re.compile(r"^<!-- test: (.*) -->$")
 # What others' programs a block may hold, which are not run.
-CLIENTS = {"rerun", "mavproxy.py", "make", "git", "cd", "pip", "python", "dask", "eval", "python3", "curl"}
+CLIENTS = {
+    *("rerun", "mavproxy.py", "make", "git", "cd", "cp", "source", "pip", "python", "dask", "eval", "python3", "curl")
+}
 
 
 class Block(NamedTuple):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flight.simulation.field_source import FieldSource
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.replay.instruments import make_instruments
@@ -38,6 +39,18 @@ def test_legs_turns_and_the_end_stand_in_order_of_time(log: FlightLog) -> None:
     assert "full for 4.0 s" in texts(entries, "throttle")
     assert texts(entries, "event") == ["warning: half way up", "arrived"]
     assert texts(entries, "end")[0].startswith("completed; 8.0 s, 2.72 km, 9.0 Wh")
+
+
+def test_a_real_flight_begins_where_its_log_does_without_seed_or_trim(log: FlightLog) -> None:
+    def start(given: FlightLog) -> str:
+        return timeline(given)[0].text
+
+    real = dataclasses.replace(log, setup=dataclasses.replace(log.setup, source=FieldSource("a.BIN", "", "")))
+    assert "seed" in start(log)
+    assert log.setup.route.started in start(log)
+    assert "; log of the field a.BIN, from " in start(real)
+    assert "seed" not in start(real)
+    assert log.setup.route.started not in start(real)
 
 
 def test_the_lowest_clearance_of_each_leg_is_that_of_a_fine_sampling(log: FlightLog) -> None:

@@ -7,17 +7,18 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
 from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.flight_loop import Order, Pilots
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import fly_one, lost_row
-from planfly.campaigns.fly_campaign import _Book, fly_campaign, open_store
+from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
+from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store
 from planfly.campaigns.report.summary import summarise
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally, lower_bound
@@ -82,6 +83,24 @@ def test_what_is_known_is_not_sent_again() -> None:
     while (order := book.following()) is not None:
         sent.append(order.index)
     assert sent == [2, 4, 5]
+
+
+def test_the_last_line_of_progress_counts_every_flight(base: CampaignBase, tmp_path: Path) -> None:
+    class AtOnce:
+        def fly(self, following: Callable[[], Order | None]) -> Iterator[tuple[Order, FlightRow]]:
+            while (order := following()) is not None:
+                yield order, made_flight(base, order.index, None)
+
+    goal, told = Goal(None, False, 6), list[tuple[float, float, str]]()
+    estimator = Estimator(goal)
+    book = _Book(estimator, goal)
+    pace = _Pace(goal, estimator, book.tally, lambda *said: told.append(said))
+    with open_store(base, goal, tmp_path, resume=False) as store:
+        _fly_rest(cast("Pilots", AtOnce()), book, store, pace)
+    # They were quicker than a line is due.
+    assert [said[:2] for said in told] == [(6.0, 6.0)]
+    assert told[0][2].startswith("6 flights, P ")
+    assert told[0][2].endswith(", 0 s left")
 
 
 def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBase, tmp_path: Path) -> None:

@@ -35,6 +35,14 @@ def test_failures_stand_below_the_summary_with_what_would_pass(capsys: pytest.Ca
     assert lines[-1] == "  note    gusty"
 
 
+@pytest.mark.parametrize(("flown", "limit"), [(25_634.2, 1_139_821.0), (9999.0, 10_000.4)])
+def test_large_numbers_stand_without_a_power_of_ten(
+    capsys: pytest.CaptureFixture[str], flown: float, limit: float
+) -> None:
+    lines = printed(capsys, Verdict((slope(0, flown, limit),), True, True, ("flyable",), "flown"))
+    assert lines[1].endswith(f"leg 0: {round(flown)} deg against {round(limit)} (aircraft)")
+
+
 def test_of_many_failures_twelve_are_listed_and_the_rest_counted(capsys: pytest.CaptureFixture[str]) -> None:
     findings = tuple(slope(k, 9.0, 8.0) for k in range(15))
     lines = printed(capsys, Verdict(findings, False, True, ("not flyable",), "flown"))

@@ -68,7 +68,7 @@ def test_a_climb_too_steep_is_said_in_the_first_line() -> None:
     # 30 degrees, as QGroundControl draws a climb-out.
     verdict = judge_geometry(setup_of(*climb(30.0), home=HOME))
     assert verdict.headline == "flyable; take-off not judged"
-    assert any(line.startswith("Not judged: takeoff (climbs 100 m in 173 m, 30.0°; at most ") for line in verdict.lines)
+    assert any(line.startswith("Not judged: take-off (climbs 100 m in 173 m, 30.0°; at ") for line in verdict.lines)
 
 
 def test_a_landing_of_45_degrees_fails_in_flight_too() -> None:
