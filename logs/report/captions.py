@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flight.simulation.flight_setup import FlightSetup
-from logs.figures.elements.style import few_colours
 
 # Bytes from which on a picture is kept with few colours.
 _LARGE = 200_000
@@ -60,6 +59,9 @@ def picture_address(png: bytes) -> str:
     >>> picture_address(b"PNG")
     'data:image/png;base64,UE5H'
     """
+    # Imported here, as in `page`: matplotlib is not loaded before a drawing.
+    from logs.figures.elements.style import few_colours
+
     small = png if len(png) <= _LARGE else few_colours(png)
     return "data:image/png;base64," + base64.b64encode(small).decode("ascii")
 

@@ -18,7 +18,6 @@ from logs.figures.elements.failures import failures
 from logs.figures.elements.scene_data import scene_data, script_json
 from logs.report import tables
 from logs.report.captions import report_pictures
-from logs.report.charts.page_charts import report_charts, report_flight
 from logs.report.page_parts import CHART_SCRIPTS, VIEW_SCRIPTS, page_library, script_digest, script_text, style_text
 from logs.report.text import badge_of, count_sentence, finding_rows, level_rows, rule_rows
 from logs.verdict.findings import Verdict
@@ -130,6 +129,9 @@ def _page(
 
 def _page_data(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Any]:
     """What the page's scripts read, made safe for where it stands, and the scripts themselves."""
+    # Imported here: charts share the figures' lines and colours, and matplotlib is not loaded before a drawing.
+    from logs.report.charts.page_charts import report_charts, report_flight
+
     failed = failures(verdict, len(setup.route.waypoints))
     drawn, script = with_fence_zones(setup), script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
     flight = report_flight(setup, track)

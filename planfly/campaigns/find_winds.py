@@ -93,6 +93,7 @@ def find_winds(
                 _fly_round(pilots, search, missing, known, pace)
             for one in asked:
                 search.take(one, known.outcomes[one.number])
+    pace.tell(len(search.flown), last=True)
     store.drop_from(len(search.flown))
     return search.found()
 
@@ -193,12 +194,13 @@ class _Pace:
     def __init__(self, search: _Search, known: int, advance: Advance | None) -> None:
         self._search, self._advance, self._rate = search, advance, FlightRate(known)
 
-    def tell(self, flights: int) -> None:
+    def tell(self, flights: int, last: bool = False) -> None:
         """How far it is: directions settled, flights, flights a minute, and time left while flights are known to come.
 
+        last: whether or not it is due.
         How many a direction takes beyond the fewest shows only when it has them: no time is told then.
         """
-        if self._advance is None or not self._rate.due():
+        if self._advance is None or not (self._rate.due() or last):
             return
         search, rate = self._search, self._rate.a_second(flights)
         to_come = len(search.flown) + search.at_least() - flights
