@@ -13,15 +13,10 @@ from pathlib import Path
 
 from planfly.first_start.sharing import compile_units
 from planfly.kernel_units.unit_kernels import BOTH
+from planfly.kernel_units.units import MISSION
 from world.kernels import cache_folder
 
-# A climb and a corner over the level field of FIELD.
-MISSION = """QGC WPL 110
-0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0.0\t1
-1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100.0\t1
-2\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.0\t110.0\t1
-3\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.006\t110.0\t1
-"""
+# Over which the climb and the corner of MISSION lead.
 FIELD = """name = "field"
 [terrain]
 kind = "flat"
