@@ -145,7 +145,7 @@ class Requests:
         if reply.result == ACCEPTED:
             return [PeerMessage(peer, telemetry_message("MISSION_CURRENT", self.status))]
         # The message has no refusal, and MAVSDK asks again, without end, at each MISSION_CURRENT of another item: it
-        # gives up when it gets none for as long as it tries.
+        # gives up when it gets none for as long as it tries.  One that was on its way already still traps it.
         peer.due["MISSION_CURRENT"] = now + _QUIET
         return [StatusText(reply.text, WARNING)]
 

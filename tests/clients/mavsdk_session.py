@@ -5,7 +5,9 @@ Run as a subprocess, because the library is native and starts threads.  ITEMS.js
 """
 
 import json
+import os
 import sys
+import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +18,9 @@ from mavsdk.plugins.mission import Mission, MissionPlan
 from mavsdk.plugins.mission import MissionItem as PlanItem
 from mavsdk.plugins.mission_raw import MissionItem, MissionRaw, MissionRawError
 from mavsdk.plugins.telemetry import Telemetry
+
+# Seconds that a request may take, and what stands for the answer of one that takes longer.
+LIMIT, TRAPPED = 6.0, "NO END"
 
 
 def main() -> None:
@@ -30,7 +35,9 @@ def main() -> None:
         found = by_asking(system, rows)
     else:
         found = by_plan(system, rows) if task == "plan" else by_items(system, rows, task == "fly")
-    print(json.dumps(found))
+    print(json.dumps(found), flush=True)
+    # MAVSDK's threads would wait for a request that has no end.
+    os._exit(0)
 
 
 def by_items(system: System, rows: list[list[float]], flown: bool) -> dict[str, object]:
@@ -80,7 +87,6 @@ def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
     mission.start_mission()
     wait(telemetry.in_air)
     flight = {
-        "item": asked(lambda: mission.set_current_mission_item(0)),
         "pause": asked(mission.pause_mission),
         "hold": asked(action.hold),
         "return": asked(action.return_to_launch),
@@ -88,6 +94,17 @@ def by_asking(system: System, rows: list[list[float]]) -> dict[str, object]:
         "speed": asked(lambda: action.set_current_speed(22.0)),
         "orbit": asked(lambda: action.do_orbit(100.0, 20.0, 0, 46.0, 8.0, 150.0)),
     }
+    # A MISSION_CURRENT that crosses this request ends MAVSDK's own time limit, and MAVSDK waits for ever.  The vehicle
+    # sends one every 0.5 s, at once with the news that it is in the air: what comes half-way between is least likely
+    # to be crossed.
+    time.sleep(0.25)
+    found: list[tuple[float, str]] = [(LIMIT, TRAPPED)]
+    request = threading.Thread(
+        target=lambda: found.append(asked(lambda: mission.set_current_mission_item(0))), daemon=True
+    )
+    request.start()
+    request.join(LIMIT)
+    flight["item"] = found[-1]
     return {"ground": ground, "flight": flight}
 
 

@@ -104,13 +104,20 @@ def test_mavsdks_mission_plugin_sends_no_home(serve: Callable[..., Served], tmp_
 
 
 def test_mavsdk_is_answered_at_once_whatever_it_asks(serve: Callable[..., Served], tmp_path: Path) -> None:
-    """A start at another item is flown; in flight all is refused, MISSION_SET_CURRENT by the only way it has."""
+    """A start at another item is flown; in flight all is refused, MISSION_SET_CURRENT by the only way it has.
+
+    A MISSION_CURRENT that crosses that request has MAVSDK wait without end, whatever the vehicle then does: one session
+    in thirty on a machine at load 16.  So three sessions may be needed; without the vehicle's silence all are trapped.
+    """
     need("mavsdk")
-    port = free_port()
-    vehicle = serve("--scenario", "field.toml", to=port)
-    found = mavsdk(
-        tmp_path, port, [[46.0, 8.0, 100.0], [46.0, 8.0033, 100.0], [46.0, 8.0165, 100.0], [46.0, 8.03, 100.0]], "ask"
-    )
+    rows = [[46.0, 8.0, 100.0], [46.0, 8.0033, 100.0], [46.0, 8.0165, 100.0], [46.0, 8.03, 100.0]]
+    for session in range(3):
+        port = free_port()
+        vehicle = serve("--scenario", "field.toml", "--log", f"logs-{session}", to=port)
+        found = mavsdk(tmp_path, port, rows, "ask")
+        if found["flight"]["item"][1] != "NO END":
+            break
+        vehicle.kill()
     seconds, answer = found["ground"]["item"]
     assert (seconds < 2.0, answer) == (True, "SUCCESS")
     answers = {name: answer for name, (_, answer) in found["flight"].items()}
@@ -120,7 +127,7 @@ def test_mavsdk_is_answered_at_once_whatever_it_asks(serve: Callable[..., Served
     assert found["flight"]["item"][0] < 5.0
     assert max(seconds for name, (seconds, _) in found["flight"].items() if name != "item") < 2.0
     assert vehicle.stop() == 0
-    log = read_log(tmp_path / "logs" / "flight-001.mcap")
+    log = read_log(tmp_path / f"logs-{session}" / "flight-001.mcap")
     assert len(log.setup.route.waypoints) == 3, "from the second place on"
 
 
