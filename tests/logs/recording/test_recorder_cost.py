@@ -13,9 +13,10 @@ from tests.soak import SOAK
 from world.scenario import load_scenario
 
 # Of some 12 minutes each.
-LAPS = 5 if SOAK else 2
+LAPS = 5 if SOAK else 1
 
 
+@pytest.mark.skipif(not SOAK, reason="a ratio of times, which other tests disturb: in make soak and make bench")
 def test_recording_costs_a_fraction_of_the_flight(tmp_path: Path) -> None:
     scenario = load_scenario("jacksboro")
     airframe = load_airframe(scenario)
@@ -24,7 +25,7 @@ def test_recording_costs_a_fraction_of_the_flight(tmp_path: Path) -> None:
     setup = make_setup(scenario, airframe, mission, 1, plan=plan)
     # The first round compiles what is not compiled yet.  Of each the least of all rounds counts, and more are flown
     # while another test on the next core makes one of them slow.
-    spent = recording(setup, airframe, tmp_path, rounds=10 if SOAK else 2)
+    spent = recording(setup, airframe, tmp_path, rounds=10)
     for _ in range(4):
         if spent["flight, recorded at 20 Hz"] < 1.20 * spent["flight"]:
             break
@@ -36,19 +37,21 @@ def test_recording_costs_a_fraction_of_the_flight(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def hour(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, float]:
-    """An hour (outside the full count two fifths of it) in wind and turbulence, and how many hours it is."""
+    """An hour (outside the full count a sixth of it) in wind and turbulence, and how many hours it is."""
     return long_flight(tmp_path_factory.mktemp("hour"), LAPS)
 
 
 def test_an_hour_takes_less_than_45_megabytes(hour: tuple[Path, float]) -> None:
     log, hours = hour
-    assert hours > (1.0 if SOAK else 0.35)
+    assert hours > (1.0 if SOAK else 0.15)
     assert log.stat().st_size < 45e6 * hours
     assert read_log(log).complete
 
 
 def test_an_hour_is_checked_in_5_seconds_and_reported_in_15(hour: tuple[Path, float], tmp_path: Path) -> None:
     log, _ = hour
-    assert in_child("check", str(log), rounds=1) < 5.0
-    assert in_child("report", str(log), "--out", str(tmp_path / "out"), rounds=1) < 15.0
+    # Starting and drawing do not grow with the log.
+    share = 1.0 if SOAK else 0.5
+    assert in_child("check", str(log), rounds=1) < 5.0 * share
+    assert in_child("report", str(log), "--out", str(tmp_path / "out"), rounds=1) < 15.0 * share
     assert (tmp_path / "out" / "report.html").stat().st_size < 8e6

@@ -183,6 +183,7 @@ def test_paper_is_light_whatever_the_screen(browser: Browser) -> None:
     assert browser.value("getComputedStyle(document.body).getPropertyValue('--ink').trim()") == "#1d1d1f"
 
 
+@pytest.mark.skipif(not SOAK, reason="the same charts, twice: in make soak")
 def test_the_comparison_has_charts_for_both_and_nothing_grave(
     browser: Browser, log_file: Path, other: FlightLog, tmp_path: Path
 ) -> None:
