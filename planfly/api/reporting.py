@@ -15,7 +15,7 @@ from logs.verdict.judge_geometry import judge_geometry
 from planfly.api.results import ExportedFiles, FlownMission, WrittenReport
 from planfly.open_mission import open_planned
 from planfly.terminal.stored_logs import judge_log
-from planfly.terminal.targets import COMPARE_FILES, LOG_FIGURES, prepare_folder, refuse_folder
+from planfly.terminal.targets import COMPARE_FILES, LOG_FIGURES, prepare_folder, refuse_existing, refuse_folder
 from planner.plan import Plan, plan_json
 from world.atomic_files import temporary_folder, write_whole
 from world.errors import PlanflyError
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Source = FlightLog | FlownMission | Plan | str | Path
+# What a script writes to have results replaced.
+_ASK = "overwrite=True"
 
 
 class _Shown(NamedTuple):
@@ -123,6 +125,8 @@ def export(source: FlightLog | FlownMission | Plan | str | Path, *files: str | P
     if not files:
         raise PlanflyError("export: no file: one at least is expected", field="files")
     targets = tuple(Path(file) for file in files)
+    for target in targets:
+        refuse_existing(target, overwrite, ask=_ASK)
     with contextlib.ExitStack() as place:
         path = _as_file(source, place)
         options = argparse.Namespace(
@@ -165,6 +169,6 @@ def _shown(source: Source) -> _Shown:
 
 def _prepared(out: str | Path, files: tuple[str, ...], overwrite: bool) -> Path:
     folder = Path(out)
-    refuse_folder(folder, overwrite)
+    refuse_folder(folder, overwrite, ask=_ASK)
     prepare_folder(folder, files)
     return folder

@@ -26,7 +26,9 @@ def campaign_goal(args: argparse.Namespace) -> Goal:
         return make_goal(args.flights, args.prove, args.at_least, args.confidence)
     except ValueError as error:
         name = str(error).partition(":")[0]
-        raise PlanflyError(f"--{error}", field=f"--{name}", value=getattr(args, name, None)) from error
+        # Python's names are the options' with "_" for "-".
+        option, text = (said.replace("at_least", "at-least") for said in (name, str(error)))
+        raise PlanflyError(f"--{text}", field=f"--{option}", value=getattr(args, name, None)) from error
 
 
 def campaign_spread(args: argparse.Namespace) -> FlightSpread:

@@ -40,24 +40,27 @@ COMPARE_FILES = (
 )
 
 
-def refuse_existing(path: Path, overwrite: bool, source: Path | None = None) -> None:
-    """Refuse a named target file that exists, is a folder, cannot be made, or is the input.  Raises PlanflyError."""
+def refuse_existing(path: Path, overwrite: bool, source: Path | None = None, *, ask: str = "--overwrite") -> None:
+    """Refuse a named target file that exists, is a folder, cannot be made, or is the input.  Raises PlanflyError.
+
+    ask: what a person writes to have it replaced.
+    """
     if source is not None and path.exists() and source.exists() and path.samefile(source):
         raise PlanflyError(f"{path}: is the input itself; name another file to write", file=path)
     if path.is_dir():
         raise PlanflyError(f"{path}: is a folder; a file name is expected", file=path)
     if path.exists() and not overwrite:
-        raise PlanflyError(f"{path}: exists; --overwrite replaces it", file=path)
+        raise PlanflyError(f"{path}: exists; {ask} replaces it", file=path)
     if not path.parent.exists():
         raise PlanflyError(f"{path}: its folder {path.parent} does not exist", file=path)
 
 
-def refuse_folder(folder: Path, overwrite: bool) -> None:
-    """Refuse a named target folder that is a file or holds anything.  Raises PlanflyError."""
+def refuse_folder(folder: Path, overwrite: bool, *, ask: str = "--overwrite") -> None:
+    """Refuse a named target folder that is a file or holds anything; ask: as above.  Raises PlanflyError."""
     if folder.exists() and not folder.is_dir():
         raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
     if not overwrite and folder.is_dir() and any(folder.iterdir()):
-        raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results", file=folder)
+        raise PlanflyError(f"{folder}: exists and is not empty; {ask} replaces its results", file=folder)
 
 
 def prepare_folder(folder: Path, files: tuple[str, ...] = RUN_FILES) -> None:

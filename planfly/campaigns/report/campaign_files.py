@@ -8,6 +8,7 @@ from pathlib import Path
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.report.summary import CampaignSummary, log_name, summary_json
+from planfly.campaigns.storage.held_table import refuse_held
 from planfly.campaigns.storage.row_values import same_flight
 from planfly.campaigns.storage.store import DATABASE, Store
 from planfly.campaigns.storage.winds_store import WINDS_DATABASE
@@ -40,8 +41,13 @@ def campaign_folder(out: Path | str | None, *, resume: bool) -> Iterator[Path]:
 
 
 def clear_campaign(folder: Path) -> None:
-    """Make a folder, and clear what an earlier campaign or search left there; anything else stays."""
+    """Make a folder, and clear what an earlier campaign or search left there; anything else stays.
+
+    Raises StoreError, and clears nothing, where another process holds it.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    for table in (DATABASE, WINDS_DATABASE):
+        refuse_held(folder / table)
     for path in (*(folder / name for name in CAMPAIGN_FILES), *_logs(folder)):
         path.unlink(missing_ok=True)
 

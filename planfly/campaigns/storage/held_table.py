@@ -12,6 +12,9 @@ from typing import Any, Self
 from planfly.campaigns.statistics.proportions import Tally
 from world.errors import PlanflyError
 
+# What SQLite says of a file that another process holds.
+_HELD = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
+
 
 class StoreError(PlanflyError):
     """The table of a campaign cannot be opened, or is another campaign's."""
@@ -126,6 +129,20 @@ class HeldTable:
         return Tally(counts.get("flyable", 0), counts.get("not flyable", 0), counts.get("lost", 0))
 
 
+def refuse_held(path: Path) -> None:
+    """Refuse a table that another process holds; a file that is none is nobody's.  Raises StoreError."""
+    if not path.is_file():
+        return
+    connection = sqlite3.connect(path, timeout=1.0, isolation_level=None)
+    try:
+        connection.execute("BEGIN EXCLUSIVE")
+    except sqlite3.Error as error:
+        if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_NOTADB) & 0xFF in _HELD:
+            raise StoreError(f"{path}: is held by another process", file=path) from error
+    finally:
+        connection.close()
+
+
 class told_errors:
     """Tell SQLite's errors about a file as ours: a full disk as OSError, the rest as StoreError."""
 
@@ -144,6 +161,6 @@ class told_errors:
         code = getattr(error, "sqlite_errorcode", None)
         if code is not None and code & 0xFF == sqlite3.SQLITE_FULL:
             raise OSError(errno.ENOSPC, "no space left; the flights before are kept, --resume goes on", str(self._path))
-        if code is not None and code & 0xFF in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+        if code is not None and code & 0xFF in _HELD:
             raise StoreError(f"{self._path}: is held by another process", file=self._path) from error
         raise StoreError(f"{self._path}: {error}", file=self._path) from error

@@ -47,7 +47,7 @@ def test_a_report_of_a_log_is_the_commands(
 def test_results_are_replaced_where_the_script_says_so_alone(flown: planfly.FlownMission, tmp_path: Path) -> None:
     (tmp_path / "map.png").write_text("old")
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(planfly.PlanflyError, match="not empty"):
+    with pytest.raises(planfly.PlanflyError, match="not empty; overwrite=True replaces"):
         planfly.report(flown, tmp_path)
     assert (tmp_path / "map.png").read_text() == "old"
     written = planfly.report(flown, str(tmp_path), svg=True, overwrite=True)
@@ -100,7 +100,7 @@ def test_bad_exports_write_nothing(path: planfly.Plan, tmp_path: Path) -> None:
         planfly.export(path)
     assert list(tmp_path.iterdir()) == []
     planfly.export(path, tmp_path / "a.plan")
-    with pytest.raises(planfly.PlanflyError, match="exists"):
+    with pytest.raises(planfly.PlanflyError, match="overwrite=True replaces it"):
         planfly.export(path, tmp_path / "a.plan")
     planfly.export(path, tmp_path / "a.plan", overwrite=True)
 

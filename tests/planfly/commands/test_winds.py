@@ -77,6 +77,7 @@ def test_an_interruption_says_what_is_kept_and_how_to_go_on(
         (["--out", "campaign"], "holds another campaign; --overwrite replaces it"),
         ([], "--resume goes on with it"),
         (["--resume"], "held by another process"),
+        (["--overwrite"], "held by another process"),
     ],
 )
 def test_one_line_and_nothing_lost(

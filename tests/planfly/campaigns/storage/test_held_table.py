@@ -12,7 +12,7 @@ import pytest
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.proportions import Tally
-from planfly.campaigns.storage.held_table import StoreError
+from planfly.campaigns.storage.held_table import StoreError, refuse_held
 from planfly.campaigns.storage.store import Store
 from planfly.campaigns.storage.winds_store import AskedFlight, WindsStore
 from tests.planfly.campaigns.made_campaigns import all_fly, table
@@ -86,12 +86,17 @@ def test_a_held_table_is_refused_and_loses_nothing(base: CampaignBase, tmp_path:
         if holder == "another store":
             with pytest.raises(StoreError, match="held by another process"):
                 opened(path, resume=True)
+            with pytest.raises(StoreError, match="held by another process"):
+                refuse_held(path)
     if holder == "another program":
         other = sqlite3.connect(path, isolation_level=None)
         other.execute("BEGIN IMMEDIATE")
         with pytest.raises(StoreError, match="held by another process"):
             opened(path, resume=True)
+        with pytest.raises(StoreError, match="held by another process"):
+            refuse_held(path)
         other.close()
+    refuse_held(path)
     with opened(path, resume=True) as store:
         assert store.tally() == Tally(1, 0)
 
@@ -101,6 +106,8 @@ def test_a_file_that_is_no_table_is_refused(tmp_path: Path) -> None:
     path.write_bytes(b"not a database at all, but long enough to be read as one" * 40)
     with pytest.raises(StoreError, match="not a database"):
         opened(path, resume=True)
+    # Nor is it anybody's.
+    refuse_held(path)
 
 
 @pytest.mark.parametrize("add", [add_to_campaign, add_to_search])
