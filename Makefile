@@ -3,6 +3,8 @@
 # make dev: set up what a developer needs, and nothing more
 PYTHON ?= python3
 VENV := .venv
+# Bytecode is kept, whatever the shell says: each of the tests' many processes would compile all it imports anew.
+export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
 # A file's tests run in one of two processes, so that what they share is made once; files in their own order.
 TWO := -n 2 --dist loadfile --no-loadscope-reorder

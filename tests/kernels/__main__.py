@@ -2,8 +2,9 @@
 
 First what a first start compiles, in the same two processes; then the planner's other kernels in one process, and those
 of other flights, verdicts and reports in another: they are not each other's.  At last tests run that call kernels with
-types, or in parts, that no command has: whether they pass is seen later.  All stay in the cache for all later
-processes; where they are there already this takes seconds.
+types, or in parts, that no command has, and all others are read, so that Python's own bytecode of them is kept too:
+whether they pass is seen later.  All stay in the caches for all later processes; where they are there already this
+takes seconds.
 """
 
 import os
@@ -113,7 +114,8 @@ def main() -> int:
         failed = max(one.wait() for one in started)
     tests = Path(__file__).parents[1]
     chosen = [str(tests / one) for one in TESTS]
-    subprocess.run([sys.executable, "-m", "pytest", "-q", "-n", "2", *chosen], cwd=tests.parent, check=False)
+    for asked in (("-n", "2", *chosen), ("-n", "0", "--collect-only")):
+        subprocess.run([sys.executable, "-m", "pytest", "-q", *asked], cwd=tests.parent, check=False)
     return failed
 
 

@@ -63,8 +63,8 @@ def test_a_served_flight_goes_on_where_it_was(serve: Callable[..., Served]) -> N
 
 
 def test_a_replay_goes_on_where_it_was(tmp_path: Path) -> None:
-    """20 s in 5 s, stopped for 3 s: what comes next is not what would have come meanwhile."""
-    record(tmp_path / "f.mcap", make_setup(), make_track(20.0))
+    """12 s in 3 s, stopped for 2.5 s: what comes next is not what would have come meanwhile."""
+    record(tmp_path / "f.mcap", make_setup(), make_track(12.0))
     replay = subprocess.Popen(
         [sys.executable, "-m", "planfly", "replay", "f.mcap", "--speed", "4"],
         cwd=tmp_path, env=os.environ | {"PYTHONUNBUFFERED": "1"}, stdout=subprocess.PIPE, text=True,
@@ -73,12 +73,12 @@ def test_a_replay_goes_on_where_it_was(tmp_path: Path) -> None:
     assert replay.stdout.readline().strip()
     begun = time.monotonic()
     replay.send_signal(signal.SIGSTOP)
-    time.sleep(3.0)
+    time.sleep(2.5)
     replay.send_signal(signal.SIGCONT)
-    # An end is the last thing that is printed; the first look after the stop may take a second of the 5.
+    # An end is the last thing that is printed; the first look after the stop may take a second of the 3.
     while "s  end " not in replay.stdout.readline():
         pass
-    assert time.monotonic() - begun > 3.0 + 5.0 - 1.2
+    assert time.monotonic() - begun > 2.5 + 3.0 - 1.2
     replay.stdout.close()
     assert replay.wait() == 0
 

@@ -24,23 +24,20 @@ from tests.soak import SOAK, note
 
 LIMIT = 1.0
 MOMENTS = 8
+# 1.5 km east, 1.1 km north and back.
+ROUND = """QGC WPL 110
+0 1 0 16 0 0 0 0 46 8 0 1
+1 0 3 16 0 0 0 0 46 8 100 1
+2 0 3 16 0 0 0 0 46 8.02 100 1
+3 0 3 16 0 0 0 0 46.01 8.02 100 1
+"""
 # Long enough a way that its flight is under way whenever the signal comes: 100 rounds.
-LONG = "\n".join(
-    [
-        "QGC WPL 110",
-        "0 1 0 16 0 0 0 0 46 8 0 1",
-        "1 0 3 16 0 0 0 0 46 8 100 1",
-        "2 0 3 16 0 0 0 0 46 8.02 100 1",
-        "3 0 3 16 0 0 0 0 46.01 8.02 100 1",
-        "4 0 3 177 1 12 0 0 0 0 0 1",
-        "",
-    ]
-)
+LONG = f"{ROUND}4 0 3 177 1 12 0 0 0 0 0 1\n"
 # Without seeds a search goes on for all its generations: hours.
 PLANNER = 'algorithm = "umda-smooth"\nwaypoints = 10\npopulation = 2000\ngenerations = 100000\n'
 PAPER = ("paper", "--problems", "7", "--runs", "3", "--jobs", "2", "--out", "out")
 FLY = ("fly", "long.waypoints", "--scenario", "field.toml", "--log", "f.mcap")
-CAMPAIGN = ("campaign", "long.waypoints", "--scenario", "field.toml", "--workers", "2", "--out", "out")
+CAMPAIGN = ("campaign", "round.waypoints", "--scenario", "field.toml", "--workers", "2", "--out", "out")
 SERVE = ("serve", "--bind", "127.0.0.1:0", "--to", "127.0.0.1:9", "--log", "logs")
 
 
@@ -101,6 +98,7 @@ def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("inputs")
     (folder / "field.toml").write_text(FIELD, encoding="utf-8")
     (folder / "long.waypoints").write_text(LONG, encoding="ascii")
+    (folder / "round.waypoints").write_text(ROUND, encoding="ascii")
     head, tail = scenario_text("endless", make_instance(0, 7), "a search that does not end").split("[planner]\n")
     text = f"{head}[planner]\n{PLANNER}\n[flight]{tail.split('[flight]')[1]}"
     (folder / "endless.toml").write_text(text, encoding="utf-8")

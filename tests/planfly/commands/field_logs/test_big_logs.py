@@ -34,9 +34,9 @@ def peak(log: Path, target: Path) -> float:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the unit of ru_maxrss is Linux's")
 def test_memory_grows_by_less_than_the_log(tmp_path: Path) -> None:
-    few, many = (big_log(tmp_path / f"{size}.BIN", size * MEGABYTE) for size in (2, 32))
+    few, many = (big_log(tmp_path / f"{size}.BIN", size * MEGABYTE) for size in (2, 14))
     grown = peak(many, tmp_path / "a.mcap") - peak(few, tmp_path / "b.mcap")
-    assert grown < 30.0 * (MOST - ITSELF) / WHOLE
+    assert grown < 12.0 * (MOST - ITSELF) / WHOLE
 
 
 @pytest.mark.skipif(not SOAK or sys.platform != "linux", reason="takes minutes")
