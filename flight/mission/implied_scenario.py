@@ -12,7 +12,7 @@ from flight.mission.items import Mission
 from flight.mission.itinerary import ItineraryStop, make_itinerary
 from flight.mission.placing import HIGHEST, PlacedMission, on_map, place_stops
 from world.errors import MissionError, TerrainError
-from world.frames import GeoOrigin, to_map
+from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
 from world.scenario import GROUND_BUFFER, Scenario, from_spec
 from world.scenario_tables import AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
@@ -121,18 +121,20 @@ def _ground(
     tile = tile_bounds(raster, origin)
     inside = np.stack([np.maximum(box[:, 0], tile[:, 0]), np.minimum(box[:, 1], tile[:, 1])], axis=1)
     if not ((inside[:, 0] <= flown[:, 0]) & (flown[:, 1] <= inside[:, 1])).all():
-        (e0, e1), (n0, n1) = flown
-        (te0, te1), (tn0, tn1) = tile
+        lons, lats = raster.corners.T
         raise TerrainError(
-            f"{path}: the mission flies to east {e0:.0f}..{e1:.0f} m, north {n0:.0f}..{n1:.0f} m of"
-            f" {origin.lat_deg:.5f}, {origin.lon_deg:.5f}; the terrain covers"
-            f" east {te0:.0f}..{te1:.0f} m, north {tn0:.0f}..{tn1:.0f} m",
+            f"{path}: the mission flies to {_degrees(*to_geo(origin, *flown))}; the terrain covers"
+            f" {_degrees(lats, lons)}",
             file=path,
         )
     file = Path(path)
     found = str(file.resolve()) if file.is_file() else path
     table = TerrainTable(kind="dem", path=found, sha256=raster.sha256)
     return read_terrain(raster, origin, inside, GROUND_BUFFER), table, inside
+
+
+def _degrees(lats: Floats, lons: Floats) -> str:
+    return f"latitude {lats.min():.4f}..{lats.max():.4f}, longitude {lons.min():.4f}..{lons.max():.4f}"
 
 
 def _end(point: Floats, terrain: Terrain | None) -> EndTable:

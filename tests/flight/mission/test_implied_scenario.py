@@ -88,7 +88,9 @@ def test_a_log_gives_the_same_scenario() -> None:
 
 
 def test_a_mission_off_the_tile_is_refused() -> None:
-    with pytest.raises(TerrainError, match="the mission flies to east"):
+    # 9 km south of 36.5 degrees, where a degree is 110.96 km.
+    words = r"flies to latitude 36\.4189\.\.36\.5000, longitude -84\.2000\.\.-84\.2000; the terrain covers latitude 36"
+    with pytest.raises(TerrainError, match=words):
         implied_scenario(mission(wp(0, 0), wp(0, -9000), home="40 -84 0"), "jacksboro")
 
 
