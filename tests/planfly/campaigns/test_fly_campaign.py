@@ -167,7 +167,7 @@ def test_a_sleeping_laptop_costs_no_worker(tmp_path: Path) -> None:
 
 
 def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
-    kills, count = scaled(20, 1), scaled(400, 40)
+    kills, count = scaled(20, 1), scaled(400, 20)
     folder = tmp_path / "killed"
     folder.mkdir()
     moments, written = random.Random(3), set[int]()
@@ -185,7 +185,7 @@ def test_a_killed_client_loses_no_flight(tmp_path: Path) -> None:
 
 
 def test_a_killed_worker_loses_no_flight(base: CampaignBase, tmp_path: Path) -> None:
-    kills, count = scaled(20, 2), scaled(1200, 100)
+    kills, count = scaled(20, 2), scaled(1200, 70)
     begun, goal = threading.Event(), Goal(None, False, count)
     with open_store(base, goal, tmp_path, resume=False) as store, workers_killed(kills, begun) as killed:
         fly_campaign(base, goal, Workers(2), store, lambda *_: begun.set(), fly=slow_flight)
