@@ -78,7 +78,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
     ]
     keys = list(dict.fromkeys([*measures[0], *measures[1]]))
     found = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
-    return Comparison((first, second), names, verdicts, tuple(found), tuple(_notes(first, second)))
+    return Comparison((first, second), names, verdicts, tuple(found), tuple(_notes(first, second, names)))
 
 
 def _judge(log: FlightLog) -> Verdict:
@@ -142,7 +142,7 @@ def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
     return found
 
 
-def _notes(first: FlightLog, second: FlightLog) -> list[str]:
+def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
     """Note what the two flights do not share, and how far apart their tracks are."""
     a, b = first.setup, second.setup
     notes = []
@@ -157,6 +157,12 @@ def _notes(first: FlightLog, second: FlightLog) -> list[str]:
     ):
         if left != right:
             notes.append(f"{name}: differs" if name == "mission" else f"{name}: {left} and {right}")
+    for log, name in zip((first, second), names, strict=True):
+        if not np.isfinite(log.track.cross_track).any():
+            notes.append(
+                f"cross-track and height error: guidance's own, which the log of {name} does not hold;"
+                " planfly refly measures an imported flight against its legs"
+            )
     if a.scenario.origin == b.scenario.origin:
         there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
         if len(there) and len(here):

@@ -1,9 +1,11 @@
 """Two flights are measured alike, and nothing differs where nothing differs."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from flight.simulation.track import Track
@@ -34,3 +36,13 @@ def test_differences_and_notes_state_what_differs(log_file: Path, other: FlightL
     lines = difference_lines(found)
     assert len({len(line) for line in lines[2:-4]}) == 1
     assert "energy used (Wh)" in "\n".join(lines)
+
+
+def test_a_flight_without_guidance_has_its_cross_track_named(log_file: Path) -> None:
+    ours = read_log(log_file)
+    none = np.full_like(ours.track.cross_track, np.nan)
+    recorded = replace(ours, track=replace(ours.track, cross_track=none, height_error=none))
+    found, items = compared(ours, recorded)
+    assert math.isnan(items["largest cross-track"].second)
+    (note,) = (note for note in found.notes if "cross-track" in note)
+    assert "the log of b.mcap does not hold" in note
