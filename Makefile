@@ -40,6 +40,7 @@ bench: $(TESTED)
 # make soak GO_ON=1: go on with one that was stopped, of the same sources.
 SOAKED := PLANFLY_SOAK=1 PLANFLY_SOAK_WHOLE=1
 soak: $(TESTED) clients docs
+	$(BIN)/python -m tests.kernels >/dev/null
 	@$(SOAKED) $(BIN)/python -m tests.soak $(if $(GO_ON),--go-on)
 # Pytest ends with 5 where every file has passed before.
 	$(SOAKED) $(BIN)/python -m pytest -m soak $(TWO) || test $$? = 5

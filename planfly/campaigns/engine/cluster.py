@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+from planfly.campaigns.engine.kept_workers import kept_workers
 from world.atomic_files import temporary_folder
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
-# A flight is given up when a second worker dies on it.
-ALLOWED_FAILURES = 1
+# A flight is given up when a third worker dies on it: one that only waited for its worker has died with it, too.
+ALLOWED_FAILURES = 2
 _CONNECT_SECONDS = 20
 
 
@@ -74,7 +75,9 @@ def connected(workers: Workers) -> Iterator[Any]:
             # In a folder that goes with this process, however it ends.
             folder = stack.enter_context(temporary_folder("planfly-workers-"))
             stack.enter_context(dask.config.set({"temporary-directory": str(folder)}))
-            cluster = stack.enter_context(_local_cluster(cluster_types, workers.count, folder))
+            number = workers.count or os.cpu_count() or 1
+            cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
+            stack.enter_context(kept_workers(cluster, number))
             client = stack.enter_context(cluster_types.Client(cluster, set_as_default=False))
             try:
                 yield client
@@ -100,8 +103,7 @@ def _start_tracker() -> None:
             os.environ[name] = before
 
 
-def _local_cluster(cluster_types: Any, count: int | None, folder: Path) -> Any:
-    number = count or os.cpu_count() or 1
+def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
     if os.name == "posix":
         _start_tracker()
     try:

@@ -99,7 +99,7 @@ class Pilots:
         if future.status == "error":
             error = future.exception()
             if isinstance(error, KilledWorker):
-                return lost_row(self._base, order.index, "lost: its worker died twice")
+                return lost_row(self._base, order.index, "lost: its worker died three times")
             if isinstance(error, PlanflyError):
                 raise error
             raise RuntimeError(f"flight {order.index}: {type(error).__name__}: {error}") from error

@@ -14,7 +14,7 @@ from planfly.campaigns.flights.varied_flight import GivenWind, vary
 from planfly.campaigns.spread.draws import Draw, draw_flight
 from planfly.pipeline import fly_and_judge
 
-# A lost flight could not be flown: its worker died twice on it.
+# A lost flight could not be flown: its worker died on it three times.
 Outcome = Literal["flyable", "not flyable", "lost"]
 
 

@@ -41,6 +41,17 @@ def finish_client(kind: str, folder: Path, flights: int) -> set[int]:
     return {int(line) for line in told.splitlines()}
 
 
+def spawned_processes() -> list[int]:
+    """The numbers of this process's workers that live."""
+    found = []
+    for one in psutil.Process().children(recursive=True):
+        # Those that were killed a moment ago have no command line any more.
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if "spawn_main" in " ".join(one.cmdline()):
+                found.append(one.pid)
+    return found
+
+
 @contextlib.contextmanager
 def workers_killed(kills: int, begun: threading.Event, seed: int = 5) -> Iterator[list[int]]:
     """Kill workers of this process, one after another, from when flights come in on; the list of those killed."""
@@ -49,8 +60,7 @@ def workers_killed(kills: int, begun: threading.Event, seed: int = 5) -> Iterato
     def kill() -> None:
         begun.wait()
         while len(killed) < kills and not over.wait(moments.uniform(0.3, 1.2)):
-            children = psutil.Process().children(recursive=True)
-            workers = [one.pid for one in children if "spawn_main" in " ".join(one.cmdline())]
+            workers = spawned_processes()
             if workers:
                 killed.append(moments.choice(workers))
                 os.kill(killed[-1], signal.SIGKILL)

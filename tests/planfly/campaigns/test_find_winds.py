@@ -181,12 +181,13 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
 @pytest.mark.skipif(not SOAK, reason="workers die at a small count in a campaign's tests: in make soak")
 def test_a_deadly_flight_is_named_and_counts_against(wind_base: CampaignBase, tmp_path: Path) -> None:
     """By workers: all others come out as without them, and the one counts as not flyable."""
-    goal = WindsGoal(0.9, 0.95, 4, 20.0, 48)
+    # Twelve of each direction in 10 m/s, in which none flies, and twelve in 5 m/s, in which all others fly.
+    goal = WindsGoal(0.9, 0.95, 4, 20.0, 96)
     found = searched(wind_base, tmp_path / "two", goal, fly=deadly_in_the_east)
 
     def here(base: CampaignBase, index: int, wind: Any) -> Any:
-        dies = index == 5 and wind.from_deg == 90.0
-        return lost_row(base, index, "lost: its worker died twice") if dies else made_flight(base, index, wind)
+        dies = index == 17 and wind.from_deg == 90.0
+        return lost_row(base, index, "lost: its worker died three times") if dies else made_flight(base, index, wind)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "hired_pilots", contextmanager(lambda _, *given: iter([HerePilots(*given)])))

@@ -131,7 +131,7 @@ def test_a_deadly_flight_is_named_and_counts_against(base: CampaignBase, tmp_pat
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]
     assert [row for row in table(tmp_path / DATABASE) if row[0] != 5] == others
     with open_store(base, goal, tmp_path, resume=True) as store:
-        assert store.flight(5) == lost_row(base, 5, "lost: its worker died twice")
+        assert store.flight(5) == lost_row(base, 5, "lost: its worker died three times")
         assert summarise(base, goal, found, store).lost == (5,)
     flyable = found.tally.flyable
     assert found.tally == Tally(flyable, 11 - flyable, 1)
