@@ -31,7 +31,7 @@ def search(draw: Callable[[], float], flights: int = 300) -> WindBoundary:
 def test_it_finds_the_quantile(law: Any, within: float) -> None:
     """Of either law, without being told which."""
     truth = float(law.ppf(0.01))
-    found = [search(partial(law.rvs, random_state=np.random.default_rng(seed))) for seed in range(scaled(20, 1))]
+    found = [search(partial(law.rvs, random_state=np.random.default_rng(seed))) for seed in range(scaled(20, 2))]
     assert np.median([abs(one.estimate - truth) for one in found]) < within
     assert sum(one.low - 0.1 <= truth <= one.high + 0.1 for one in found) >= 0.75 * len(found)
 
