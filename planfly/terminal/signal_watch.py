@@ -16,7 +16,9 @@ from world.interruption import Interrupted, interrupt, remove_unfinished
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal to the end of the process where its command has not ended by itself, s.
 GRACE = 0.7
-_AGAIN = 0.05
+# Time from a signal that could not be heard to its next, s.
+_AGAIN = 0.02
+_COMPILERS = ("numba", "llvmlite")
 
 
 @contextlib.contextmanager
@@ -33,16 +35,20 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     heard: list[int] = []
     deaf = False
 
-    def hear(number: int, _frame: FrameType | None = None) -> None:
+    def hear(number: int, frame: FrameType | None = None) -> None:
         # The first interrupts; whatever ends the work then is not to be interrupted.
         nonlocal deaf
-        if not deaf:
-            deaf = True
-            heard.append(number)
-            interrupt(number)
+        if deaf:
+            return
+        if _called_by_compiled_code(frame):
+            threading.Timer(_AGAIN, signal.raise_signal, (number,)).start()
+            return
+        deaf = True
+        heard.append(number)
+        interrupt(number)
 
     def hear_again(lost: "sys.UnraisableHookArgs") -> None:
-        # Raised where nobody could take it, in a compiler's callback: tried again, a little later.
+        # Raised where nobody could take it, in a library's callback: tried again, a little later.
         nonlocal deaf
         if isinstance(lost.exc_value, Interrupted):
             deaf = False
@@ -62,6 +68,20 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     finally:
         # What a signal would interrupt from here on is the end itself.
         deaf = True
+
+
+def _called_by_compiled_code(frame: FrameType | None) -> bool:
+    """Whether Python runs here for Numba: it compiles, reads a kernel from its cache, or makes a kernel's results.
+
+    Compiled code goes on with a null pointer where an exception ends that, and the process dies.  A result that is a
+    named tuple is made by a module named after its class.
+    """
+    while frame is not None:
+        module = str(frame.f_globals.get("__name__"))
+        if module.partition(".")[0] in _COMPILERS or module.startswith("namedtuple_"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _signal_pipe() -> tuple[Callable[[int], bytes], int]:

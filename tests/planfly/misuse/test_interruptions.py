@@ -235,3 +235,22 @@ def test_every_command_at_any_moment(inputs: Path, flight: Path, broken: Path, t
             shutil.rmtree(tmp_path / f"{n}-{k}")
     assert count > len(commands) * MOMENTS // 2
     note("interruptions", count=count, commands=len(commands), longest_s=round(longest, 2), left=0)
+
+
+@pytest.mark.skipif(not SOAK, reason="minutes; set PLANFLY_SOAK=1")
+def test_a_run_at_any_moment_of_its_kernels(inputs: Path, tmp_path: Path) -> None:
+    """Kernels are read from the cache when they are called, and make named tuples: not to be interrupted either."""
+    rng = np.random.default_rng(18)
+    longest, count = 0.0, 0
+    for k in range(60):
+        case = Case(("run", "tight", "--out", "out"), "", float(rng.uniform(0.8, 2.0)), signal.SIGINT)
+        code, took, said = interrupted(case, inputs, tmp_path / str(k))
+        shutil.rmtree(tmp_path / str(k))
+        if code is None:
+            continue
+        assert code in (128 + signal.SIGINT, -signal.SIGINT, 4), f"{case}: {code}: {said}"
+        assert took < LIMIT, f"{case}: {took:.2f} s"
+        assert "Traceback" not in said, f"{case}: {said}"
+        longest, count = max(longest, took), count + 1
+    assert count > 40
+    note("interruptions: kernels", count=count, longest_s=round(longest, 2))

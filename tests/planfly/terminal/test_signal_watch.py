@@ -28,6 +28,24 @@ BODIES = {
     "in Python": ("time.sleep(30)", 0.0),
 }
 
+# The first Python that runs after the signal is Numba's, which makes the kernel's named tuples.
+SPINNING = """
+from typing import NamedTuple
+import numba
+class Inner(NamedTuple):
+    number: float
+class Outer(NamedTuple):
+    number: float
+    inner: Inner
+@numba.njit
+def spin(count):
+    x = 0.5
+    for _ in range(count):
+        x = 3.9 * x * (1.0 - x)
+    return Outer(x, Inner(x))
+spin(1)
+"""
+
 
 @pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -51,6 +69,25 @@ def test_a_process_ends_whatever_it_does(body: str, number: signal.Signals, tmp_
         assert process.returncode == 128 + number
         assert said == b"planfly: interrupted\n"
     assert least <= took < 2.0
+    assert not mine.exists()
+
+
+def test_a_kernel_is_not_interrupted_where_numba_makes_its_results(tmp_path: Path) -> None:
+    mine = tmp_path / "mine"
+    body = "while True: spin(40_000_000)"
+    process = subprocess.Popen(
+        [sys.executable, "-c", SPINNING + PROGRAM.format(body=body), str(mine)], stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
+    assert process.stdout is not None
+    assert process.stdout.readline() == "begun\n"
+    time.sleep(0.1)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=20.0)
+    # In order; by the thread where a kernel took longer than the grace.
+    assert process.returncode in (-signal.SIGINT, 128 + signal.SIGINT), said
+    assert "Interrupted" in said or said == "planfly: interrupted\n"
     assert not mine.exists()
 
 

@@ -59,7 +59,7 @@ def peak() -> int:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
-@pytest.mark.parametrize("algorithm", ["fda-seeded", "umda"])
+@pytest.mark.parametrize("algorithm", ["fda-seeded", "umda-seeded", "umda"])
 def test_a_large_problem_is_planned(
     tmp_path: Path,
     make_limits: Callable[[Scenario], Limits],
@@ -85,7 +85,9 @@ def test_a_large_problem_is_planned(
             )
     # The file as it was read, the window of it, and one copy; then the population, some dozens of times.
     assert peak() - before < 3 * 4 * SIDE**2 + 60 * 8 * 3 * WAYPOINTS * POPULATION + 500e6
-    assert plan.evaluations >= POPULATION
+    # The default goes through generations of a population where its seeds gave no safe path; here they give one.
+    if algorithm != "fda-seeded":
+        assert plan.evaluations >= POPULATION
     if algorithm == "umda":
         # The paper's planner finds nothing of this length; it runs to its end, and says so.
         assert plan.ended == "completed"
