@@ -19,11 +19,11 @@ from tests.soak import SOAK, note
 
 
 class FewWorkers:
-    """A cluster of two, of which so many are there."""
+    """A cluster of two, or more, of which so many are there."""
 
-    def __init__(self, there: int) -> None:
+    def __init__(self, there: int, started: int = 2) -> None:
         self.scheduler_info = {"workers": dict.fromkeys(range(there))}
-        self.worker_spec = dict.fromkeys(range(2))
+        self.worker_spec = dict.fromkeys(range(started))
         self.asked: list[int] = []
 
     def scale(self, n: int) -> None:
@@ -47,6 +47,16 @@ def test_the_missing_are_asked_for_by_their_names_then_by_new_ones(
     with kept_workers(cluster, 2, patience=0.05):
         assert until(lambda: len(cluster.asked) > 1, 10.0)
     assert cluster.asked[:2] == asked
+
+
+@pytest.mark.parametrize(("there", "started"), [(3, 3), (2, 4)])
+def test_those_that_are_too_many_end(there: int, started: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who stayed away came back after others had been started, or may still."""
+    monkeypatch.setattr(module, "_LOOK", 0.01)
+    cluster = FewWorkers(there, started)
+    with kept_workers(cluster, 2, patience=60.0):
+        assert until(lambda: bool(cluster.asked), 10.0)
+    assert cluster.asked == [2]
 
 
 def test_nothing_is_asked_while_all_are_there_or_not_long_away(monkeypatch: pytest.MonkeyPatch) -> None:
