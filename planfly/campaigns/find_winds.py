@@ -1,8 +1,9 @@
 """The largest wind from each direction in which a mission flies: flights put where they tell most, in rounds."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 from planfly.campaigns.engine.cluster import Workers
@@ -13,14 +14,20 @@ from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.flights.varied_flight import GivenWind
-from planfly.campaigns.statistics.wind_boundary import BATCH, Direction, WindBoundary, needs_more
+from planfly.campaigns.spread.draws import standard_draws, standard_population
+from planfly.campaigns.statistics.flight_choice import next_flights
+from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more
 from planfly.campaigns.storage.held_table import StoreError
-from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, WindsStore
+from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, FlownFlight, WindsStore
 
-# Half of the interval's width that is flown for, m/s, and the fewest flights of a direction.
-ACCURACY, FEWEST = 0.4, 30
-# Flights of a round, about, where few directions are open, and the most of one direction: workers wait for each round.
-_ROUND, _MOST_EACH = 48, 12
+# Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
+# fails, one in fifty does at most (95 %); and with fewer a fit is surer of itself than it may be.
+ACCURACY, FEWEST = 0.25, 150
+# Points that stand for all that may be drawn.
+_POPULATION = 4096
+# Flights of a round, about, where few directions are open, and the fewest and the most of one direction: workers wait
+# for each round.
+_ROUND, _FEWEST_EACH, _MOST_EACH = 48, 3, 6
 # Of a spread, what the wind that is asked about takes the place of.
 ASKED = ("wind_speed", "wind_from")
 
@@ -83,8 +90,8 @@ def find_winds(
     and however often it was stopped.  What was flown before an error or Ctrl-C stays in the table.
     base: of a spread without the quantities of `ASKED`.
     """
-    search, known = _Search(goal), _Known(store)
-    pace = _Pace(search, len(known.outcomes), advance)
+    search, known = _Search(goal, base), _Known(store)
+    pace = _Pace(search, len(known.flown), advance)
     with ExitStack() as stack:
         pilots: Pilots | None = None
         while asked := search.next_round():
@@ -92,7 +99,7 @@ def find_winds(
                 pilots = pilots or stack.enter_context(hired_pilots(workers, base, fly))
                 _fly_round(pilots, search, missing, known, pace)
             for one in asked:
-                search.take(one, known.outcomes[one.number])
+                search.take(one, known.flown[one.number])
     pace.tell(len(search.flown), last=True)
     store.drop_from(len(search.flown))
     return search.found()
@@ -101,9 +108,12 @@ def find_winds(
 class _Search:
     """What has been asked for, round after round, and what came of it."""
 
-    def __init__(self, goal: WindsGoal) -> None:
+    def __init__(self, goal: WindsGoal, base: CampaignBase) -> None:
         self.goal = goal
-        self.directions = [Direction(goal.most, goal.target, goal.confidence) for _ in range(goal.directions)]
+        numbers = DrawnNumbers(
+            standard_population(base.spread, _POPULATION), partial(standard_draws, base.spread, base.seed)
+        )
+        self.directions = [Direction(goal.most, goal.target, numbers, goal.confidence) for _ in range(goal.directions)]
         self.open = list(range(goal.directions))
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
@@ -111,12 +121,10 @@ class _Search:
     def next_round(self) -> list[AskedFlight]:
         """The flights to fly next; none where all is known or used up."""
         self.open = [number for number, one in enumerate(self.directions) if self._is_open(one)]
-        each = max(BATCH, min(_MOST_EACH, _ROUND // max(1, len(self.open))))
+        each = max(_FEWEST_EACH, min(_MOST_EACH, _ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
         for number in self.open:
-            direction = self.directions[number]
-            speed, before = direction.next_speed(), len(direction.speeds)
-            for draw in range(before, before + each):
+            for speed, draw in next_flights(self.directions[number], each):
                 asked.append(AskedFlight(len(self.flown) + len(asked), number, speed, draw))
         return asked[: max(0, self.goal.flights - len(self.flown))]
 
@@ -125,12 +133,13 @@ class _Search:
         count = len(direction.speeds)
         return not count or needs_more(direction.boundary(), count, ACCURACY, FEWEST)
 
-    def take(self, asked: AskedFlight, outcome: str) -> None:
+    def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
         """Take a flight in, in the order in which they were asked for."""
-        flyable = outcome == "flyable"
-        self.directions[asked.direction].add(asked.speed, flyable)
+        flyable = flown.outcome == "flyable"
+        ways: set[Hashable] = {(rule, place.kind, place.index) for rule, place in flown.failed} or {flown.outcome}
+        self.directions[asked.direction].add(asked.speed, asked.draw, frozenset() if flyable else frozenset(ways))
         self.flown.append((asked.direction, asked.speed, flyable))
-        if outcome == "lost":
+        if flown.outcome == "lost":
             self.lost.append(asked.number)
 
     def order(self, asked: AskedFlight) -> Order:
@@ -149,13 +158,13 @@ class _Search:
 
 
 class _Known:
-    """The flights that the table has, and their outcomes by number."""
+    """The flights that the table has, and what came of each by number."""
 
     def __init__(self, store: WindsStore) -> None:
         known = store.known()
         self._store = store
         self._asked = {number: asked for number, (asked, _) in known.items()}
-        self.outcomes = {number: outcome for number, (_, outcome) in known.items()}
+        self.flown = {number: flown for number, (_, flown) in known.items()}
 
     def missing(self, asked: list[AskedFlight]) -> list[AskedFlight]:
         """Those that have still to be flown.  Raises StoreError for one that was asked for otherwise."""
@@ -163,12 +172,12 @@ class _Known:
             if self._asked.get(one.number, one) != one:
                 path = self._store.path
                 raise StoreError(f"{path}: flight {one.number} does not follow from those before it", file=path)
-        return [one for one in asked if one.number not in self.outcomes]
+        return [one for one in asked if one.number not in self.flown]
 
     def add(self, asked: AskedFlight, row: FlightRow) -> None:
         """Write one down."""
         self._store.add(asked, row)
-        self.outcomes[asked.number] = row.outcome
+        self.flown[asked.number] = FlownFlight(row.outcome, row.failed)
 
 
 def _fly_round(pilots: Pilots, search: _Search, missing: list[AskedFlight], known: _Known, pace: "_Pace") -> None:
@@ -185,7 +194,7 @@ def _fly_round(pilots: Pilots, search: _Search, missing: list[AskedFlight], know
 
     for order, row in pilots.fly(following):
         known.add(asked[order], row)
-        pace.tell(len(known.outcomes))
+        pace.tell(len(known.flown))
 
 
 class _Pace:

@@ -3,9 +3,15 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from planfly.campaigns.spread.quantities import QUANTITIES
 from planfly.campaigns.spread.spread_file import FlightSpread
+
+Floats = NDArray[np.float64]
+
+# Shares of a distribution whose values give its mean and standard deviation.
+_MIDDLES = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +39,57 @@ def draw_flight(spread: FlightSpread, seed: int, index: int) -> Draw:
     >>> first == again, first.values["drag"], 0.9 < first.values["mass"] < 1.1
     (True, 1.0, True)
     """
-    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
-    uniform = random.random(len(QUANTITIES)).tolist()
-    number = int(random.integers(2**63))
+    uniform, number = _drawn(seed, index)
     varying = {one.quantity.name: one for one in spread.varying}
     values = {
         quantity.name: varying[quantity.name].value(share) if quantity.name in varying else quantity.nominal
-        for quantity, share in zip(QUANTITIES, uniform, strict=True)
+        for quantity, share in zip(QUANTITIES, uniform.tolist(), strict=True)
     }
     return Draw(index, number, values)
+
+
+def standard_draws(spread: FlightSpread, seed: int, start: int, stop: int) -> Floats:
+    """(stop - start, d) what varies, as `draw_flight` draws it for these flights, in standard deviations from the mean.
+
+    d: of a spread's varying quantities those that have more than one value.
+
+    >>> from planfly.campaigns.spread.spread_file import default_spread
+    >>> standard_draws(default_spread(), 1, 5, 7).shape
+    (2, 11)
+    """
+    uniform = np.array([_drawn(seed, index)[0] for index in range(start, stop)]).reshape(-1, len(QUANTITIES))
+    columns = [QUANTITIES.index(one.quantity) for one in spread.varying]
+    return _standardised(spread, uniform[:, columns])
+
+
+def standard_population(spread: FlightSpread, count: int) -> Floats:
+    """(count, d) points that cover evenly what may be drawn, as `standard_draws` has it; count: a power of two.
+
+    The points are Sobol's, each in the middle of its cell.
+
+    >>> from planfly.campaigns.spread.spread_file import default_spread
+    >>> bool(abs(standard_population(default_spread(), 1024).mean(axis=0)).max() < 0.01)
+    True
+    """
+    from scipy.stats import qmc
+
+    quantities = len(spread.varying)
+    shares = qmc.Sobol(quantities, scramble=False).random(count) if quantities else np.zeros((count, 0))
+    return _standardised(spread, shares + 0.5 / count)
+
+
+def _drawn(seed: int, index: int) -> tuple[Floats, int]:
+    """Of each of `QUANTITIES` the share of its distribution, and the seed of what changes within the flight."""
+    random = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(index,)))
+    return random.random(len(QUANTITIES)), int(random.integers(2**63))
+
+
+def _standardised(spread: FlightSpread, shares: Floats) -> Floats:
+    """(n, d) of shares (n, v) of each varying quantity's distribution."""
+    middles = (np.arange(_MIDDLES) + 0.5) / _MIDDLES
+    columns = []
+    for k, one in enumerate(spread.varying):
+        values = one.values(middles)
+        if (deviation := float(values.std())) > 0.0:
+            columns.append((one.values(shares[:, k]) - values.mean()) / deviation)
+    return np.column_stack(columns) if columns else np.zeros((len(shares), 0))

@@ -16,9 +16,14 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from planfly.campaigns.spread.quantities import BY_NAME, NAMES, Quantity
 from world.errors import PlanflyError
 from world.text_files import read_small_file, toml_table, utf8_text
+
+Floats = NDArray[np.float64]
 
 # Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
 INSIDE = 0.99
@@ -69,9 +74,14 @@ class Varying:
         >>> round(mass.value(0.25), 6)
         0.95
         """
+        return float(self.values(np.array([uniform]))[0])
+
+    def values(self, uniform: Floats) -> Floats:
+        """(n,) the same of many shares (n,)."""
         low, high = self._inside
-        drawn = float(self._frozen.ppf(low + uniform * (high - low)))
-        return min(self.quantity.high, max(self.quantity.low, drawn))
+        drawn = self._frozen.ppf(low + uniform * (high - low))
+        out: Floats = np.clip(drawn, self.quantity.low, self.quantity.high)
+        return out
 
 
 @dataclass(frozen=True)

@@ -1,177 +1,54 @@
 """The largest wind in which a mission flies with a given probability, from flights in winds chosen as one goes.
 
-Each flight has a wind of its own above which it fails.  Over flights that wind is taken to be distributed normally
-(probit regression) or as the least of many (Gumbel's law for minima: complementary log-log regression, whose tail is
-the longer one), each of mean and standard deviation unknown and as likely as the other before the first flight.  The
-boundary for a probability P is the quantile 1 - P.  The posterior is summed on a grid over law, mean and standard
-deviation, so that it holds for few flights, too, for none that failed, and however the winds were chosen: only the
-likelihood of what was flown enters.
-
-The next wind is the one after which the boundary's variance is expected to be least, whatever comes of the flight: the
-look one step ahead of adaptive psychometric testing (King-Smith et al., Vision Research 34, 1994; Watson, "QUEST+",
-Journal of Vision 17(3):10, 2017).  Only winds are asked where few flights are expected to fail, for the boundary is in
-the tail, and what holds about the middle of a law need not hold there.
+Where some flights flew and some failed, the share of flights that fail in a wind is the mean of `failure_modes` over
+what may be drawn, and the boundary the wind in which that share is 1 - P; its variance is that of the coefficients, by
+the boundary's derivatives (the delta method).  Each of the `links` is as likely as the other before the first flight,
+and weighs by its evidence then.  Where all flew, or all failed, one law of `failure_laws` has to do.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from planfly.campaigns.statistics.failure_laws import FailureLaws
+from planfly.campaigns.statistics.failure_modes import (
+    FailureMode,
+    boundary_slopes,
+    boundary_speed,
+    fit_modes,
+    regressors,
+)
+from planfly.campaigns.statistics.links import LINKS
+
 Floats = NDArray[np.float64]
 
-# Of the standard deviation of the wind at which flights begin to fail, m/s: from a quarter of the accuracy wanted to
-# what would leave no boundary; each factor as likely as any other.
-_SPREADS = np.geomspace(0.1, 5.0, 30)
-# Grid of the mean, m/s, and how far it goes beyond the winds that are looked at.
-_STEP, _BELOW, _ABOVE = 0.1, 5.0, 10.0
-# Weights that are less than this of the largest are left out where the next wind is looked for.
-_NEGLIGIBLE = 1e-8
-# The share of flights that is expected to fail where they are put: at the least, and at most.
-_LEAST_SHARE, _MOST_SHARE = 1e-3, 0.2
-# Winds that are compared for the next flights.
-_CANDIDATES = 24
-# Winds are flown in steps of this, m/s, so that flights at one wind come together.
-GRID = 0.1
-# Flights that are put at a time.
-BATCH = 3
+# How far beyond the winds that are looked at a boundary is followed, m/s: past it nothing is settled by how far.
+_BEYOND = 10.0
 
 
-@dataclass(frozen=True)
-class FailureLaws:
-    """The laws of the wind at which flights begin to fail, on a grid: (n,) arrays, normal ones first.
+@dataclass
+class DrawnNumbers:
+    """What varies from flight to flight but the wind that is asked about, in standard deviations from the means.
 
-    location, scale: m/s; of the normal law its mean and standard deviation.
-    normals: how many are normal; the others are Gumbel's of the same means and standard deviations.
+    population: (m, d) spread evenly over what may be drawn; each stands for the same share of flights.
+    drawn: gives (stop - start, d) of the draws from one index to before another, as they are flown.
     """
 
-    location: Floats
-    scale: Floats
-    normals: int
+    population: Floats
+    drawn: Callable[[int, int], Floats]
+    _known: list[Floats] = field(default_factory=list)
 
-    @classmethod
-    def up_to(cls, most: float) -> "FailureLaws":
-        """For winds up to this, m/s."""
-        means = np.arange(-_BELOW, most + _ABOVE, _STEP)
-        mean, spread = (grid.ravel() for grid in np.meshgrid(means, _SPREADS, indexing="ij"))
-        # Of Gumbel's law for minima: mean = location - gamma * scale, variance = (pi * scale)^2 / 6.
-        scale = spread * np.sqrt(6.0) / np.pi
-        location = mean + np.euler_gamma * scale
-        return cls(np.concatenate((mean, location)), np.concatenate((spread, scale)), mean.size)
-
-    def picked(self, mask: NDArray[np.bool_]) -> "FailureLaws":
-        """Those of a mask (n,)."""
-        return FailureLaws(self.location[mask], self.scale[mask], int(mask[: self.normals].sum()))
-
-    def log_shares(self, speed: float) -> tuple[Floats, Floats]:
-        """(n,) logarithms of the probability to fail at a wind, m/s, and to fly."""
-        from scipy.special import log_ndtr
-        from scipy.stats import gumbel_l
-
-        x = (speed - self.location) / self.scale
-        normal, gumbel = x[: self.normals], x[self.normals :]
-        fails = np.concatenate((log_ndtr(normal), gumbel_l.logcdf(gumbel)))
-        return fails, np.concatenate((log_ndtr(-normal), gumbel_l.logsf(gumbel)))
-
-    def quantile(self, share: float) -> Floats:
-        """(n,) the wind at which this share of flights fails, m/s."""
-        from scipy.special import ndtri
-        from scipy.stats import gumbel_l
-
-        standard = np.full(self.scale.size, float(gumbel_l.ppf(share)))
-        standard[: self.normals] = float(ndtri(share))
-        out: Floats = self.location + standard * self.scale
-        return out
-
-
-class Direction:
-    """Flights in wind from one direction.
-
-    most: wind up to which is looked, m/s.
-    speeds: m/s, in which they were flown.  flyable: whether each was.
-    """
-
-    def __init__(self, most: float, target: float, confidence: float = 0.95) -> None:
-        self.most, self.target, self.confidence = most, target, confidence
-        self.speeds: list[float] = []
-        self.flyable: list[bool] = []
-        self._laws = FailureLaws.up_to(most)
-        self._logs = np.zeros(self._laws.location.size)
-
-    def add(self, speed: float, flyable: bool) -> None:
-        """Take a flight in."""
-        self.speeds.append(speed)
-        self.flyable.append(flyable)
-        fails, flies = self._laws.log_shares(speed)
-        self._logs += flies if flyable else fails
-
-    def boundary(self) -> "WindBoundary":
-        """What is known of the boundary.
-
-        >>> direction = Direction(20.0, 0.99)
-        >>> for k in range(200):
-        ...     direction.add(8.0 + 0.02 * k, 8.0 + 0.02 * k < 10.0)
-        >>> found = direction.boundary()
-        >>> 9.3 < found.low < found.estimate <= found.high < 10.1
-        True
-        """
-        order = np.argsort(self._quantiles, kind="stable")
-        values, share = self._quantiles[order], np.cumsum(self._weights()[order])
-        tail = 0.5 * (1.0 - self.confidence)
-        low, middle, high = (
-            float(values[min(int(np.searchsorted(share, part)), values.size - 1)]) for part in (tail, 0.5, 1.0 - tail)
-        )
-        return WindBoundary(middle, low, high, middle >= self.most - 1e-9)
-
-    @cached_property
-    def _quantiles(self) -> Floats:
-        """(n,) the boundary by each law, within the winds that are looked at, m/s."""
-        return np.clip(self._laws.quantile(1.0 - self.target), 0.0, self.most)
-
-    def _weights(self) -> Floats:
-        """(n,) of the laws, summing to 1."""
-        weights: Floats = np.exp(self._logs - self._logs.max())
-        weights /= weights.sum()
-        return weights
-
-    def next_speed(self) -> float:
-        """The wind that tells most, m/s: by halves until some flights flew and some failed, then by looking ahead."""
-        if not self.speeds:
-            return _rounded(0.5 * self.most, self.most)
-        if all(self.flyable):
-            top = max(self.speeds)
-            return _rounded(0.5 * (top + self.most), self.most) if top < self.most - 0.3 else self.most
-        if not any(self.flyable):
-            return _rounded(0.5 * min(self.speeds), self.most)
-        return self._looked_ahead()
-
-    def _looked_ahead(self) -> float:
-        """The wind after whose flight the boundary's expected variance is least, m/s."""
-        weights = self._weights()
-        mask = weights > _NEGLIGIBLE * weights.max()
-        laws, weights, edge = self._laws.picked(mask), weights[mask] / weights[mask].sum(), self._quantiles[mask]
-        low, high = (self._where_share_fails(laws, weights, share) for share in (_LEAST_SHARE, _MOST_SHARE))
-        speeds = sorted({_rounded(speed, self.most) for speed in np.linspace(low, high, _CANDIDATES)})
-        fails = np.exp([laws.log_shares(speed)[0] for speed in speeds])
-        # (speeds,) the probability to fail, and the sum of boundaries of the laws by which it fails; the variance
-        # left after either outcome is the mean square of the boundary less that of its two conditional means.
-        failing, failed = fails @ weights, fails @ (weights * edge)
-        explained = failed**2 / failing + (weights @ edge - failed) ** 2 / (1.0 - failing)
-        return speeds[int(np.argmax(explained))]
-
-    def _where_share_fails(self, laws: FailureLaws, weights: Floats, share: float) -> float:
-        """The wind in which this share of flights is expected to fail, m/s, found by halves."""
-        low, high = 0.0, self.most
-        while high - low > 0.5 * GRID:
-            middle = 0.5 * (low + high)
-            fails = float(np.exp(laws.log_shares(middle)[0]) @ weights)
-            low, high = (middle, high) if fails < share else (low, middle)
-        return high
-
-
-def _rounded(speed: float, most: float) -> float:
-    return min(most, max(0.0, round(speed / GRID) * GRID))
+    def first(self, count: int) -> Floats:
+        """(count, d) of the draws from 0 on; computed once."""
+        have = sum(len(block) for block in self._known)
+        if have < count:
+            self._known.append(self.drawn(have, max(count, have + 500)))
+        if len(self._known) > 1:
+            self._known[:] = [np.concatenate(self._known)]
+        return self._known[0][:count] if self._known else self.population[:0]
 
 
 @dataclass(frozen=True)
@@ -191,6 +68,114 @@ class WindBoundary:
     def width(self) -> float:
         """Of the interval, m/s."""
         return self.high - self.low
+
+
+@dataclass(frozen=True)
+class FailureFit:
+    """What the flights of a direction tell of its boundary by one link.
+
+    weight: of the link among all, by its evidence.
+    speed: of the boundary, m/s, up to some way beyond the winds that are looked at.
+    slopes: its derivatives by each mode's coefficients.
+    """
+
+    modes: tuple[FailureMode, ...]
+    weight: float
+    speed: float
+    slopes: list[Floats]
+
+    @property
+    def deviation(self) -> float:
+        """The boundary's standard deviation, m/s."""
+        variances = (one @ mode.covariance @ one for one, mode in zip(self.slopes, self.modes, strict=True))
+        return float(np.sqrt(sum(variances)))
+
+
+class Direction:
+    """Flights in wind from one direction.
+
+    most: wind up to which is looked, m/s.
+    speeds: m/s, in which they were flown.  draws: index of each one's draw.  failed: the ways in which each failed.
+    """
+
+    def __init__(self, most: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
+        self.most, self.target, self.numbers, self.confidence = most, target, numbers, confidence
+        self.speeds: list[float] = []
+        self.draws: list[int] = []
+        self.failed: list[frozenset[Hashable]] = []
+        self._fits: tuple[int, tuple[FailureFit, ...]] | None = None
+
+    def add(self, speed: float, draw: int, failed: frozenset[Hashable]) -> None:
+        """Take a flight in; failed: none for one that was flyable."""
+        self.speeds.append(speed)
+        self.draws.append(draw)
+        self.failed.append(failed)
+
+    @property
+    def all_flew(self) -> bool:
+        """Whether no flight failed."""
+        return not any(self.failed)
+
+    @property
+    def all_failed(self) -> bool:
+        """Whether every flight did."""
+        return all(self.failed)
+
+    def fits(self) -> tuple[FailureFit, ...]:
+        """The ways of failing by each link; for a direction in which some flew and some did not."""
+        if self._fits is None or self._fits[0] != len(self.speeds):
+            terms = regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
+            every = [fit_modes(terms, self.failed, link) for link in LINKS]
+            evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in every])
+            weights = np.exp(evidence - evidence.max())
+            weights /= weights.sum()
+            self._fits = (
+                len(self.speeds),
+                tuple(self._fit(modes, float(weight)) for modes, weight in zip(every, weights, strict=True)),
+            )
+        return self._fits[1]
+
+    def _fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
+        draws = self.numbers.population
+        speed = boundary_speed(modes, draws, 1.0 - self.target, self.most + _BEYOND)
+        return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
+
+    def boundary(self) -> WindBoundary:
+        """What is known of the boundary.
+
+        >>> numbers = DrawnNumbers(np.zeros((8, 0)), lambda start, stop: np.zeros((stop - start, 0)))
+        >>> direction = Direction(20.0, 0.99, numbers)
+        >>> for k in range(200):
+        ...     direction.add(8.0 + 0.02 * k, k, frozenset() if 8.0 + 0.02 * k < 10.0 else frozenset({"slope"}))
+        >>> found = direction.boundary()
+        >>> 9.0 < found.low < found.estimate < found.high < 10.0
+        True
+        """
+        tail = 0.5 * (1.0 - self.confidence)
+        if self.all_flew or self.all_failed:
+            parts, flew = np.array([tail, 0.5, 1.0 - tail]), np.full(len(self.speeds), self.all_flew)
+            low, middle, high = self._laws.quantile_at(1.0 - self.target, np.array(self.speeds), flew, parts)
+        else:
+            low, middle, high = (_mixed_quantile(self.fits(), part) for part in (tail, 0.5, 1.0 - tail))
+        low, middle, high = (float(min(self.most, max(0.0, one))) for one in (low, middle, high))
+        return WindBoundary(middle, low, high, middle >= self.most - 1e-9)
+
+    @cached_property
+    def _laws(self) -> FailureLaws:
+        return FailureLaws.up_to(self.most)
+
+
+def _mixed_quantile(fits: tuple[FailureFit, ...], part: float) -> float:
+    """The boundary at this part of its posterior, m/s: each fit's is normal, and they weigh as they do."""
+    from scipy.special import ndtr
+
+    reach = 40.0 * max(fit.deviation for fit in fits) + 1e-6
+    low, high = min(fit.speed for fit in fits) - reach, max(fit.speed for fit in fits) + reach
+    while high - low > 1e-4:
+        middle = 0.5 * (low + high)
+        below = sum(fit.weight * float(ndtr((middle - fit.speed) / max(fit.deviation, 1e-9))) for fit in fits)
+        low, high = (middle, high) if below < part else (low, middle)
+    return 0.5 * (low + high)
 
 
 def needs_more(found: WindBoundary, flights: int, accuracy: float, fewest: int) -> bool:

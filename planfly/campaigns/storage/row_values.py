@@ -66,15 +66,11 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
         if (place := known[f"place_{rule}"]) is not None:
             data = json.loads(place)
             margins.append((rule, LeastMargin(known[f"margin_{rule}"], data.pop("unit"), Place(**data))))
-    failed = []
-    for entry in json.loads(known["failed"]):
-        rule = entry.pop("rule")
-        failed.append((rule, Place(**entry)))
     return FlightRow(
         draw=Draw(index, known["seed"], {name: known[name] for name in NAMES}),
         outcome=known["outcome"],
         ended=known["ended"],
-        failed=tuple(failed),
+        failed=failed_of(known["failed"]),
         margins=tuple(margins),
         energy_left=known["energy_left"],
         duration=known["duration"],
@@ -83,6 +79,16 @@ def row_of(index: int, known: Mapping[str, Any]) -> FlightRow:
         seconds=known["seconds"],
         worker=known["worker"],
     )
+
+
+def failed_of(text: str) -> tuple[tuple[str, Place], ...]:
+    """Rule and place of each finding that failed, of the column's text.
+
+    >>> failed_of('[{"rule": "slope", "kind": "leg", "index": 3}]')[0][1].index
+    3
+    """
+    entries = json.loads(text)
+    return tuple((entry.pop("rule"), Place(**entry)) for entry in entries)
 
 
 def same_flight(one: FlightRow, other: FlightRow) -> bool:

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from planfly.campaigns.flights.flight_row import FlightRow
+from logs.verdict.places import Place
+from planfly.campaigns.flights.flight_row import FlightRow, Outcome
 from planfly.campaigns.storage.held_table import HeldTable, TableKind
-from planfly.campaigns.storage.row_values import ROW_COLUMNS, row_values
+from planfly.campaigns.storage.row_values import ROW_COLUMNS, failed_of, row_values
 
 WINDS_DATABASE = "winds.sqlite"
 # What decides which flights are asked for; of the number of flights, only how many are.
@@ -39,6 +40,14 @@ class AskedFlight:
     draw: int
 
 
+@dataclass(frozen=True, slots=True)
+class FlownFlight:
+    """What came of a flight: its outcome, and rule and place of each finding that failed."""
+
+    outcome: Outcome
+    failed: tuple[tuple[str, Place], ...]
+
+
 class WindsStore(HeldTable):
     """A search's table, held by one process at a time."""
 
@@ -53,9 +62,12 @@ class WindsStore(HeldTable):
         }  # fmt: skip
         self.insert({**asked_for, **row_values(row, self.made_of)})
 
-    def known(self) -> dict[int, tuple[AskedFlight, str]]:
-        """Each flight there is and its outcome, by number."""
+    def known(self) -> dict[int, tuple[AskedFlight, FlownFlight]]:
+        """Each flight there is and what came of it, by number."""
         rows = self._connection.execute(
-            "SELECT flight, direction, asked_speed, draw, outcome FROM flights ORDER BY flight"
+            "SELECT flight, direction, asked_speed, draw, outcome, failed FROM flights ORDER BY flight"
         )
-        return {number: (AskedFlight(number, *asked), outcome) for number, *asked, outcome in rows}
+        return {
+            number: (AskedFlight(number, *asked), FlownFlight(outcome, failed_of(failed)))
+            for number, *asked, outcome, failed in rows
+        }

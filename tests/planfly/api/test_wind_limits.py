@@ -14,6 +14,7 @@ from planfly.campaigns.spread.draws import draw_flight
 from planfly.campaigns.statistics.wind_boundary import Direction
 from planfly.campaigns.storage.winds_store import AskedFlight, WindsStore
 from tests.planfly.campaigns.made_campaigns import table
+from tests.planfly.campaigns.statistics.made_directions import no_numbers
 
 FLIGHTS = tuple((number, speed, speed < 8.0) for number in range(4) for speed in (2.0, 6.0, 7.5, 8.5, 10.0, 14.0))
 
@@ -27,9 +28,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[CampaignBase, WindsGoal
         seen.append((base, goal))
         if not store.known():
             store.add(AskedFlight(0, 0, 5.0, 0), made_row(base))
-        directions = [Direction(goal.most, goal.target, goal.confidence) for _ in range(goal.directions)]
-        for number, speed, flyable in FLIGHTS:
-            directions[number].add(speed, flyable)
+        directions = [Direction(goal.most, goal.target, no_numbers(), goal.confidence) for _ in range(goal.directions)]
+        for draw, (number, speed, flyable) in enumerate(FLIGHTS):
+            directions[number].add(speed, draw, frozenset() if flyable else frozenset({"slope"}))
         return WindsFound(goal, tuple(one.boundary() for one in directions), FLIGHTS)
 
     monkeypatch.setattr(wind_limits, "find_winds", found)

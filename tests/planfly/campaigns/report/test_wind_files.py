@@ -4,7 +4,7 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-from planfly.campaigns.find_winds import WindsFound, WindsGoal
+from planfly.campaigns.find_winds import FEWEST, WindsFound, WindsGoal
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.report.wind_files import spokes, wind_lines, write_winds
 from planfly.campaigns.statistics.wind_boundary import WindBoundary
@@ -25,8 +25,8 @@ def test_flights_are_counted_by_wind() -> None:
 
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
     assert any("not settled: 4 of 4 directions" in line for line in wind_lines(FOUND))
-    boundary = WindBoundary(7.0, 6.7, 7.4, False)
-    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(30)))
+    boundary = WindBoundary(7.0, 6.8, 7.3, False)
+    settled = WindsFound(FOUND.goal, (boundary,), tuple((0, 7.0, True) for _ in range(FEWEST)))
     assert not any("not settled" in line for line in wind_lines(settled))
     fewer = WindsFound(FOUND.goal, (boundary,), settled.flights[1:])
     assert any("not settled: 1 of 1" in line for line in wind_lines(fewer))

@@ -1,0 +1,108 @@
+"""The links of a binary regression: the probability to fail as a function of a linear predictor.
+
+`PROBIT` is that of a threshold which is distributed normally; `LEAST_OF_MANY` (complementary log-log) that of the least
+of many thresholds, Gumbel's law for minima, whose tail towards little wind is the longer one (McCullagh and Nelder,
+Generalized Linear Models, 2nd edition, 1989, section 4.3).
+"""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+# exp of more than this is more than any number; and the least number that is not taken as none.
+_MOST, _LEAST = 700.0, 1e-300
+
+
+class BinaryLink(Protocol):
+    """All of (n,) predictors."""
+
+    def log_shares(self, x: Floats) -> tuple[Floats, Floats]:
+        """Logarithms of the probability to fail, and to fly."""
+
+    def fly_shares(self, x: Floats) -> Floats:
+        """Probability to fly."""
+
+    def density(self, x: Floats) -> Floats:
+        """Derivative of the probability to fail."""
+
+    def information(self, x: Floats) -> Floats:
+        """Fisher's, of a flight about its predictor: the density squared over the variance of what comes out."""
+
+    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+        """First and second derivative of the logarithm of the probability of what came out."""
+
+
+class _Probit:
+    def log_shares(self, x: Floats) -> tuple[Floats, Floats]:
+        from scipy.special import log_ndtr
+
+        return log_ndtr(x), log_ndtr(-x)
+
+    def fly_shares(self, x: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        out: Floats = ndtr(-x)
+        return out
+
+    def density(self, x: Floats) -> Floats:
+        out: Floats = np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
+        return out
+
+    def information(self, x: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        out: Floats = self.density(x) ** 2 / np.maximum(ndtr(x) * ndtr(-x), _LEAST)
+        return out
+
+    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+        from scipy.special import log_ndtr
+
+        sign = np.where(failed, 1.0, -1.0)
+        z = sign * x
+        # By logarithms, for Phi is 0 long before its logarithm's derivative is.
+        ratio = np.exp(-0.5 * z * z - 0.5 * np.log(2.0 * np.pi) - log_ndtr(z))
+        return sign * ratio, -ratio * (z + ratio)
+
+
+class _LeastOfMany:
+    def log_shares(self, x: Floats) -> tuple[Floats, Floats]:
+        rate = np.exp(np.minimum(x, _MOST))
+        with np.errstate(divide="ignore"):
+            # Where the rate is 0, the probability is the rate.
+            fails = np.where(x < -30.0, x, np.log(-np.expm1(-rate)))
+        return fails, -rate
+
+    def fly_shares(self, x: Floats) -> Floats:
+        out: Floats = np.exp(-np.exp(np.minimum(x, _MOST)))
+        return out
+
+    def density(self, x: Floats) -> Floats:
+        out: Floats = np.exp(x - np.exp(np.minimum(x, _MOST)))
+        return out
+
+    def information(self, x: Floats) -> Floats:
+        rate = np.exp(np.clip(x, -_MOST, 0.5 * _MOST))
+        out: Floats = rate * _rate_ratio(rate)
+        return out
+
+    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+        rate = np.exp(np.clip(x, -_MOST, 0.5 * _MOST))
+        first = _rate_ratio(rate)
+        second = first * (1.0 - rate - first)
+        return np.where(failed, first, -rate), np.where(failed, np.minimum(second, 0.0), -rate)
+
+
+def _rate_ratio(rate: Floats) -> Floats:
+    """Rate / (exp(rate) - 1): near 1 for a small rate, 0 for a large one."""
+    with np.errstate(over="ignore"):
+        out: Floats = rate / np.expm1(rate)
+    return out
+
+
+PROBIT: BinaryLink = _Probit()
+LEAST_OF_MANY: BinaryLink = _LeastOfMany()
+LINKS = (PROBIT, LEAST_OF_MANY)

@@ -1,0 +1,43 @@
+"""The links of a binary regression, against scipy's laws."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.stats import gumbel_l, norm
+
+from planfly.campaigns.statistics.links import LEAST_OF_MANY, LINKS, PROBIT, BinaryLink
+
+CASES = [(PROBIT, norm), (LEAST_OF_MANY, gumbel_l)]
+X = np.linspace(-6.0, 3.0, 37)
+
+
+@pytest.mark.parametrize(("link", "law"), CASES)
+def test_shares_and_density_are_the_laws(link: BinaryLink, law: Any) -> None:
+    fails, flies = link.log_shares(X)
+    assert fails == pytest.approx(law.logcdf(X), rel=1e-9)
+    assert flies == pytest.approx(law.logsf(X), rel=1e-9)
+    assert link.fly_shares(X) == pytest.approx(law.sf(X), rel=1e-9)
+    assert link.density(X) == pytest.approx(law.pdf(X), rel=1e-9)
+    assert link.information(X) == pytest.approx(law.pdf(X) ** 2 / (law.cdf(X) * law.sf(X)), rel=1e-8)
+
+
+@pytest.mark.parametrize(("link", "law"), CASES)
+@pytest.mark.parametrize("failed", [True, False])
+def test_derivatives_are_those_of_the_law(link: BinaryLink, law: Any, failed: bool) -> None:
+    logs, h = (law.logcdf if failed else law.logsf), 1e-4
+    first, second = link.derivatives(X, np.full(X.size, failed))
+    assert first == pytest.approx((logs(X + h) - logs(X - h)) / (2.0 * h), rel=1e-5, abs=1e-7)
+    assert second == pytest.approx((logs(X + h) - 2.0 * logs(X) + logs(X - h)) / h**2, rel=1e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_far_from_all_flights_numbers_stay_finite(link: BinaryLink) -> None:
+    """A search may look at winds and draws that its fit has at no chance whatever."""
+    far = np.array([-300.0, -60.0, -35.0, 35.0, 300.0])
+    for failed in (True, False):
+        for values in link.derivatives(far, np.full(far.size, failed)):
+            assert np.isfinite(values).all()
+        assert (link.derivatives(far, np.full(far.size, failed))[1] <= 0.0).all()
+    assert np.isfinite(link.information(far)).all()
+    assert np.isfinite(link.density(far)).all()
