@@ -74,12 +74,14 @@ def fit_modes(terms: Floats, failed: Sequence[frozenset[Hashable]], link: Binary
     12.0
     """
     found: list[FailureMode] = []
+    # Where nothing is known of what is drawn, its coefficients' prior is none's.
+    priors = _DRAWS if terms.shape[1] > 2 else _DRAWS[:1]
     left = np.ones(len(failed), dtype=bool)
     while counts := Counter(way for here, ways in zip(left, failed, strict=True) if here for way in ways):
         # By name where as many failed, as the order of a set is not the same in every process.
         common = min(counts, key=lambda way: (-counts[way], repr(way)))
         so = np.array([common in ways for ways in failed])
-        fits = (_fit(terms[left], so[left], link, deviation) for deviation in _DRAWS)
+        fits = (_fit(terms[left], so[left], link, deviation) for deviation in priors)
         found.append(max(fits, key=lambda mode: mode.log_evidence))
         left &= ~so
     return tuple(found)

@@ -75,10 +75,12 @@ def _most_telling(direction: Direction, count: int) -> list[tuple[float, int]]:
     )
     speeds = np.unique([_rounded(wind, most) for wind in np.linspace(min(least), max(largest), _WINDS)])
     beliefs = [_Belief(fit) for fit in fits]
+    # Where nothing is known of what is drawn, one draw is as good as any.
+    compared = _COMPARED if direction.numbers.population.shape[1] else 1
     out: list[tuple[float, int]] = []
     for number in range(flown, flown + count):
         taken = [draw for _, draw in out]
-        draws = _next_draws(direction, 1 if number % _PLAIN == 0 else _COMPARED, taken)
+        draws = _next_draws(direction, 1 if number % _PLAIN == 0 else compared, taken)
         drawn = direction.numbers.first(max(draws) + 1)[draws]
         terms = regressors(np.repeat(speeds, len(draws)), np.tile(drawn, (speeds.size, 1)))
         best = int(np.argmax(sum(belief.gains(terms) for belief in beliefs) + _gains_between(fits, terms)))
