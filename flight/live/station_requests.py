@@ -197,13 +197,15 @@ def _whole(value: float) -> int:
 
 # After a refused MISSION_SET_CURRENT a station gets no MISSION_CURRENT for this time, s.
 _QUIET = 3.0
+# MAV_CMD_DO_ORBIT, a name that pymavlink 2.4.41 has not.
+_DO_ORBIT = 34
 _NO_GUIDED = "go-to refused: this vehicle flies its mission alone; upload the way as a mission"
 # Commands to an aircraft that this one, which flies a mission as it was judged, is not flown by; and what to do.
 _NOT_FLOWN: dict[int, str] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "speed change refused: put DO_CHANGE_SPEED into the mission",
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL refused: a forced disarm ends the flight; a mission may end with RTL",
     mavlink.MAV_CMD_DO_REPOSITION: _NO_GUIDED,
-    mavlink.MAV_CMD_DO_ORBIT: "orbit refused: put a loiter into the mission",
+    _DO_ORBIT: "orbit refused: put a loiter into the mission",
     mavlink.MAV_CMD_DO_CHANGE_ALTITUDE: "height change refused: put the height into the mission",
     mavlink.MAV_CMD_NAV_TAKEOFF: "take-off refused: put NAV_TAKEOFF into the mission and start it",
     mavlink.MAV_CMD_NAV_LAND: "landing refused: put NAV_LAND into the mission and start it",
