@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
 LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/flight/mission_files tests/flight/dynamics \
-	tests/flight/live tests/logs/recording tests/logs/verdict
+	tests/flight/live tests/logs/recording tests/logs/verdict tests/planfly/campaigns/statistics tests/planfly/campaigns/spread
 # What pyproject.toml names.
 DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
@@ -57,7 +57,7 @@ low: SET := $(LOWEST)
 newest: SET := --upgrade
 low newest:
 	$(PYTHON) -m venv build/$@
-	build/$@/bin/python -m pip install --quiet $(SET) --editable . hypothesis pytest pytest-xdist
+	build/$@/bin/python -m pip install --quiet $(SET) --editable . hypothesis pytest pytest-xdist trimesh
 	@echo "tested with the $(if $(filter low,$@),lowest,newest) versions:"
 	@build/$@/bin/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
 	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(TWO) $(LOW)
