@@ -6,6 +6,8 @@ VENV := .venv
 # Bytecode is kept, whatever the shell says: each of the tests' many processes would compile all it imports anew.
 export PYTHONDONTWRITEBYTECODE :=
 BIN := $(VENV)/bin
+# Two processes test on two cores: threads of NumPy's linear algebra would stand in the other's way.
+test low newest: export OPENBLAS_NUM_THREADS := 1
 # A file's tests run in one of two processes, so that what they share is made once; files in their own order.
 TWO := -n 2 --dist loadfile --no-loadscope-reorder
 # Rooms that need nothing but planfly itself; the others test with clients, which have their own lower bounds.
