@@ -112,7 +112,7 @@ def deadly_flight(base: CampaignBase, index: int, wind: GivenWind | None = None)
 
 
 def deadly_in_the_east(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
-    """Flight 17 in wind from the east, of 5 m/s where it is among the second twelve, ends its worker's process."""
-    if index == 17 and wind is not None and wind.from_deg == 90.0:
+    """Flight 9 in wind from the east, of 5 m/s where it is among the second six, ends its worker's process."""
+    if index == 9 and wind is not None and wind.from_deg == 90.0:
         os.abort()
     return made_flight(base, index, wind)

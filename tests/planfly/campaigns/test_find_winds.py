@@ -5,6 +5,7 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -175,11 +176,8 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
     assert [int(line[2]) for line in lines if line] == [*range(1, flights + 1), flights]
     # Four directions take thirty each; how many more shows when it shows.
     assert [bool(line[3]) for line in lines if line] == [k < 4 * 30 for k in range(1, flights + 2)]
-    # Three of them are alike, and settled before the fourth; all at its end.
-    counts = [int(line[1]) for line in lines if line]
-    assert counts == sorted(counts)
-    assert counts[0] == 0
-    assert {3, 4} <= set(counts)
+    # Three of them are alike, and settled together.
+    assert [key for key, _ in groupby(line[1] for line in lines if line)] == ["0", "3", "4"]
     assert told[0][:2] == (1.0, 120.0)
     assert all(done < whole for done, whole, _ in told)
 
@@ -187,12 +185,12 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
 @pytest.mark.skipif(not SOAK, reason="workers die at a small count in a campaign's tests: in make soak")
 def test_a_deadly_flight_is_named_and_counts_against(wind_base: CampaignBase, tmp_path: Path) -> None:
     """By workers: all others come out as without them, and the one counts as not flyable."""
-    # Twelve of each direction in 10 m/s, in which none flies, and twelve in 5 m/s, in which all others fly.
-    goal = WindsGoal(0.9, 0.95, 4, 20.0, 96)
+    # Six of each direction in 10 m/s, in which none flies, and six in 5 m/s, in which all others fly.
+    goal = WindsGoal(0.9, 0.95, 4, 20.0, 48)
     found = searched(wind_base, tmp_path / "two", goal, fly=deadly_in_the_east)
 
     def here(base: CampaignBase, index: int, wind: Any) -> Any:
-        dies = index == 17 and wind.from_deg == 90.0
+        dies = index == 9 and wind.from_deg == 90.0
         return lost_row(base, index, "lost: its worker died three times") if dies else made_flight(base, index, wind)
 
     with pytest.MonkeyPatch.context() as patch:
