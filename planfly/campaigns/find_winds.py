@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 
+from logs.verdict.places import Place
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.fingerprint import code_hash
 from planfly.campaigns.engine.flight_loop import Order, Pilots, hired_pilots
@@ -136,8 +137,10 @@ class _Search:
     def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
         """Take a flight in, in the order in which they were asked for."""
         flyable = flown.outcome == "flyable"
-        ways: set[Hashable] = {(rule, place.kind, place.index) for rule, place in flown.failed} or {flown.outcome}
-        self.directions[asked.direction].add(asked.speed, asked.draw, frozenset() if flyable else frozenset(ways))
+        ways: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
+        room: dict[Hashable, float] = {_way(rule, place): share for rule, place, share in flown.narrow}
+        failed = frozenset() if flyable else frozenset(ways)
+        self.directions[asked.direction].add(asked.speed, asked.draw, failed, room)
         self.flown.append((asked.direction, asked.speed, flyable))
         if flown.outcome == "lost":
             self.lost.append(asked.number)
@@ -155,6 +158,11 @@ class _Search:
         """The answer."""
         boundaries = tuple(one.boundary() for one in self.directions)
         return WindsFound(self.goal, boundaries, tuple(self.flown), tuple(self.lost))
+
+
+def _way(rule: str, place: Place) -> Hashable:
+    """A way of failing: the rule, and where."""
+    return rule, place.kind, place.index
 
 
 class _Known:
@@ -177,7 +185,7 @@ class _Known:
     def add(self, asked: AskedFlight, row: FlightRow) -> None:
         """Write one down."""
         self._store.add(asked, row)
-        self.flown[asked.number] = FlownFlight(row.outcome, row.failed)
+        self.flown[asked.number] = FlownFlight(row.outcome, row.failed, row.narrow)
 
 
 def _fly_round(pilots: Pilots, search: _Search, missing: list[AskedFlight], known: _Known, pace: "_Pace") -> None:

@@ -74,6 +74,11 @@ def path_spheres(points: Floats, time: Floats, centres: Floats, radii: Floats, s
     """How a path meets each of m spheres.  A radius of 0 is no sphere.
 
     points: (n, 3) m.  time: (n,) s.  centres: (m, 3) m.  radii, scales: (m,) m.
+
+    >>> line, time = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]), np.array([0.0, 10.0])
+    >>> visits = path_spheres(line, time, np.array([[50.0, 30.0, 0.0]]), np.array([50.0]), np.array([10.0]))
+    >>> float(visits.closest[0]), round(float(visits.inside[0]), 6)
+    (30.0, 8.0)
     """
     given = (read_only(array) for array in (points, time, centres, radii, scales))
     visits: SphereVisits = _path_spheres(*given)

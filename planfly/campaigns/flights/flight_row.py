@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Place
 from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.margin_scales import COUNTS, SCALES
+from planfly.campaigns.flights.narrow_passes import NarrowPass, narrow_passes
 from planfly.campaigns.flights.track_shape import clearance_profile, waypoint_crossings
 from planfly.campaigns.flights.varied_flight import GivenWind, vary
 from planfly.campaigns.spread.draws import Draw, draw_flight
@@ -37,6 +39,7 @@ class FlightRow:
     energy_left: Wh; None where nothing was flown.
     duration: s.
     clearance, crossings: bytes of `planfly.campaigns.flights.track_shape`'s arrays; empty where nothing was flown.
+    narrow: where it passed narrowly, and with how much room; the table of a campaign does not keep it.
     seconds: that it took.  worker: who flew it.  Both are no part of what is the same for any number of workers.
     """
 
@@ -49,6 +52,7 @@ class FlightRow:
     duration: float = 0.0
     clearance: bytes = b""
     crossings: bytes = b""
+    narrow: tuple[NarrowPass, ...] = ()
     seconds: float = 0.0
     worker: str = ""
 
@@ -57,16 +61,6 @@ class FlightRow:
         """Least of all margins over their tolerable scale: what orders the closest calls; inf where none is known."""
         known = [margin.value / SCALES[rule] for rule, margin in self.margins if margin.value is not None]
         return min((value for value in known if math.isfinite(value)), default=math.inf)
-
-
-# What a margin is measured by where flights are put in order: of each rule, a difference that a person would call
-# noticeable, in the rule's unit.  They order pictures and lists, and decide nothing.
-SCALES = dict.fromkeys(RULES, 10.0) | {
-    "turn": 5.0, "slope": 1.0, "clearance": 10.0, "height": 10.0, "speed": 1.0, "stall": 1.0, "energy": 50.0,
-    "waypoint": 10.0, "corridor": 10.0, "departure": 10.0, "completion": 1.0,
-}  # fmt: skip
-# Rules whose margin is a count or a time, and tells nothing of how close a flight was.
-_COUNTS = ("completion", "threat", "mission", "takeoff", "landing", "turn")
 
 
 def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: Path | None = None) -> FlightRow:
@@ -90,6 +84,7 @@ def fly_one(base: CampaignBase, index: int, wind: GivenWind | None = None, log: 
         duration=float(track.time[-1]) if some else 0.0,
         clearance=clearance_profile(route, track).tobytes() if some else b"",
         crossings=waypoint_crossings(route, track).tobytes() if some else b"",
+        narrow=narrow_passes(flown.verdict.findings, varied.setup.scenario, track),
         seconds=time.perf_counter() - started,
     )
 
@@ -112,7 +107,7 @@ def least_margins(findings: tuple[Finding, ...]) -> tuple[tuple[str, LeastMargin
     """
     least: dict[str, Finding] = {}
     for item in findings:
-        if item.ok is None or item.margin is None or item.rule in _COUNTS:
+        if item.ok is None or item.margin is None or item.rule in COUNTS:
             continue
         known = least.get(item.rule)
         if known is None or known.margin is None or item.margin < known.margin:

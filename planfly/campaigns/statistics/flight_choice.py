@@ -116,7 +116,7 @@ class _Belief:
         """(n,) by how much each of these flights (n, 2 + d) is expected to lessen the boundary's variance, m2/s2."""
         out: Floats = np.zeros(len(terms))
         for mode, covariance, slope in zip(self._fit.modes, self._covariances, self._fit.slopes, strict=True):
-            known, told = terms @ covariance, mode.link.information(terms @ mode.mean)
+            known, told = terms @ covariance, mode.link.information(terms @ mode.mean, mode.by_room)
             out += (known @ slope) ** 2 * told / (1.0 + told * (known * terms).sum(axis=1))
         return self._fit.weight * out
 
@@ -124,7 +124,7 @@ class _Belief:
         """Count a flight (2 + d,) as flown, whatever comes of it."""
         for k, mode in enumerate(self._fit.modes):
             known = self._covariances[k] @ row
-            told = float(mode.link.information(row[None] @ mode.mean)[0])
+            told = float(mode.link.information(row[None] @ mode.mean, mode.by_room)[0])
             self._covariances[k] = self._covariances[k] - told * np.outer(known, known) / (1.0 + told * (row @ known))
 
 

@@ -6,7 +6,7 @@ the boundary's derivatives (the delta method).  Each of the `links` is as likely
 and weighs by its evidence then.  Where all flew, or all failed, one law of `failure_laws` has to do.
 """
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -96,6 +96,7 @@ class Direction:
 
     most: wind up to which is looked, m/s.
     speeds: m/s, in which they were flown.  draws: index of each one's draw.  failed: the ways in which each failed.
+    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1.
     """
 
     def __init__(self, most: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
@@ -103,13 +104,17 @@ class Direction:
         self.speeds: list[float] = []
         self.draws: list[int] = []
         self.failed: list[frozenset[Hashable]] = []
+        self.room: list[Mapping[Hashable, float]] = []
         self._fits: tuple[int, tuple[FailureFit, ...]] | None = None
 
-    def add(self, speed: float, draw: int, failed: frozenset[Hashable]) -> None:
-        """Take a flight in; failed: none for one that was flyable."""
+    def add(
+        self, speed: float, draw: int, failed: frozenset[Hashable], room: Mapping[Hashable, float] | None = None
+    ) -> None:
+        """Take a flight in; failed: none for one that was flyable.  room: None where nothing is known of it."""
         self.speeds.append(speed)
         self.draws.append(draw)
         self.failed.append(failed)
+        self.room.append(room or {})
 
     @property
     def all_flew(self) -> bool:
@@ -125,7 +130,7 @@ class Direction:
         """The ways of failing by each link; for a direction in which some flew and some did not."""
         if self._fits is None or self._fits[0] != len(self.speeds):
             terms = regressors(np.array(self.speeds), self.numbers.first(max(self.draws) + 1)[self.draws])
-            every = [fit_modes(terms, self.failed, link) for link in LINKS]
+            every = [fit_modes(terms, self.failed, link, self.room) for link in LINKS]
             evidence = np.array([sum(mode.log_evidence for mode in modes) for modes in every])
             weights = np.exp(evidence - evidence.max())
             weights /= weights.sum()

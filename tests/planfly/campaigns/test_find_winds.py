@@ -5,12 +5,14 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from logs.verdict.places import Place
 from planfly.campaigns import find_winds as module
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.flight_loop import Flown, Order
@@ -111,6 +113,24 @@ def test_the_boundary_is_found_in_each_direction(wind_base: CampaignBase, tmp_pa
         draws = [row[3] for row in rows if row[1] == direction]
         assert len(set(draws)) == len(draws)
         assert set(range(len(draws) // 3)) <= set(draws)
+
+
+def flight_that_tells_its_room(base: CampaignBase, index: int, wind: GivenWind) -> FlightRow:
+    """A made flight that also tells by how much it passed, where that is less than a metre a second of wind."""
+    row = made_flight(base, index, wind)
+    room = (12.0 if wind.from_deg == 270.0 else 8.0) + row.draw.seed % 1000 / 1000.0 - 0.5 - wind.speed
+    return replace(row, narrow=(("clearance", Place("leg", 1), room),)) if 0.0 < room < 1.0 else row
+
+
+@pytest.mark.usefixtures("here")
+def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: CampaignBase, tmp_path: Path) -> None:
+    """As many flights; and what is told is still there when the search goes on."""
+    goal = replace(GOAL, flights=160)
+    told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_tells_its_room)
+    bare = searched(wind_base, tmp_path / "bare", goal)
+    for some, none in zip(told.boundaries, bare.boundaries, strict=True):
+        assert some.width < 0.8 * none.width
+    assert searched(wind_base, tmp_path / "told", goal, fly=flight_that_tells_its_room) == told
 
 
 @pytest.mark.usefixtures("here")

@@ -71,7 +71,7 @@ def test_another_campaign_and_a_missing_one_are_refused(tmp_path: Path) -> None:
 def test_a_search_s_table_is_no_campaign_s(base: CampaignBase, tmp_path: Path) -> None:
     add_to_campaign(tmp_path / "c", [all_fly(base, 0)], resume=False)
     add_to_search(tmp_path / "w", [all_fly(base, 0)], resume=False)
-    with pytest.raises(StoreError, match=r"planfly.winds-flights/1 is expected"):
+    with pytest.raises(StoreError, match=r"planfly.winds-flights/2 is expected"):
         add_to_search(tmp_path / "c", [], resume=True)
     with pytest.raises(StoreError, match=r"planfly.campaign/1 is expected"):
         add_to_campaign(tmp_path / "w", [], resume=True)
