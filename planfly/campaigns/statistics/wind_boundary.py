@@ -13,9 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from planfly.campaigns.statistics.censored_regression import FailureMode
 from planfly.campaigns.statistics.failure_laws import FailureLaws
 from planfly.campaigns.statistics.failure_modes import (
-    FailureMode,
     boundary_slopes,
     boundary_speed,
     fit_modes,
