@@ -8,6 +8,7 @@ from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.report.campaign_files import campaign_folder
 from planfly.campaigns.report.wind_files import write_winds
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
+from planfly.campaigns.storage.winds_store import WINDS_DATABASE
 
 
 def winds(
@@ -24,6 +25,7 @@ def winds(
     scheduler: str | None = None,
     out: str | Path | None = None,
     resume: bool = False,
+    overwrite: bool = False,
 ) -> WindsFound:
     """The largest wind from each direction in which a mission flies with a probability, by flights put where they tell.
 
@@ -31,7 +33,7 @@ def winds(
     prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all directions.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
-    resume: go on with the search that is there.
+    resume: go on with the search that is there.  overwrite: replace it.
 
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
     Raises ValueError for numbers that are none, and a `planfly.PlanflyError` for bad input.
@@ -49,8 +51,9 @@ def winds(
             raise ValueError(f"{name}: {value:g}: {low:g} to {high:g} is expected")
     goal = WindsGoal(prove, confidence, directions, most, flights)
     chosen = default_spread() if spread is None else read_spread(Path(spread))
-    with campaign_folder(out, resume=resume) as folder:
-        base = open_campaign(str(target), chosen.without(ASKED), planned=folder / "plan.json", seed=seed)
+    with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as asked:
+        folder = asked.folder
+        base = asked.open(lambda plan: open_campaign(str(target), chosen.without(ASKED), planned=plan, seed=seed))
         with open_winds_store(base, goal, folder, resume=resume) as store:
             found = find_winds(base, goal, Workers(workers, scheduler), store)
         if out is not None:

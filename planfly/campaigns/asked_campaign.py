@@ -7,15 +7,13 @@ from pathlib import Path
 
 from planfly.campaigns.campaign_result import make_goal
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
-from planfly.campaigns.report.campaign_files import CAMPAIGN_FILES, clear_campaign
+from planfly.campaigns.report.campaign_files import AskedFolder
 from planfly.campaigns.spread.spread_file import FlightSpread, default_spread, read_spread
 from planfly.campaigns.statistics.decision import Goal
 from planfly.pipeline import Advance
 from planfly.terminal.progress import progress
 from planfly.terminal.scenario_options import scenario_change
 from planfly.terminal.targets import RESULTS
-from planner.plan import plan_json
-from world.atomic_files import write_whole
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
@@ -42,31 +40,8 @@ def open_base(args: argparse.Namespace, spread: FlightSpread, folder: Path, tabl
     table: name of the file of flights.  A scenario's plan is kept in the folder, for those that go on.
     Raises PlanflyError; a folder that was not ready is as it was then.
     """
-    if again and not (folder / table).is_file():
-        raise PlanflyError(f"{folder / table}: no campaign there to go on with", file=folder / table)
-    if not again:
-        _refuse_campaign(folder, table, args.overwrite)
-    base = _opened(args, spread, folder if again else None)
-    if not again:
-        clear_campaign(folder)
-    if base.plan is not None and not (folder / "plan.json").exists():
-        write_whole(folder / "plan.json", plan_json(base.plan))
-    return base
-
-
-def _refuse_campaign(folder: Path, table: str, overwrite: bool) -> None:
-    """Refuse a folder that is a file, or that holds a campaign or anything else.  Raises PlanflyError."""
-    if folder.exists() and not folder.is_dir():
-        raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
-    if overwrite or not folder.is_dir() or not any(folder.iterdir()):
-        return
-    if (folder / table).exists():
-        raise PlanflyError(
-            f"{folder}: holds a campaign; --resume goes on with it, --overwrite replaces it", file=folder
-        )
-    if any((folder / name).exists() for name in CAMPAIGN_FILES):
-        raise PlanflyError(f"{folder}: holds another campaign; --overwrite replaces it", file=folder)
-    raise PlanflyError(f"{folder}: exists and is not empty; --overwrite replaces its results", file=folder)
+    asked = AskedFolder(folder, table, again, args.overwrite, ("--resume", "--overwrite"))
+    return asked.open(lambda planned: _opened(args, spread, planned))
 
 
 def tell_interrupted(stop: KeyboardInterrupt, folder: Path, flights: int) -> int:
@@ -75,15 +50,15 @@ def tell_interrupted(stop: KeyboardInterrupt, folder: Path, flights: int) -> int
     return 128 + (stop.number if isinstance(stop, Interrupted) else signal.SIGINT)
 
 
-def _opened(args: argparse.Namespace, spread: FlightSpread, folder: Path | None) -> CampaignBase:
-    """The mission of the options, planned if it is a scenario and the folder holds no plan of it."""
+def _opened(args: argparse.Namespace, spread: FlightSpread, planned: Path | None) -> CampaignBase:
+    """The mission of the options, planned if it is a scenario and there is no plan of it."""
     change = scenario_change(args)
 
     def opened(advance: Advance | None = None) -> CampaignBase:
         return open_campaign(
             args.target,
             spread,
-            planned=None if folder is None else folder / "plan.json",
+            planned=planned,
             scenario_name=args.scenario,
             terrain=args.terrain,
             seed=args.seed,
@@ -92,7 +67,7 @@ def _opened(args: argparse.Namespace, spread: FlightSpread, folder: Path | None)
         )
 
     is_file = Path(args.target).suffix.lower() in (".json", ".waypoints", ".plan")
-    if is_file or (folder is not None and (folder / "plan.json").is_file()):
+    if is_file or (planned is not None and planned.is_file()):
         return opened()
     with progress("planning") as advance:
         return opened(advance)

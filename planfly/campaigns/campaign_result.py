@@ -106,6 +106,7 @@ def campaign(
     scheduler: str | None = None,
     out: Path | str | None = None,
     resume: bool = False,
+    overwrite: bool = False,
 ) -> CampaignResult:
     """Fly a mission many times, each time as `planfly fly` would in its own wind, aircraft, terrain and start.
 
@@ -118,6 +119,7 @@ def campaign(
     seed: of plan and draws; None takes the scenario's, or 1.
     workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
     out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
+    overwrite: replace it.
 
     A script that calls it does so under ``if __name__ == "__main__":``, for workers import it.
     Raises ValueError for numbers that are none, and a `planfly.PlanflyError` for bad input.
@@ -129,8 +131,9 @@ def campaign(
     """
     goal = make_goal(flights, prove, at_least, confidence)
     chosen = default_spread() if spread is None else read_spread(Path(spread))
-    with campaign_folder(out, resume=resume) as folder:
-        base = open_campaign(str(target), chosen, planned=folder / "plan.json", seed=seed)
+    with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as asked:
+        folder = asked.folder
+        base = asked.open(lambda plan: open_campaign(str(target), chosen, planned=plan, seed=seed))
         with open_store(base, goal, folder, resume=resume) as store:
             estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
             summary = summarise(base, goal, estimate, store) if out is None else None

@@ -15,7 +15,8 @@ from world.atomic_files import temporary_folder
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
-# A flight is given up when a third worker dies on it: one that only waited for its worker has died with it, too.
+# dask gives a flight up when a third worker dies on it: one that only waited for its worker has died with it, too.
+# `planfly.campaigns.engine.flight_loop` sends it once more then.
 ALLOWED_FAILURES = 2
 _CONNECT_SECONDS = 20
 

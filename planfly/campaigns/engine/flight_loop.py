@@ -16,6 +16,9 @@ from planfly.campaigns.flights.varied_flight import GivenWind
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 
+# How a flight ended that could not be flown.
+LOST = "lost: its workers died"
+
 
 @dataclass(frozen=True, slots=True)
 class Order:
@@ -60,26 +63,32 @@ class Pilots:
         from distributed import as_completed
 
         flying: dict[tuple[str, int], Order] = {}
+        given_up: set[Order] = set()
         done: Any = cast("Any", as_completed)(loop=self._client.loop)
 
-        def send() -> None:
-            while len(flying) < self.threads():
-                order = following()
-                if order is None:
-                    return
-                # A tuple: dask takes its first word for the kind of task, and keeps something of each kind for good.
-                key = (self._name, next(self._numbers))
-                flying[key] = order
-                done.add(self._client.submit(fly_task, self._name, order.index, order.wind, key=key, pure=False))
+        def send(order: Order) -> None:
+            # A tuple: dask takes its first word for the kind of task, and keeps something of each kind for good.
+            key = (self._name, next(self._numbers))
+            flying[key] = order
+            done.add(self._client.submit(fly_task, self._name, order.index, order.wind, key=key, pure=False))
+
+        def send_following() -> None:
+            while len(flying) < self.threads() and (order := following()) is not None:
+                send(order)
 
         try:
-            send()
+            send_following()
             while flying:
                 future = next(done)
                 order = flying.pop(future.key)
                 row = self._result(future, order)
-                yield Flown(order, row)
-                send()
+                if row is None and order not in given_up:
+                    # Its workers may have died of something else: it is given up twice before it is lost.
+                    given_up.add(order)
+                    send(order)
+                else:
+                    yield Flown(order, row or lost_row(self._base, order.index, LOST))
+                    send_following()
                 # After the next was sent: of a kind without any task dask makes a new record with the next one.
                 future.release()
         except Interrupted:
@@ -90,16 +99,20 @@ class Pilots:
             if flying:
                 self._client.cancel(list(done.futures), force=True)
 
-    def _result(self, future: Any, order: Order) -> FlightRow:
+    def _result(self, future: Any, order: Order) -> FlightRow | None:
+        """What came of a flight; None where dask gave it up, as workers died on it."""
         from distributed import KilledWorker
 
         if future.status == "finished":
-            row: FlightRow = future.result()
-            return row
+            # A result goes with its worker until it is fetched, and is made anew: that may be given up, too.
+            with contextlib.suppress(KilledWorker):
+                row: FlightRow = future.result()
+                return row
+            return None
         if future.status == "error":
             error = future.exception()
             if isinstance(error, KilledWorker):
-                return lost_row(self._base, order.index, "lost: its worker died three times")
+                return None
             if isinstance(error, PlanflyError):
                 raise error
             raise RuntimeError(f"flight {order.index}: {type(error).__name__}: {error}") from error

@@ -16,7 +16,7 @@ from planfly.campaigns.flights.varied_flight import GivenWind, vary
 from planfly.campaigns.spread.draws import Draw, draw_flight
 from planfly.pipeline import fly_and_judge
 
-# A lost flight could not be flown: its worker died on it three times.
+# A lost flight could not be flown: its workers died on it.
 Outcome = Literal["flyable", "not flyable", "lost"]
 
 

@@ -1,8 +1,9 @@
 """The files of a campaign's folder: what is cleared there, and summary, report, and the logs of its worst flights."""
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from planfly.campaigns.flights.campaign_base import CampaignBase
@@ -13,6 +14,7 @@ from planfly.campaigns.storage.row_values import same_flight
 from planfly.campaigns.storage.store import DATABASE, Store
 from planfly.campaigns.storage.winds_store import WINDS_DATABASE
 from planfly.pipeline import Advance
+from planner.plan import plan_json
 from world.atomic_files import write_whole
 from world.errors import PlanflyError
 
@@ -23,21 +25,70 @@ CAMPAIGN_FILES = (
 )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class AskedFolder:
+    """A campaign's folder, and what may be done with what lies in it.
+
+    table: name of the file of flights.
+    resume: go on with the campaign that is there.  overwrite: replace it.
+    asks: how either is asked for, for the lines that refuse.
+    """
+
+    folder: Path
+    table: str
+    resume: bool
+    overwrite: bool
+    asks: tuple[str, str] = ("resume=True", "overwrite=True")
+
+    def refuse(self) -> None:
+        """Refuse a folder that is a file, or has other contents than were asked for.  Raises PlanflyError."""
+        folder, (resume, overwrite) = self.folder, self.asks
+        if self.resume:
+            if not (folder / self.table).is_file():
+                raise PlanflyError(f"{folder / self.table}: no campaign there to go on with", file=folder / self.table)
+            return
+        if folder.exists() and not folder.is_dir():
+            raise PlanflyError(f"{folder}: is a file; a folder is expected", file=folder)
+        if self.overwrite or not folder.is_dir() or not any(folder.iterdir()):
+            return
+        if (folder / self.table).exists():
+            raise PlanflyError(
+                f"{folder}: holds a campaign; {resume} goes on with it, {overwrite} replaces it", file=folder
+            )
+        if any((folder / name).exists() for name in CAMPAIGN_FILES):
+            raise PlanflyError(f"{folder}: holds another campaign; {overwrite} replaces it", file=folder)
+        raise PlanflyError(f"{folder}: exists and is not empty; {overwrite} replaces its results", file=folder)
+
+    def open(self, opened: Callable[[Path | None], CampaignBase]) -> CampaignBase:
+        """The mission, and the folder ready for it: cleared, or with what is to be gone on with.
+
+        opened: gives the mission, with its plan from a file where it is gone on with.
+        A scenario's plan is kept in the folder, for those that go on.
+        Raises PlanflyError; a folder that was not ready is as it was then.
+        """
+        self.refuse()
+        kept = self.folder / "plan.json"
+        base = opened(kept if self.resume else None)
+        if not self.resume:
+            clear_campaign(self.folder)
+        if base.plan is not None and not kept.exists():
+            write_whole(kept, plan_json(base.plan))
+        return base
+
+
 @contextmanager
-def campaign_folder(out: Path | str | None, *, resume: bool) -> Iterator[Path]:
-    """A campaign's folder, cleared unless it is gone on with; out: None for one that is removed at the end.
+def campaign_folder(out: Path | str | None, table: str, *, resume: bool, overwrite: bool) -> Iterator[AskedFolder]:
+    """A campaign's folder; out: None for one that is removed at the end.
 
     Raises ValueError for a campaign to resume without a folder.
     """
     if out is not None:
-        if not resume:
-            clear_campaign(Path(out))
-        yield Path(out)
+        yield AskedFolder(Path(out), table, resume, overwrite)
         return
     if resume:
         raise ValueError("resume: out is missing: the folder of what is to be gone on with")
     with tempfile.TemporaryDirectory() as name:
-        yield Path(name)
+        yield AskedFolder(Path(name), table, resume=False, overwrite=False)
 
 
 def clear_campaign(folder: Path) -> None:

@@ -211,7 +211,7 @@ def test_a_deadly_flight_is_named_and_counts_against(wind_base: CampaignBase, tm
 
     def here(base: CampaignBase, index: int, wind: Any) -> Any:
         dies = index == 9 and wind.from_deg == 90.0
-        return lost_row(base, index, "lost: its worker died three times") if dies else made_flight(base, index, wind)
+        return lost_row(base, index, "lost: its workers died") if dies else made_flight(base, index, wind)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "hired_pilots", contextmanager(lambda _, *given: iter([HerePilots(*given)])))

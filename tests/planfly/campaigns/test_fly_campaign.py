@@ -125,13 +125,18 @@ def test_real_flights_are_the_same_on_any_workers(base: CampaignBase, tmp_path: 
     note("campaign: real flights on 1, 2 and 4 workers", flights=20, other=0)
 
 
-def test_a_deadly_flight_is_named_and_counts_against(base: CampaignBase, tmp_path: Path) -> None:
+def test_a_deadly_flight_is_named_and_counts_against(
+    base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not SOAK:
+        # Given up with the first worker, not with the third: workers take their time to start.
+        monkeypatch.setattr("planfly.campaigns.engine.cluster.ALLOWED_FAILURES", 0)
     goal, count = Goal(None, False, 12), 12
     found = flown(base, goal, tmp_path, Workers(2), deadly_flight)
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]
     assert [row for row in table(tmp_path / DATABASE) if row[0] != 5] == others
     with open_store(base, goal, tmp_path, resume=True) as store:
-        assert store.flight(5) == lost_row(base, 5, "lost: its worker died three times")
+        assert store.flight(5) == lost_row(base, 5, "lost: its workers died")
         assert summarise(base, goal, found, store).lost == (5,)
     flyable = found.tally.flyable
     assert found.tally == Tally(flyable, 11 - flyable, 1)

@@ -3,12 +3,14 @@
 from contextlib import nullcontext
 
 import pytest
+from distributed import KilledWorker
 
 from planfly.campaigns.engine.cluster import Workers, connected
 from planfly.campaigns.engine.fingerprint import WorkerError
-from planfly.campaigns.engine.flight_loop import Order, Pilots, hired_pilots
+from planfly.campaigns.engine.flight_loop import LOST, Order, Pilots, hired_pilots
 from planfly.campaigns.engine.flight_tasks import CampaignPlugin
 from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.flight_row import FlightRow, lost_row
 from planfly.campaigns.storage.row_values import same_flight
 from tests.planfly.campaigns.made_campaigns import made_flight
 from world.interruption import Interrupted
@@ -34,6 +36,71 @@ def test_each_flight_comes_back_once_and_a_foreign_worker_is_refused(
         with pytest.raises(WorkerError, match=r"worker tcp://127.0.0.1:\d+: planfly .* not 0.0.1 as here"):
             list(other.fly(lambda: next(once, None)))
         other.close()
+
+
+class GivenUp:
+    """A flight at its end: as it was flown, or as dask gave it up, at once or when its result was to be fetched."""
+
+    def __init__(self, key: object, row: FlightRow | None, status: str) -> None:
+        self.key, self._row = key, row
+        self.status = "finished" if row else status
+
+    def result(self) -> FlightRow:
+        if self._row is None:
+            raise self.exception()
+        return self._row
+
+    def exception(self) -> Exception:
+        return KilledWorker("x", None, 2)
+
+    def release(self) -> None:
+        pass
+
+
+class OneWorker:
+    """A client whose worker dies on flight 1 so many times."""
+
+    loop = None
+
+    def __init__(self, base: CampaignBase, times: int, status: str) -> None:
+        self._base, self._left, self._status = base, times, status
+        self.sent: list[int] = []
+
+    def register_plugin(self, _plugin: CampaignPlugin) -> None:
+        pass
+
+    def nthreads(self) -> dict[str, int]:
+        return {"a": 1}
+
+    def submit(self, _task: object, _name: str, index: int, _wind: object, *, key: object, pure: bool) -> GivenUp:
+        self.sent.append(index)
+        dies = index == 1 and self._left > 0
+        self._left -= dies
+        return GivenUp(key, None if dies else made_flight(self._base, index), self._status)
+
+
+class InTurn(list[GivenUp]):
+    """Futures are done in the order in which they are sent."""
+
+    def add(self, future: GivenUp) -> None:
+        self.append(future)
+
+    def __next__(self) -> GivenUp:
+        return self.pop(0)
+
+
+@pytest.mark.parametrize("status", ["error", "finished"])
+@pytest.mark.parametrize("times", [0, 1, 2])
+def test_a_flight_is_lost_that_is_given_up_twice(
+    base: CampaignBase, monkeypatch: pytest.MonkeyPatch, times: int, status: str
+) -> None:
+    """Once may be another's doing, and also of one that was flown, but whose result died with its worker."""
+    monkeypatch.setattr("distributed.as_completed", lambda loop: InTurn())
+    client, orders = OneWorker(base, times, status), iter(range(3))
+    flown = list(Pilots(client, base).fly(lambda: next((Order(k) for k in orders), None)))
+    assert client.sent == ([0, 1, 2] if times == 0 else [0, 1, 1, 2])
+    assert [one.order.index for one in flown] == [0, 1, 2]
+    assert flown[1].row == (made_flight(base, 1) if times < 2 else lost_row(base, 1, LOST))
 
 
 @pytest.mark.parametrize(
