@@ -1,12 +1,17 @@
 """A signal interrupts once, and where that does not end the process a thread does."""
 
+import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
+
+from planfly.terminal.signal_watch import end_process
+from world.interruption import unfinished
 
 # What a command may do when the signal comes; a file of its own that it has not finished.
 PROGRAM = """
@@ -106,3 +111,39 @@ def test_it_ends_in_time_where_no_pipe_can_be_told_not_to_block(tmp_path: Path) 
     _, said = process.communicate(timeout=20.0)
     assert (process.returncode, said) == (128 + signal.SIGTERM, b"planfly: interrupted\n")
     assert least <= time.monotonic() - begun < 2.0
+
+
+@pytest.mark.parametrize(("takes", "waited"), [(0.2, True), (1.2, False)])
+def test_what_a_child_makes_at_its_end_is_removed_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, takes: float, waited: bool
+) -> None:
+    """A killed child that was in the middle of making a file; one that does not end is not waited for long."""
+    folder = tmp_path / "made"
+    folder.mkdir()
+
+    class Child:
+        def __init__(self) -> None:
+            self.sentinel, self._end = os.pipe()
+
+        def kill(self) -> None:
+            threading.Timer(takes, self._ends).start()
+
+        def _ends(self) -> None:
+            folder.mkdir(exist_ok=True)
+            (folder / "late").write_text("")
+            os.close(self._end)
+
+    def left(code: int) -> None:
+        raise SystemExit(code)
+
+    monkeypatch.setattr("multiprocessing.active_children", lambda: [Child(), Child()])
+    monkeypatch.setattr(os, "_exit", left)
+    begun = time.monotonic()
+    with unfinished(folder):
+        with pytest.raises(SystemExit):
+            end_process(3)
+        assert 0.19 < time.monotonic() - begun < 0.9
+        time.sleep(0.1)
+        assert not folder.exists()
+    if waited:
+        assert time.monotonic() - begun < 0.45
