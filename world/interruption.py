@@ -102,13 +102,18 @@ def unfinished(path: Path) -> Iterator[None]:
             _state.unfinished.discard(path)
 
 
-def remove_unfinished() -> None:
+def remove_unfinished() -> bool:
     """Remove the temporary files and folders that are there now: for a process that has to end at once.
 
+    Whether none is left.
+
     >>> remove_unfinished()
+    True
     """
-    for path in tuple(_state.unfinished):
+    paths = tuple(_state.unfinished)
+    for path in paths:
         _remove(path)
+    return not any(path.exists() for path in paths)
 
 
 def _remove(path: Path) -> None:

@@ -191,7 +191,9 @@ def linearise(simulator: Simulator, at: Trim) -> tuple[Floats, Floats]:
     """
     simulator.move_to(at.amsl)
     roll, pitch = attitude(at)
-    states = np.array([at.airspeed * np.cos(at.alpha), 0.0, at.airspeed * np.sin(at.alpha), 0.0, 0.0, 0.0, roll, pitch])
+    states = np.array(
+        [at.airspeed * math.cos(at.alpha), 0.0, at.airspeed * math.sin(at.alpha), 0.0, 0.0, 0.0, roll, pitch]
+    )
     commands = np.array(at.commands())
 
     def column(index: int, vector: Floats, rate: Callable[[Floats], Floats]) -> Floats:
@@ -213,8 +215,9 @@ def attitude(at: Trim) -> tuple[float, float]:
 
 def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats:
     """(3, 3) rotation from body to north-east-down axes for a velocity along ``heading`` and ``climb``, no sideslip."""
-    ch, sh, cc, sc = np.cos(heading), np.sin(heading), np.cos(climb), np.sin(climb)
-    cb, sb, ca, sa = np.cos(bank), np.sin(bank), np.cos(alpha), np.sin(alpha)
+    # Not by NumPy, whose sines of processors with AVX-512 differ in the last digit from others'.
+    ch, sh, cc, sc = math.cos(heading), math.sin(heading), math.cos(climb), math.sin(climb)
+    cb, sb, ca, sa = math.cos(bank), math.sin(bank), math.cos(alpha), math.sin(alpha)
     forward = np.array([ch * cc, sh * cc, -sc])
     level_right = np.array([-sh, ch, 0.0])
     level_down = np.array([ch * sc, sh * sc, cc])
@@ -226,9 +229,9 @@ def body_axes(heading: float, climb: float, bank: float, alpha: float) -> Floats
 def euler(axes: Floats) -> tuple[float, float, float]:
     """Roll, pitch and yaw, rad, of a rotation (3, 3) from body to north-east-down axes."""
     return (
-        float(np.arctan2(axes[2, 1], axes[2, 2])),
-        float(np.arcsin(np.clip(-axes[2, 0], -1.0, 1.0))),
-        float(np.arctan2(axes[1, 0], axes[0, 0])),
+        math.atan2(axes[2, 1], axes[2, 2]),
+        math.asin(min(1.0, max(-1.0, -float(axes[2, 0])))),
+        math.atan2(axes[1, 0], axes[0, 0]),
     )
 
 

@@ -3,7 +3,6 @@
 import contextlib
 import functools
 import os
-import select
 import signal
 import sys
 import threading
@@ -17,9 +16,9 @@ from world.interruption import Interrupted, interrupt, remove_unfinished
 ENDING = (signal.SIGINT, signal.SIGTERM)
 # Time from a signal to the end of the process where its command has not ended by itself, s.
 GRACE = 0.7
-# For which children that were killed are waited for, s.
-_ENDING = 0.5
-# Time from a signal that could not be heard to its next, s.
+# For which files are tried to be removed, s.
+_REMOVING = 0.5
+# Time from a signal that could not be heard to its next, and between two tries to remove files, s.
 _AGAIN = 0.02
 _COMPILERS = ("numba", "llvmlite")
 
@@ -124,20 +123,11 @@ def end_process(code: int) -> NoReturn:
 def _leave(code: int) -> NoReturn:
     # Not imported here: there are no children where nobody has, and an import could wait for one under way.
     multiprocessing = sys.modules.get("multiprocessing")
-    children = multiprocessing.active_children() if multiprocessing is not None else []
-    for child in children:
-        child.kill()
-    # One that is in the middle of making a file makes it yet.
-    _await_ends([child.sentinel for child in children])
-    remove_unfinished()
-    os._exit(code)
-
-
-def _await_ends(sentinels: list[int]) -> None:
-    """Wait until children have ended, but not for long; sentinels: a pipe of each, which its end closes."""
-    # Not by multiprocessing, which imports then; on Windows, where they are no pipes, nothing is waited for.
-    with contextlib.suppress(OSError, ValueError):
-        until = time.monotonic() + _ENDING
-        while sentinels and (left := until - time.monotonic()) > 0.0:
-            ended, _, _ = select.select(sentinels, [], [], left)
-            sentinels = [one for one in sentinels if one not in ended]
+    until = time.monotonic() + _REMOVING
+    while True:
+        for child in multiprocessing.active_children() if multiprocessing is not None else ():
+            child.kill()
+        # A killed child that was in the middle of making a file makes it yet, and its folder stays at first.
+        if remove_unfinished() or time.monotonic() > until:
+            os._exit(code)
+        time.sleep(_AGAIN)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.kernels.processors import NUMPY_AS_ON_ITS_LEAST_PROCESSOR
 from tests.soak import SOAK
 
 ROOT = Path(__file__).parents[3]
@@ -25,7 +26,6 @@ for name in sys.argv[1:]:
     print(hashlib.sha256(plan_json(make_plan(scenario, load_airframe(scenario), 7)).encode()).hexdigest())
 """
 NAMES = ("hard-07", "jacksboro", "paper-07") if SOAK else ("hard-07",)
-FEATURES = "AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"
 
 
 def hashes(**changes: str) -> str:
@@ -52,8 +52,7 @@ EACH = {
     "threads 1, hash seed 1": {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
     "threads 2, hash seed 2": {"NUMBA_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONHASHSEED": "2"},
     "threads 4": {"NUMBA_NUM_THREADS": "4", "OMP_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4"},
-    "NumPy without AVX-512": {"NPY_DISABLE_CPU_FEATURES": FEATURES},
-    "NumPy without AVX2": {"NPY_DISABLE_CPU_FEATURES": FEATURES + " AVX2 FMA3"},
+    "NumPy as on its least processor": NUMPY_AS_ON_ITS_LEAST_PROCESSOR,
     "an older OpenBLAS core": {"OPENBLAS_CORETYPE": "Nehalem"},
     "a C library without AVX2 and FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"},
 }
