@@ -73,13 +73,17 @@ class WindsStore(HeldTable):
             "SELECT flight, direction, asked_speed, draw, outcome, failed, narrow FROM flights ORDER BY flight"
         )
         return {
-            number: (AskedFlight(number, *asked), FlownFlight(outcome, failed_of(failed), _narrow_of(narrow)))
+            number: (AskedFlight(number, *asked), FlownFlight(outcome, failed_of(failed), narrow_passes_of(narrow)))
             for number, *asked, outcome, failed, narrow in rows
         }
 
 
-def _narrow_of(text: str) -> tuple[NarrowPass, ...]:
-    """Narrow passes of the column's text."""
+def narrow_passes_of(text: str) -> tuple[NarrowPass, ...]:
+    """Narrow passes of the column's text.
+
+    >>> narrow_passes_of('[{"rule": "slope", "room": 0.25, "kind": "leg", "index": 3}]')[0][2]
+    0.25
+    """
     return tuple(_narrow_pass(**entry) for entry in json.loads(text))
 
 

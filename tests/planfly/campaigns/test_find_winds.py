@@ -24,7 +24,7 @@ from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.storage.held_table import StoreError
 from planfly.campaigns.storage.row_values import row_of
-from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight
+from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight, narrow_passes_of
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     deadly_in_the_east,
@@ -86,7 +86,8 @@ def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], go
         for values in table(whole / WINDS_DATABASE):
             if values[0] in numbers:
                 known = dict(zip(KIND.columns, (*values, 0.0, ""), strict=True))
-                store.add(AskedFlight(*values[:4]), row_of(known["draw"], known))
+                row = replace(row_of(known["draw"], known), narrow=narrow_passes_of(known["narrow"]))
+                store.add(AskedFlight(*values[:4]), row)
 
 
 def same(one: tuple[WindsFound, Path], other: tuple[WindsFound, Path]) -> bool:
@@ -131,6 +132,10 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: Campaig
     for some, none in zip(told.boundaries, bare.boundaries, strict=True):
         assert some.width < 0.8 * none.width
     assert searched(wind_base, tmp_path / "told", goal, fly=flight_that_tells_its_room) == told
+    # And where a part of it is there alone.
+    keep_part(wind_base, tmp_path / "told", tmp_path / "part", {*range(70), 72}, goal)
+    again = searched(wind_base, tmp_path / "part", goal, fly=flight_that_tells_its_room)
+    assert same((told, tmp_path / "told"), (again, tmp_path / "part"))
 
 
 @pytest.mark.usefixtures("here")
