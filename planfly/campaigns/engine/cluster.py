@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 from planfly.campaigns.engine.kept_workers import kept_workers
 from world.atomic_files import temporary_folder
 from world.errors import PlanflyError
-from world.interruption import Interrupted
+from world.interruption import Interrupted, deaf_children
 
 # dask gives a flight up when a third worker dies on it: one that only waited for its worker has died with it, too.
 # `planfly.campaigns.engine.flight_loop` sends it once more then.
@@ -77,7 +77,9 @@ def connected(workers: Workers) -> Iterator[Any]:
             folder = stack.enter_context(temporary_folder("planfly-workers-"))
             stack.enter_context(dask.config.set({"temporary-directory": str(folder)}))
             number = workers.count or os.cpu_count() or 1
-            cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
+            # Ctrl-C in the middle of a worker's imports would have it say so.
+            with deaf_children():
+                cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
             stack.enter_context(kept_workers(cluster, number))
             client = stack.enter_context(cluster_types.Client(cluster, set_as_default=False))
             try:

@@ -1,9 +1,22 @@
 """Where flights may be sent, and what listens where."""
 
+import os
+import signal
+import sys
+from pathlib import Path
+
 import psutil
 import pytest
 
 from planfly.campaigns.engine.cluster import SchedulerError, Workers, checked_address, connected
+from tests.planfly.campaigns.kills import spawned_processes
+
+
+def hears_interrupt(process: int) -> bool:
+    """Whether the kernel would deliver it SIGINT: by the mask of its first thread."""
+    status = Path(f"/proc/{process}/status").read_text(encoding="ascii")
+    blocked = next(int(line.split()[1], 16) for line in status.splitlines() if line.startswith("SigBlk"))
+    return not blocked >> (signal.SIGINT - 1) & 1
 
 
 @pytest.mark.parametrize(
@@ -36,6 +49,10 @@ def test_what_is_no_address_is_told(address: str) -> None:
 @pytest.mark.filterwarnings("default")
 def test_our_own_workers_listen_on_loopback_alone() -> None:
     with connected(Workers(1)) as client:
+        if sys.platform == "linux":
+            # And they do not hear Ctrl-C, which reaches all of a terminal's processes, from their first moment on.
+            assert [hears_interrupt(number) for number in spawned_processes()] == [False]
+            assert hears_interrupt(os.getpid())
         processes = [psutil.Process(), *psutil.Process().children(recursive=True)]
         ports = [
             connection.laddr
