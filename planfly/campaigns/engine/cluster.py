@@ -77,6 +77,8 @@ def connected(workers: Workers) -> Iterator[Any]:
             folder = stack.enter_context(temporary_folder("planfly-workers-"))
             stack.enter_context(dask.config.set({"temporary-directory": str(folder)}))
             number = workers.count or os.cpu_count() or 1
+            if os.name == "posix":
+                _start_tracker()
             # Ctrl-C in the middle of a worker's imports would have it say so.
             with deaf_children():
                 cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
@@ -107,8 +109,6 @@ def _start_tracker() -> None:
 
 
 def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
-    if os.name == "posix":
-        _start_tracker()
     try:
         return cluster_types.LocalCluster(
             n_workers=number,
