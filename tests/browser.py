@@ -161,11 +161,7 @@ class Browser:
 
     def settle(self) -> None:
         """Wait for two frames: what was asked for is then drawn."""
-        # Chromium without a screen stops drawing now and then: two seconds are two frames, too.
-        self.value(
-            "new Promise(done => { requestAnimationFrame(() => requestAnimationFrame(() => done(1)));"
-            " setTimeout(() => done(1), 2000); })"
-        )
+        self.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
 
     def picture(self, selector: str | None = None) -> bytes:
         """PNG of one element, or of the whole page."""
