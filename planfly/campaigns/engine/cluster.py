@@ -16,7 +16,7 @@ from world.errors import PlanflyError
 from world.interruption import Interrupted, deaf_children
 
 # dask gives a flight up when a third worker dies on it: one that only waited for its worker has died with it, too.
-# `planfly.campaigns.engine.flight_loop` sends it once more then.
+# `planfly.campaigns.engine.flight_loop` sends it again then, twice at most.
 ALLOWED_FAILURES = 2
 _CONNECT_SECONDS = 20
 
@@ -121,6 +121,8 @@ def _local_cluster(cluster_types: Any, number: int, folder: Path) -> Any:
             memory_limit=0,
             silence_logs=logging.CRITICAL,
             local_directory=str(folder),
+            # Imported before the scheduler knows the worker: a flight that waited for it would die with the worker.
+            preload=["planfly.campaigns.engine.flight_tasks", "scipy.stats"],
             # What a worker leaves that is killed goes with it, too.
             env={"TMPDIR": str(folder)},
         )

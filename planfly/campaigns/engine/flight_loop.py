@@ -3,6 +3,7 @@
 import contextlib
 import itertools
 import uuid
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
@@ -18,6 +19,8 @@ from world.interruption import Interrupted
 
 # How a flight ended that could not be flown.
 LOST = "lost: its workers died"
+# How often dask gives a flight up before it is lost: its workers may have died of something else.
+_MOST_GIVEN_UP = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +66,7 @@ class Pilots:
         from distributed import as_completed
 
         flying: dict[tuple[str, int], Order] = {}
-        given_up: set[Order] = set()
+        given_up: Counter[Order] = Counter()
         done: Any = cast("Any", as_completed)(loop=self._client.loop)
 
         def send(order: Order) -> None:
@@ -82,9 +85,8 @@ class Pilots:
                 future = next(done)
                 order = flying.pop(future.key)
                 row = self._result(future, order)
-                if row is None and order not in given_up:
-                    # Its workers may have died of something else: it is given up twice before it is lost.
-                    given_up.add(order)
+                given_up[order] += row is None
+                if row is None and given_up[order] < _MOST_GIVEN_UP:
                     send(order)
                 else:
                     yield Flown(order, row or lost_row(self._base, order.index, LOST))
