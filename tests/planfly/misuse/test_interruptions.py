@@ -22,6 +22,8 @@ from tests.instances import make_instance, scenario_text
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK, note
 
+pytestmark = pytest.mark.alone
+
 LIMIT = 1.0
 MOMENTS = 8
 # 1.5 km east, 1.1 km north and back.
