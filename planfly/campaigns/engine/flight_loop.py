@@ -85,7 +85,8 @@ class Pilots:
                 future = next(done)
                 order = flying.pop(future.key)
                 row = self._result(future, order)
-                given_up[order] += row is None
+                if row is None:
+                    given_up[order] += 1
                 if row is None and given_up[order] < _MOST_GIVEN_UP:
                     send(order)
                 else:
