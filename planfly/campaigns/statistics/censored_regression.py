@@ -1,11 +1,15 @@
-"""A way of failing as a regression on the wind and what was drawn: of who failed, and by how little others passed.
+"""Regressions on the wind and what was drawn: of who failed, and by how little others passed.
 
-The probability to fail is a link's function of a + b * wind + c . draws.  A flight that passed narrowly tells more than
-that it did not fail: the share of flights that pass by less than some room is the same function with k * room added, k
-of it to a scale's length, so that the room has the link's law and 1/k is its scale.  Of a failed flight only that it
-failed counts, of one that passed by a scale or more only that, so that no law is asked to hold far from failing: a
-regression censored on both sides (Tobin, "Estimation of relationships for limited dependent variables", Econometrica
-26, 1958; Rosett and Nelson, "Estimation of the two-limit probit regression model", Econometrica 43, 1975).
+The probability to fail is a link's function of a + b * wind + c . draws.  Three likelihoods are had of it:
+
+- of who failed alone, a binary regression;
+- of who failed and with how little room others passed, by one law: the share of flights that pass by less than some
+  room is the same function with k * room added, k of it to a scale's length, so that the room has the link's law and
+  1/k is its scale.  Of a failed flight only that it failed counts, of one that passed by a scale or more only that, so
+  that no law is asked to hold far from failing: a regression censored on both sides (Tobin, "Estimation of
+  relationships for limited dependent variables", Econometrica 26, 1958; Rosett and Nelson, "Estimation of the
+  two-limit probit regression model", Econometrica 43, 1975);
+- of the room alone, given that a flight passed: the same regression truncated at no room.
 
 The posterior of (a, b, c, k) is taken as normal about its mode, under a weak normal prior (Gelman et al., Bayesian Data
 Analysis, 3rd edition, 2013, chapters 4.1 and 16.3); the evidence for a link, and for how wide a prior the draws'
@@ -22,121 +26,177 @@ from planfly.campaigns.statistics.links import BinaryLink
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
-# Standard deviations of the prior: of the constant, and of the wind's coefficient, 1/(m/s).
-_CONSTANT, _WIND = 20.0, 1.5
+# Standard deviation of the prior of the constant.  More wind never has fewer fail: the wind's coefficient, 1/(m/s), is
+# above 0, and its logarithm normal; it changes a probit by one within 0.3 to 14 m/s at 95 %.
+_CONSTANT, _WIND, _WIND_FACTOR = 20.0, 0.5, 1.0
 # Of the draws' coefficients, a draw being in units of its own standard deviation: of these the one that flights are
 # most evidence for.  Where draws decide little, much room for them would have chance look like knowledge.
 _DRAWS = (0.1, 0.4, 1.5)
 # Of the room's coefficient, 1/scale, of which only what is above 0 is meant.
 _ROOM = 10.0
 # Where Newton's method begins: few fail, and more in more wind; and of the room's coefficient.
-_START, _ROOM_START = (-3.0, 0.3), 1.0
-_STEPS, _CONVERGED, _LEAST_SHARE = 100, 1e-8, 1e-9
+_START, _ROOM_START = (-3.0, np.log(0.3)), 1.0
+_STEPS, _CONVERGED, _LEAST_SHARE, _LEAST_CURVATURE, _MOST_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
 
 
 @dataclass(frozen=True, slots=True)
-class FailureMode:
-    """One way of failing.
+class Outcomes:
+    """What came of n flights by one way.
 
-    mean, covariance: (2 + d,) and (2 + d, 2 + d) of its coefficients, as `regressors` has them.
-    log_evidence: of what came out, by this link.
+    terms: (n, 2 + d) of each flight: one, the wind from some origin, and what was drawn.
+    failed: (n,).
+    room: (n,) by what share of a scale each passed: 1 for a scale or more, 0 for not known or failed.
+    given_passed: whether that a flight passed is given, and only by how much counts.
+    """
+
+    terms: Floats
+    failed: Bools
+    room: Floats
+    given_passed: bool = False
+
+    @property
+    def told(self) -> Bools:
+        """(n,) which passed by less than a scale, and by how much."""
+        return (self.room > 0.0) & (self.room < 1.0)
+
+    def without_room(self) -> "Outcomes":
+        """Who failed alone."""
+        return Outcomes(self.terms, self.failed, np.zeros_like(self.room))
+
+    def only_room(self) -> "Outcomes":
+        """Of those that passed with a room that is known, by how much alone."""
+        known = self.room > 0.0
+        return Outcomes(self.terms[known], self.failed[known], self.room[known], given_passed=True)
+
+
+@dataclass(frozen=True, slots=True)
+class RegressionFit:
+    """A posterior.
+
+    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of the terms.
+    log_evidence: of what came out.
     by_room: by how much the predictor falls over a scale of room; 0 where no flight told of its room.
     """
 
-    link: BinaryLink
     mean: Floats
     covariance: Floats
     log_evidence: float
-    by_room: float = 0.0
+    by_room: float
 
 
-def fit_mode(terms: Floats, failed: Bools, room: Floats, link: BinaryLink) -> FailureMode:
-    """One way of failing of n flights, by the prior of the draws' coefficients that has the most evidence.
-
-    terms: (n, 2 + d) of each flight: one, the wind from some origin, and what was drawn.
-    failed: (n,).  room: (n,) by what share of a scale each passed that did: 1 for a scale or more, 0 for not known.
+def fit_regression(outcomes: Outcomes, link: BinaryLink) -> RegressionFit:
+    """The regression by the prior of the draws' coefficients that has the most evidence.
 
     >>> from planfly.campaigns.statistics.links import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
-    >>> terms, by_how_much = np.column_stack((np.ones(200), wind)), 2.0 - wind
-    >>> mode = fit_mode(terms, by_how_much < 0.0, by_how_much.clip(0.0, 1.0), PROBIT)
-    >>> round(float(-mode.mean[0] / mode.mean[1]), 1)
+    >>> room = 2.0 - wind
+    >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), room < 0.0, room.clip(0.0, 1.0))
+    >>> fit = fit_regression(outcomes, PROBIT)
+    >>> round(float(-fit.mean[0] / fit.mean[1]), 1)
     2.0
     """
     # Where nothing is known of what is drawn, its coefficients' prior is none's.
-    priors = _DRAWS if terms.shape[1] > 2 else _DRAWS[:1]
-    outcomes = _Outcomes(failed, np.where(failed, 0.0, room))
-    fits = (_fit(terms, outcomes, link, deviation) for deviation in priors)
-    return max(fits, key=lambda mode: mode.log_evidence)
+    priors = _DRAWS if outcomes.terms.shape[1] > 2 else _DRAWS[:1]
+    fits = (_fit(_Posterior(outcomes, link, deviation)) for deviation in priors)
+    return max(fits, key=lambda fit: fit.log_evidence)
 
 
-class _Outcomes:
-    """What came of n flights by one way: failed, or passed by so much of a scale, of which 0 and 1 are censored."""
-
-    def __init__(self, failed: Bools, room: Floats) -> None:
-        self.failed, self.room = failed, room
-        self.told = ~failed & (room > 0.0) & (room < 1.0)
-        self.tells = bool(self.told.any())
-
-    def log_likelihood(self, link: BinaryLink, x: Floats, by_room: float) -> float:
-        """Of predictors (n,) less what room takes from them."""
-        if self.tells and by_room <= 0.0:
-            return -np.inf
-        fails, flies = link.log_shares(x)
-        logs = np.where(self.failed, fails, flies)
-        if self.tells:
-            logs = np.where(self.told, link.log_density(x) + np.log(by_room), logs)
-        return float(logs.sum())
-
-    def derivatives(self, link: BinaryLink, x: Floats) -> tuple[Floats, Floats]:
-        """First and second of each flight's by its predictor."""
-        first, second = link.derivatives(x, self.failed)
-        if self.tells:
-            slope, curvature = link.density_derivatives(x)
-            first, second = np.where(self.told, slope, first), np.where(self.told, curvature, second)
-        return first, second
-
-
-def _fit(terms: Floats, outcomes: _Outcomes, link: BinaryLink, deviation: float) -> FailureMode:
-    """The posterior's mode, by Newton's method with halved steps, and the inverse of its curvature there.
+class _Posterior:
+    """Of coefficients, but that the wind's is its logarithm; the room's is the last where some flight told of it.
 
     deviation: of the prior of the draws' coefficients.
     """
-    coefficients = terms.shape[1]
-    deviations = np.full(coefficients, deviation)
-    deviations[:2] = _CONSTANT, _WIND
-    beta = np.zeros(coefficients)
-    beta[:2] = _START
-    if outcomes.tells:
+
+    def __init__(self, outcomes: Outcomes, link: BinaryLink, deviation: float) -> None:
+        self._outcomes, self._link, self._told = outcomes, link, outcomes.told
+        self.by_room = bool(self._told.any())
+        self.size = outcomes.terms.shape[1]
+        deviations = np.full(self.size, deviation)
+        deviations[:2] = _CONSTANT, _WIND_FACTOR
         # The room is a regressor of what passed: F(terms . beta + k * room) is the share that passes by less.
-        terms = np.column_stack((terms, outcomes.room))
-        deviations, beta = np.append(deviations, _ROOM), np.append(beta, _ROOM_START)
-    precision, told = deviations**-2, int(outcomes.told.sum())
+        self._terms = np.column_stack((outcomes.terms, outcomes.room)) if self.by_room else outcomes.terms
+        self.deviations = np.append(deviations, _ROOM) if self.by_room else deviations
+        self._precision = self.deviations**-2
+        self._middle = np.zeros(self.deviations.size)
+        self._middle[1] = np.log(_WIND)
 
-    def by_room(beta: Floats) -> float:
-        return float(beta[coefficients]) if outcomes.tells else 0.0
+    def start(self) -> Floats:
+        """Where to look first."""
+        at = np.zeros(self.deviations.size)
+        at[:2] = _START
+        if self.by_room:
+            at[-1] = _ROOM_START
+        return at
 
-    def loss(beta: Floats) -> float:
-        return float(0.5 * (precision * beta * beta).sum()) - outcomes.log_likelihood(link, terms @ beta, by_room(beta))
+    def coefficients(self, at: Floats) -> Floats:
+        """What terms are multiplied by."""
+        beta = at.copy()
+        beta[1] = np.exp(min(at[1], _MOST_LOGARITHM))
+        return beta
 
-    def slope_and_curvature(beta: Floats) -> tuple[Floats, Floats]:
-        first, second = outcomes.derivatives(link, terms @ beta)
-        slope, curvature = precision * beta - terms.T @ first, np.diag(precision) - (terms * second[:, None]).T @ terms
-        if outcomes.tells:
+    def loss(self, at: Floats) -> float:
+        """Less the logarithm of prior and likelihood, but for what no coefficient changes."""
+        beta, off = self.coefficients(at), at - self._middle
+        if self.by_room and beta[-1] <= 0.0:
+            return np.inf
+        x = self._terms @ beta
+        fails, flies = self._link.log_shares(x)
+        logs = np.where(self._outcomes.failed, fails, flies)
+        if self.by_room:
+            logs = np.where(self._told, self._link.log_density(x) + np.log(beta[-1]), logs)
+        if self._outcomes.given_passed:
+            logs = logs - self._link.log_shares(self._at_no_room(beta))[1]
+        return float(0.5 * (self._precision * off * off).sum() - logs.sum())
+
+    def slope_and_curvature(self, at: Floats) -> tuple[Floats, Floats]:
+        """First and second derivatives of the loss."""
+        beta, scale = self.coefficients(at), np.ones(at.size)
+        x, terms = self._terms @ beta, self._terms
+        first, second = self._link.derivatives(x, self._outcomes.failed)
+        if self.by_room:
+            of_first, of_second = self._link.density_derivatives(x)
+            first, second = np.where(self._told, of_first, first), np.where(self._told, of_second, second)
+        slope, curvature = -terms.T @ first, -(terms * second[:, None]).T @ terms
+        if self._outcomes.given_passed:
+            bare = self._outcomes.terms
+            first, second = self._link.derivatives(self._at_no_room(beta), self._outcomes.failed)
+            slope[: self.size] += bare.T @ first
+            curvature[: self.size, : self.size] += (bare * second[:, None]).T @ bare
+        if self.by_room:
+            told = int(self._told.sum())
             slope[-1] -= told / beta[-1]
             curvature[-1, -1] += told / beta[-1] ** 2
-        return slope, curvature
+        # By the logarithm of the wind's coefficient.
+        scale[1] = beta[1]
+        slope, curvature = scale * slope, scale[:, None] * curvature * scale
+        curvature[1, 1] += slope[1]
+        return slope + self._precision * (at - self._middle), curvature + np.diag(self._precision)
 
-    value = loss(beta)
+    def _at_no_room(self, beta: Floats) -> Floats:
+        return self._outcomes.terms @ beta[: self.size]
+
+
+def _fit(posterior: _Posterior) -> RegressionFit:
+    """The posterior's mode, and the inverse of its curvature there.
+
+    By Newton's method with halved steps; where the loss is not convex, which that of room alone need not be, by the
+    curvature's absolute eigenvalues (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, section 3.4).
+    """
+    at, size = posterior.start(), posterior.size
+    value = posterior.loss(at)
     for _ in range(_STEPS):
-        slope, curvature = slope_and_curvature(beta)
-        step, share = np.linalg.solve(curvature, slope), 1.0
-        while not (tried := loss(beta - share * step)) <= value and share > _LEAST_SHARE:
+        slope, curvature = posterior.slope_and_curvature(at)
+        eigenvalues, axes = np.linalg.eigh(curvature)
+        step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _LEAST_CURVATURE))
+        share = 1.0
+        while not (tried := posterior.loss(at - share * step)) <= value and share > _LEAST_SHARE:
             share *= 0.5
-        beta, value = beta - share * step, tried
+        at, value = at - share * step, tried
         if float(np.abs(share * step).max()) < _CONVERGED:
             break
-    curvature = slope_and_curvature(beta)[1]
-    evidence = -value - np.log(deviations).sum() - 0.5 * float(np.linalg.slogdet(curvature)[1])
-    covariance: Floats = np.linalg.inv(curvature).astype(np.float64)[:coefficients, :coefficients]
-    return FailureMode(link, beta[:coefficients], covariance, float(evidence), by_room(beta))
+    curvature, beta = posterior.slope_and_curvature(at)[1], posterior.coefficients(at)
+    evidence = -value - np.log(posterior.deviations).sum() - 0.5 * float(np.linalg.slogdet(curvature)[1])
+    covariance: Floats = np.linalg.inv(curvature)[:size, :size].astype(np.float64)
+    covariance[1] *= beta[1]
+    covariance[:, 1] *= beta[1]
+    return RegressionFit(beta[:size], covariance, float(evidence), float(beta[-1]) if posterior.by_room else 0.0)

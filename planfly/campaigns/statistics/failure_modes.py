@@ -9,11 +9,12 @@ or not ways come together: the chain rule.
 
 from collections import Counter
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.statistics.censored_regression import FailureMode, fit_mode
+from planfly.campaigns.statistics.failure_mode import FailureMode, fit_mode
 from planfly.campaigns.statistics.links import BinaryLink
 
 Floats = NDArray[np.float64]
@@ -93,18 +94,36 @@ def boundary_speed(modes: Sequence[FailureMode], draws: Floats, share: float, mo
     return 0.5 * (low + high)
 
 
+@dataclass(frozen=True)
+class FailingShare:
+    """The share of flights that fail in a wind, and its derivatives.
+
+    slopes: (2 + d,) by each mode's coefficients.  by_wind: 1/(m/s).
+    """
+
+    share: float
+    slopes: list[Floats]
+    by_wind: float
+
+
+def failing_share(modes: Sequence[FailureMode], draws: Floats, speed: float) -> FailingShare:
+    """The share of draws (m, d) that is expected to fail in a wind, m/s."""
+    terms = regressors(speed, draws)
+    predictors = [terms @ mode.mean for mode in modes]
+    flies = [mode.link.fly_shares(x) for mode, x in zip(modes, predictors, strict=True)]
+    slopes, by_wind = [], 0.0
+    for k, mode in enumerate(modes):
+        others = np.prod(flies[:k] + flies[k + 1 :], axis=0)
+        slopes.append(terms.T @ (mode.link.density(predictors[k]) * others) / len(draws))
+        by_wind += float(slopes[-1][0] * mode.mean[1])
+    return FailingShare(1.0 - float(np.prod(flies, axis=0).mean()), slopes, by_wind)
+
+
 def boundary_slopes(modes: Sequence[FailureMode], draws: Floats, speed: float) -> list[Floats]:
     """(2 + d,) the boundary's derivatives by each mode's coefficients, m/s: the implicit function theorem.
 
     draws: (m, d).  speed: the boundary, m/s.
     """
-    terms = regressors(speed, draws)
-    predictors = [terms @ mode.mean for mode in modes]
-    flies = [mode.link.fly_shares(x) for mode, x in zip(modes, predictors, strict=True)]
-    shares, by_wind = [], 0.0
-    for k, mode in enumerate(modes):
-        others = np.prod(flies[:k] + flies[k + 1 :], axis=0)
-        shares.append(((mode.link.density(predictors[k]) * others)[:, None] * terms).mean(axis=0))
-        by_wind += float(shares[-1][0] * mode.mean[1])
+    at = failing_share(modes, draws, speed)
     # Where no more fail in more wind, nothing is known of the boundary.
-    return [-one / max(by_wind, 1e-9) for one in shares]
+    return [-one / max(at.by_wind, 1e-9) for one in at.slopes]

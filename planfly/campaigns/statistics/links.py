@@ -26,6 +26,9 @@ class BinaryLink(Protocol):
     def fly_shares(self, x: Floats) -> Floats:
         """Probability to fly."""
 
+    def predictor(self, share: float) -> float:
+        """Where the probability to fail is this share."""
+
     def density(self, x: Floats) -> Floats:
         """Derivative of the probability to fail."""
 
@@ -57,6 +60,11 @@ class _Probit:
 
         out: Floats = ndtr(-x)
         return out
+
+    def predictor(self, share: float) -> float:
+        from scipy.special import ndtri
+
+        return float(ndtri(share))
 
     def density(self, x: Floats) -> Floats:
         out: Floats = np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
@@ -102,6 +110,9 @@ class _LeastOfMany:
     def fly_shares(self, x: Floats) -> Floats:
         out: Floats = np.exp(-np.exp(np.minimum(x, _MOST)))
         return out
+
+    def predictor(self, share: float) -> float:
+        return float(np.log(-np.log1p(-share)))
 
     def density(self, x: Floats) -> Floats:
         out: Floats = np.exp(x - np.exp(np.minimum(x, _MOST)))

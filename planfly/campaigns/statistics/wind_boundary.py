@@ -1,9 +1,9 @@
 """The largest wind in which a mission flies with a given probability, from flights in winds chosen as one goes.
 
 Where some flights flew and some failed, the share of flights that fail in a wind is the mean of `failure_modes` over
-what may be drawn, and the boundary the wind in which that share is 1 - P; its variance is that of the coefficients, by
-the boundary's derivatives (the delta method).  Each of the `links` is as likely as the other before the first flight,
-and weighs by its evidence then.  Where all flew, or all failed, one law of `failure_laws` has to do.
+what may be drawn, and the boundary the wind in which that share is 1 - P (`boundary_posterior`).  Each of the `links`
+is as likely as the other before the first flight, and weighs by its evidence then.  Where all flew, or all failed, one
+law of `failure_laws` has to do.
 """
 
 from collections.abc import Callable, Hashable, Mapping
@@ -13,8 +13,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.statistics.censored_regression import FailureMode
+from planfly.campaigns.statistics.boundary_posterior import WeighedModes, boundary_quantiles
 from planfly.campaigns.statistics.failure_laws import FailureLaws
+from planfly.campaigns.statistics.failure_mode import FailureMode
 from planfly.campaigns.statistics.failure_modes import (
     boundary_slopes,
     boundary_speed,
@@ -24,9 +25,6 @@ from planfly.campaigns.statistics.failure_modes import (
 from planfly.campaigns.statistics.links import LINKS
 
 Floats = NDArray[np.float64]
-
-# How far beyond the winds that are looked at a boundary is followed, m/s: past it nothing is settled by how far.
-_BEYOND = 10.0
 
 
 @dataclass
@@ -71,24 +69,15 @@ class WindBoundary:
 
 
 @dataclass(frozen=True)
-class FailureFit:
+class FailureFit(WeighedModes):
     """What the flights of a direction tell of its boundary by one link.
 
-    weight: of the link among all, by its evidence.
-    speed: of the boundary, m/s, up to some way beyond the winds that are looked at.
+    speed: of the boundary, m/s, up to the largest wind that is looked at.
     slopes: its derivatives by each mode's coefficients.
     """
 
-    modes: tuple[FailureMode, ...]
-    weight: float
     speed: float
     slopes: list[Floats]
-
-    @property
-    def deviation(self) -> float:
-        """The boundary's standard deviation, m/s."""
-        variances = (one @ mode.covariance @ one for one, mode in zip(self.slopes, self.modes, strict=True))
-        return float(np.sqrt(sum(variances)))
 
 
 class Direction:
@@ -142,7 +131,7 @@ class Direction:
 
     def _fit(self, modes: tuple[FailureMode, ...], weight: float) -> FailureFit:
         draws = self.numbers.population
-        speed = boundary_speed(modes, draws, 1.0 - self.target, self.most + _BEYOND)
+        speed = boundary_speed(modes, draws, 1.0 - self.target, self.most)
         return FailureFit(modes, weight, speed, boundary_slopes(modes, draws, speed))
 
     def boundary(self) -> WindBoundary:
@@ -156,31 +145,19 @@ class Direction:
         >>> 9.0 < found.low < found.estimate < found.high < 10.0
         True
         """
-        tail = 0.5 * (1.0 - self.confidence)
+        tail, share = 0.5 * (1.0 - self.confidence), 1.0 - self.target
+        parts = (tail, 0.5, 1.0 - tail)
         if self.all_flew or self.all_failed:
-            parts, flew = np.array([tail, 0.5, 1.0 - tail]), np.full(len(self.speeds), self.all_flew)
-            low, middle, high = self._laws.quantile_at(1.0 - self.target, np.array(self.speeds), flew, parts)
+            flew = np.full(len(self.speeds), self.all_flew)
+            low, middle, high = self._laws.quantile_at(share, np.array(self.speeds), flew, np.array(parts))
         else:
-            low, middle, high = (_mixed_quantile(self.fits(), part) for part in (tail, 0.5, 1.0 - tail))
+            low, middle, high = boundary_quantiles(self.fits(), self.numbers.population, share, self.most, parts)
         low, middle, high = (float(min(self.most, max(0.0, one))) for one in (low, middle, high))
         return WindBoundary(middle, low, high, middle >= self.most - 1e-9)
 
     @cached_property
     def _laws(self) -> FailureLaws:
         return FailureLaws.up_to(self.most)
-
-
-def _mixed_quantile(fits: tuple[FailureFit, ...], part: float) -> float:
-    """The boundary at this part of its posterior, m/s: each fit's is normal, and they weigh as they do."""
-    from scipy.special import ndtr
-
-    reach = 40.0 * max(fit.deviation for fit in fits) + 1e-6
-    low, high = min(fit.speed for fit in fits) - reach, max(fit.speed for fit in fits) + reach
-    while high - low > 1e-4:
-        middle = 0.5 * (low + high)
-        below = sum(fit.weight * float(ndtr((middle - fit.speed) / max(fit.deviation, 1e-9))) for fit in fits)
-        low, high = (middle, high) if below < part else (low, middle)
-    return 0.5 * (low + high)
 
 
 def needs_more(found: WindBoundary, flights: int, accuracy: float, fewest: int) -> bool:

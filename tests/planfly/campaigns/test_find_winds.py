@@ -190,9 +190,10 @@ def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, m
     monkeypatch.setattr("planfly.campaigns.engine.flight_rate.TOLD_EVERY", 0.0)
     monkeypatch.setattr(module, "FEWEST", 30)
     monkeypatch.setattr(module, "ACCURACY", 0.4)
+    goal = replace(GOAL, flights=600)
     told: list[tuple[float, float, str]] = []
-    with open_winds_store(wind_base, GOAL, tmp_path, resume=False) as store:
-        found = find_winds(wind_base, GOAL, Workers(1), store, lambda *one: told.append(one), surer_but_in_the_west)
+    with open_winds_store(wind_base, goal, tmp_path, resume=False) as store:
+        found = find_winds(wind_base, goal, Workers(1), store, lambda *one: told.append(one), surer_but_in_the_west)
     pattern = r"(\d) of 4 directions settled, (\d+) flights, \d+ a minute(, \d+ s left at least)?"
     lines = [re.fullmatch(pattern, remark) for _, _, remark in told]
     assert all(lines)

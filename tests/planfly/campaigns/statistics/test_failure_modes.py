@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from planfly.campaigns.statistics.censored_regression import FailureMode
+from planfly.campaigns.statistics.failure_mode import FailureMode
 from planfly.campaigns.statistics.failure_modes import (
     boundary_slopes,
     boundary_speed,
@@ -43,13 +43,19 @@ def test_coefficients_are_found(link: BinaryLink) -> None:
 
 
 def test_each_way_has_the_room_that_flights_had_of_it() -> None:
-    """Room of the slope sharpens the slope's fit and leaves the threat's as it is; of another way, neither."""
-    terms, ways = made_flights(600, 2)
-    random = np.random.default_rng(1)
-    shares: list[dict[Hashable, float]] = [{} if "slope" in some else {"slope": random.random()} for some in ways]
+    """Room of the slope, of the slope's law, sharpens the slope's fit and leaves the threat's; another's, neither."""
+    random = np.random.default_rng(2)
+    terms = regressors(random.uniform(2.0, 18.0, 600), random.normal(size=(600, 2)))
+    slope, threat = (random.normal(size=600) - terms @ beta for beta in (FIRST, SECOND))
+    ways: list[frozenset[Hashable]] = [
+        frozenset(name for name, room in (("slope", one), ("threat", other)) if room < 0.0)
+        for one, other in zip(slope, threat, strict=True)
+    ]
+    shares: list[dict[Hashable, float]] = [{} if room < 0.0 else {"slope": min(1.0, room)} for room in slope]
     bare, known = fit_modes(terms, ways, PROBIT), fit_modes(terms, ways, PROBIT, shares)
-    changed = [not np.allclose(one.mean, same.mean) for one, same in zip(bare, known, strict=True)]
-    assert sorted(changed) == [False, True]
+    assert [mode.by_room > 0.0 for mode in known] == [True, False]
+    assert np.diag(known[0].covariance).sum() < 0.8 * np.diag(bare[0].covariance).sum()
+    assert known[1].mean == pytest.approx(bare[1].mean)
     other: list[dict[Hashable, float]] = [{"bounds": 0.5}] * len(ways)
     for one, same in zip(fit_modes(terms, ways, PROBIT), fit_modes(terms, ways, PROBIT, other), strict=True):
         assert one.mean == pytest.approx(same.mean)
