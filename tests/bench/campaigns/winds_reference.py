@@ -2,7 +2,7 @@
 
 ``python -m tests.bench.campaigns.winds_reference [--directions K ...] [--flights N]`` flies the demo in wind half a
 metre a second below and above each boundary that ``planfly winds jacksboro`` found, in other weather and with other
-aircraft than that had, and keeps the counts in ``tests/authorities/winds_reference.json``: some minutes a point.  A
+aircraft than that had, and adds the counts to ``tests/authorities/winds_reference.json``: some minutes a point.  A
 point ends early where its share of flyable flights is above or below the target with 99 % confidence, valid at every
 number of flights.  The boundary is right within half a metre a second where the share is at least the target below,
 and at most the target above.
@@ -102,14 +102,16 @@ def main() -> None:
     base = demo(_SEED)
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     for direction in args.directions:
-        points = []
+        points = {float(point["speed"]): point for point in kept.get(str(direction), [])}
         boundary, beyond = boundaries[direction]
         for speed in (boundary - WITHIN,) if beyond else (boundary - WITHIN, boundary + WITHIN):
             speed = round(max(0.0, speed), 2)
+            if speed in points:
+                continue
             tally = share_at(base, GivenWind(speed, 360.0 * direction / GOAL.directions), args.flights)
-            points.append({"speed": speed, "flights": tally.flown, "flyable": tally.flyable})
-            print(direction, points[-1], flush=True)
-        kept[str(direction)] = points
+            points[speed] = {"speed": speed, "flights": tally.flown, "flyable": tally.flyable}
+            print(direction, points[speed], flush=True)
+        kept[str(direction)] = [points[speed] for speed in sorted(points)]
         REFERENCE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 

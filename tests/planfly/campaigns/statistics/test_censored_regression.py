@@ -1,11 +1,13 @@
 """The regressions, against made flights whose coefficients are known."""
 
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from scipy.stats import gumbel_l, lognorm, norm
 
 from planfly.campaigns.statistics.censored_regression import Outcomes, fit_regression
@@ -73,6 +75,27 @@ def test_more_wind_never_has_fewer_fail() -> None:
     wind = np.linspace(-5.0, 5.0, 40)
     fit = fit_regression(Outcomes(np.column_stack((np.ones(40), wind)), wind < -4.0, np.zeros(40)), PROBIT)
     assert 0.0 < fit.mean[1] < 0.2
+
+
+def test_the_covariance_is_the_inverse_of_the_curvature_at_the_mode() -> None:
+    """Of a handful of flights, where the prior counts, by its own formula and differences of it."""
+    wind, failed = np.array([-4.0, -2.0, 0.0, 1.0, 2.0, 3.0, 4.0]), np.array([0, 0, 1, 0, 0, 1, 0], dtype=bool)
+
+    def loss(at: Floats) -> float:
+        x = at[0] + np.exp(at[1]) * wind
+        prior = norm.logpdf(at[0], scale=20.0) + norm.logpdf(at[1], loc=np.log(0.5))
+        return -float(prior + norm.logcdf(np.where(failed, x, -x)).sum())
+
+    mode, step = minimize(loss, np.zeros(2), tol=1e-12).x, 1e-3
+    curvature = np.empty((2, 2))
+    for i, j in product(range(2), range(2)):
+        one, other = step * np.eye(2)[i], step * np.eye(2)[j]
+        corners = loss(mode + one + other) - loss(mode + one - other) - loss(mode - one + other)
+        curvature[i, j] = (corners + loss(mode - one - other)) / (4.0 * step * step)
+    scale = np.array([1.0, np.exp(mode[1])])
+    fit = fit_regression(Outcomes(np.column_stack((np.ones(7), wind)), failed, np.zeros(7)), PROBIT)
+    assert fit.mean == pytest.approx([mode[0], np.exp(mode[1])], rel=1e-3)
+    assert fit.covariance == pytest.approx(np.linalg.inv(curvature) * np.outer(scale, scale), rel=0.01)
 
 
 @pytest.mark.parametrize("known", [True, False])

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from planfly.campaigns.statistics.censored_regression import Outcomes, fit_regression
 from planfly.campaigns.statistics.failure_mode import fit_mode
 from planfly.campaigns.statistics.links import LINKS, PROBIT, BinaryLink
 
@@ -46,12 +47,15 @@ def test_room_counts_for_nothing_where_failing_is_of_another(link: BinaryLink, s
 
 
 def test_the_rooms_own_law_says_nothing_for_a_link() -> None:
-    """The links differ in evidence by as much as they do without the room."""
+    """The links differ in evidence by as much as without the room: to each comes that of the room's own law."""
     terms, failed, room = made(400, 1, one_law=False)
     told, bare = (
         [fit_mode(terms, failed, some, link).log_evidence for link in LINKS] for some in (room, np.zeros(400))
     )
     assert told[0] - told[1] == pytest.approx(bare[0] - bare[1])
+    passes = Outcomes(terms, failed, np.where(failed, 0.0, room)).only_room()
+    by_itself = max(fit_regression(passes, link).log_evidence for link in LINKS)
+    assert told[0] == pytest.approx(bare[0] + by_itself)
 
 
 def test_the_depth_of_failing_counts_for_nothing() -> None:

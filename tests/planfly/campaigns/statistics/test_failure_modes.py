@@ -10,6 +10,7 @@ from planfly.campaigns.statistics.failure_mode import FailureMode
 from planfly.campaigns.statistics.failure_modes import (
     boundary_slopes,
     boundary_speed,
+    failing_share,
     fit_modes,
     regressors,
 )
@@ -100,3 +101,23 @@ def test_slopes_are_the_boundarys_derivatives(link: BinaryLink) -> None:
                 changed[which][k] += by
                 moved.append(boundary_speed([mode_of(beta, link) for beta in changed], draws, 0.05, 40.0))
             assert slopes[which][k] == pytest.approx((moved[1] - moved[0]) / 0.04, rel=0.03, abs=0.05)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_the_share_that_fails_and_its_derivatives(link: BinaryLink) -> None:
+    """Of two ways of which either often comes: against the share itself, a little moved."""
+    draws, betas = np.random.default_rng(1).normal(size=(4096, 2)), [FIRST, SECOND]
+    found = failing_share([mode_of(beta, link) for beta in betas], draws, 11.0)
+    flies = np.prod([link.fly_shares(regressors(11.0, draws) @ beta) for beta in betas], axis=0)
+    assert found.share == pytest.approx(1.0 - flies.mean())
+    assert 0.3 < found.share < 0.9
+    for which in (0, 1):
+        for k in range(4):
+            moved = []
+            for by in (-1e-3, 1e-3):
+                changed = [beta.copy() for beta in betas]
+                changed[which][k] += by
+                moved.append(failing_share([mode_of(beta, link) for beta in changed], draws, 11.0).share)
+            assert found.slopes[which][k] == pytest.approx((moved[1] - moved[0]) / 2e-3, rel=1e-3, abs=1e-6)
+    low, high = (failing_share([mode_of(beta, link) for beta in betas], draws, 11.0 + by).share for by in (-1e-3, 1e-3))
+    assert found.by_wind == pytest.approx((high - low) / 2e-3, rel=1e-3)

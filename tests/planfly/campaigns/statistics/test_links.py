@@ -71,3 +71,9 @@ def test_far_from_all_flights_numbers_stay_finite(link: BinaryLink) -> None:
     assert np.isfinite(link.log_density(far[:-1])).all()
     assert np.isfinite(link.density_derivatives(far)).all()
     assert np.isfinite(link.density(far)).all()
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_the_predictor_of_a_share_has_it(link: BinaryLink) -> None:
+    for share in (1e-6, 0.01, 0.5, 0.9):
+        assert 1.0 - link.fly_shares(np.array([link.predictor(share)]))[0] == pytest.approx(share)
