@@ -3,8 +3,8 @@
 The share that fails in a wind is the mean of the failure modes over what may be drawn.  Its posterior is taken as
 normal on the link's scale, with the variance that the coefficients give it (the delta method): of a single mode that no
 draw has a part in exactly Fieller's solution ("Some problems in interval estimation", Journal of the Royal Statistical
-Society B 16, 1954), which holds, too, where more wind changes little.  In more wind no fewer flights are taken to fail:
-the boundary lies below a wind no more probably than below any larger one.
+Society B 16, 1954), which holds, too, where more wind changes little.  In more wind no fewer flights fail: what is
+known near the boundary holds farther from it, too, where a line through few flights would know less.
 """
 
 from collections.abc import Callable, Sequence
@@ -50,8 +50,10 @@ def boundary_quantiles(
 
     winds = np.linspace(0.0, most, max(2, round(most / _STEP) + 1))
     probabilities = np.array([below(float(wind)) for wind in winds])
-    # Of each wind the least of all larger ones, and its own.
-    probabilities = np.minimum.accumulate(probabilities[::-1])[::-1]
+    likely = int(np.argmax(np.append(probabilities, 1.0) >= 0.5))
+    # From the middle outwards, the least and the greatest so far.
+    probabilities[:likely] = np.minimum.accumulate(probabilities[:likely][::-1])[::-1]
+    probabilities[likely:] = np.maximum.accumulate(probabilities[likely:])
     return [_crossing(below, winds, probabilities, part) for part in parts]
 
 

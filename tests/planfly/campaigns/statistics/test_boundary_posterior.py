@@ -57,3 +57,13 @@ def test_in_more_wind_no_fewer_fail() -> None:
     assert norm.cdf((-5.2 - limit) / np.hypot(0.3, 0.6)) < 1e-4
     mode = [one_mode([-5.0, 0.1], [0.3, 0.3])]
     assert boundary_quantiles(mode, NOTHING, 0.01, 8.0, (0.02, 0.05, 0.1)) == [8.0] * 3
+
+
+def test_nor_does_more_wind_bring_doubt() -> None:
+    """In 12 m/s more than one in a hundred fail for sure; of 20 m/s a line that may fall is not as sure."""
+    limit = norm.ppf(0.01)
+    assert norm.cdf((-1.4 - limit) / np.hypot(0.1, 0.2)) > 0.9999
+    assert norm.cdf((-1.0 - limit) / np.hypot(0.1, 1.0)) < 0.92
+    mode = [one_mode([-1.5, 0.05], [0.1, 0.1])]
+    (high,) = boundary_quantiles(mode, NOTHING, 0.01, 20.0, (0.99,))
+    assert high < 12.0
