@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.own_process import in_own_process
 from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.report.campaign_files import campaign_folder
@@ -53,7 +54,9 @@ def winds(
     chosen = default_spread() if spread is None else read_spread(Path(spread))
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as asked:
         folder = asked.folder
-        base = asked.open(lambda plan: open_campaign(str(target), chosen.without(ASKED), planned=plan, seed=seed))
+        base = asked.open(
+            lambda plan: in_own_process(open_campaign, str(target), chosen.without(ASKED), planned=plan, seed=seed)
+        )
         with open_winds_store(base, goal, folder, resume=resume) as store:
             found = find_winds(base, goal, Workers(workers, scheduler), store)
         if out is not None:

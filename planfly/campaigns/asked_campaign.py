@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 from planfly.campaigns.campaign_result import make_goal
+from planfly.campaigns.engine.own_process import in_own_process
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.report.campaign_files import AskedFolder
 from planfly.campaigns.spread.spread_file import FlightSpread, default_spread, read_spread
@@ -55,7 +56,8 @@ def _opened(args: argparse.Namespace, spread: FlightSpread, planned: Path | None
     change = scenario_change(args)
 
     def opened(advance: Advance | None = None) -> CampaignBase:
-        return open_campaign(
+        return in_own_process(
+            open_campaign,
             args.target,
             spread,
             planned=planned,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.own_process import in_own_process
 from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report.campaign_files import campaign_folder
@@ -133,7 +134,7 @@ def campaign(
     chosen = default_spread() if spread is None else read_spread(Path(spread))
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as asked:
         folder = asked.folder
-        base = asked.open(lambda plan: open_campaign(str(target), chosen, planned=plan, seed=seed))
+        base = asked.open(lambda plan: in_own_process(open_campaign, str(target), chosen, planned=plan, seed=seed))
         with open_store(base, goal, folder, resume=resume) as store:
             estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
             summary = summarise(base, goal, estimate, store) if out is None else None

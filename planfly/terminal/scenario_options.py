@@ -3,6 +3,7 @@
 import argparse
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from planfly.flight_limits import FlightLimits
@@ -33,11 +34,11 @@ def flight_limits(args: argparse.Namespace) -> FlightLimits:
 
 def scenario_change(args: argparse.Namespace) -> Callable[[Scenario], Scenario]:
     """What the options given change in a scenario; options that a command does not have change nothing."""
+    return partial(_changed, args)
 
-    def change(scenario: Scenario) -> Scenario:
-        speed, from_deg = getattr(args, "wind", None) or (None, None)
-        from_course = None if from_deg is None else math.radians(from_deg)
-        flown = with_flight(scenario, **flight_entries(args))
-        return with_wind(flown, speed, from_course, getattr(args, "turbulence", None))
 
-    return change
+def _changed(args: argparse.Namespace, scenario: Scenario) -> Scenario:
+    speed, from_deg = getattr(args, "wind", None) or (None, None)
+    from_course = None if from_deg is None else math.radians(from_deg)
+    flown = with_flight(scenario, **flight_entries(args))
+    return with_wind(flown, speed, from_course, getattr(args, "turbulence", None))

@@ -21,6 +21,8 @@ from world.interruption import Interrupted
 LOST = "lost: its workers died"
 # How often dask gives a flight up before it is lost: its workers may have died of something else.
 _MOST_GIVEN_UP = 3
+# Names of tasks, which dask keeps the last 100,000 of: enough of them that one is long forgotten when it comes again.
+_NAMES = 4096
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +46,7 @@ class Pilots:
     def __init__(self, client: Any, base: CampaignBase, fly: FlyOne = fly_one) -> None:
         self._client, self._base = client, base
         self._name = f"planfly-{uuid.uuid4().hex[:12]}"
-        self._numbers = itertools.count()
+        self._numbers = itertools.cycle(range(_NAMES))
         mine = fingerprint(base.scenario.flight.aircraft)
         client.register_plugin(CampaignPlugin(self._name, base, mine, fly))
 
@@ -71,12 +73,12 @@ class Pilots:
 
         def send(order: Order) -> None:
             # A tuple: dask takes its first word for the kind of task, and keeps something of each kind for good.
-            key = (self._name, next(self._numbers))
+            key = next(key for number in self._numbers if (key := (self._name, number)) not in flying)
             flying[key] = order
             done.add(self._client.submit(fly_task, self._name, order.index, order.wind, key=key, pure=False))
 
         def send_following() -> None:
-            while len(flying) < self.threads() and (order := following()) is not None:
+            while len(flying) < min(_NAMES, self.threads()) and (order := following()) is not None:
                 send(order)
 
         try:

@@ -1,7 +1,7 @@
 """Memory of the process that leads a campaign.
 
-``python -m tests.bench.campaigns.client_memory FLIGHTS`` leads a campaign of made-up flights, each row as large as a
-real one's, to its report, and prints its largest resident size in MB.
+``python -m tests.bench.campaigns.client_memory FLIGHTS`` leads a campaign of the demo, but of made-up flights, each row
+as large as a real one's, to its report, and prints its largest resident size in MB.
 """
 
 import resource
@@ -14,14 +14,16 @@ from pathlib import Path
 import numpy as np
 
 from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.engine.own_process import in_own_process
+from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.flights.flight_row import FlightRow
 from planfly.campaigns.flights.track_shape import STATIONS
 from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.report.finish_campaign import finish_campaign
+from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from tests.planfly.campaigns.made_campaigns import made_flight, short_base
+from tests.planfly.campaigns.made_campaigns import made_flight
 
 # Waypoints whose crossings a row of the demo holds.
 _WAYPOINTS = 14
@@ -38,7 +40,7 @@ def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) 
 
 def lead(flights: int, folder: Path) -> None:
     """Lead a campaign of so many flights, from its first to its report."""
-    base = short_base(folder)
+    base = in_own_process(open_campaign, "jacksboro", default_spread(), seed=1)
     goal = Goal(None, False, flights, 0.95)
     with open_store(base, goal, folder, resume=False) as store:
         estimate = fly_campaign(base, goal, Workers(1), store, fly=large_flight)

@@ -1,6 +1,7 @@
 """Each flight comes back once, by a worker that flies what the client would."""
 
 from contextlib import nullcontext
+from itertools import pairwise
 
 import pytest
 from distributed import KilledWorker
@@ -87,6 +88,51 @@ class InTurn(list[GivenUp]):
 
     def __next__(self) -> GivenUp:
         return self.pop(0)
+
+
+class LastFirst(InTurn):
+    """Of the futures that are there the last is done first: the first of all stays to the end."""
+
+    def __next__(self) -> GivenUp:
+        return self.pop()
+
+
+class TwoWorkers(OneWorker):
+    """A client of two that remembers the names of tasks."""
+
+    def __init__(self, base: CampaignBase) -> None:
+        super().__init__(base, 0, "finished")
+        self.names: list[object] = []
+
+    def nthreads(self) -> dict[str, int]:
+        return {"a": 1, "b": 1}
+
+    def submit(self, _task: object, _name: str, index: int, _wind: object, *, key: object, pure: bool) -> GivenUp:
+        self.names.append(key)
+        return super().submit(_task, _name, index, _wind, key=key, pure=pure)
+
+
+def test_names_come_again_but_for_one_that_is_flying(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Dask keeps 100,000 names; and of two flights of one name it would fly one."""
+    monkeypatch.setattr("distributed.as_completed", lambda loop: LastFirst())
+    monkeypatch.setattr("planfly.campaigns.engine.flight_loop._NAMES", 4)
+    client, orders = TwoWorkers(base), iter(range(40))
+    flown = list(Pilots(client, base).fly(lambda: next((Order(k) for k in orders), None)))
+    assert sorted(one.order.index for one in flown) == list(range(40))
+    assert flown[-1].order.index == 0
+    assert len(set(client.names)) == 4
+    assert client.names[0] not in client.names[1:]
+    assert all(one != other for one, other in pairwise(client.names))
+
+
+@pytest.mark.filterwarnings("default")
+def test_dask_flies_what_comes_under_a_name_that_was_flown(base: CampaignBase, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("planfly.campaigns.engine.flight_loop._NAMES", 16)
+    orders = iter(range(200))
+    with hired_pilots(Workers(2), base, made_flight) as pilots:
+        flown = list(pilots.fly(lambda: next((Order(k) for k in orders), None)))
+    assert sorted(one.order.index for one in flown) == list(range(200))
+    assert all(same_flight(row, made_flight(base, order.index)) for order, row in flown)
 
 
 @pytest.mark.parametrize("status", ["error", "finished"])
