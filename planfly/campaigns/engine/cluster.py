@@ -77,8 +77,7 @@ def connected(workers: Workers) -> Iterator[Any]:
             folder = stack.enter_context(temporary_folder("planfly-workers-"))
             stack.enter_context(dask.config.set({"temporary-directory": str(folder)}))
             number = workers.count or os.cpu_count() or 1
-            if os.name == "posix":
-                _start_tracker()
+            start_tracker()
             # Ctrl-C in the middle of a worker's imports would have it say so.
             with deaf_children():
                 cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
@@ -92,8 +91,10 @@ def connected(workers: Workers) -> Iterator[Any]:
                 raise
 
 
-def _start_tracker() -> None:
+def start_tracker() -> None:
     """Start multiprocessing's tracker of semaphores, so that it removes what a killed worker leaves without a word."""
+    if os.name != "posix":
+        return
     from multiprocessing import resource_tracker
 
     name, words = "PYTHONWARNINGS", "ignore:resource_tracker:UserWarning"

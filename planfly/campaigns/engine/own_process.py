@@ -5,6 +5,7 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 from typing import Any, TypeVar
 
+from planfly.campaigns.engine.cluster import start_tracker
 from planfly.pipeline import Advance
 from world.interruption import deaf_children, end_children, end_when_told
 
@@ -17,6 +18,8 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
     advance: told as work tells it.
     Raises what work raised, and OSError where the process was lost.
     """
+    # Before anything else does, so that it says nothing of what the workers leave later.
+    start_tracker()
     here, there = multiprocessing.get_context("spawn").Pipe(duplex=False)
     child = multiprocessing.get_context("spawn").Process(target=_work, args=(there, work, args, options), daemon=True)
     with deaf_children():
