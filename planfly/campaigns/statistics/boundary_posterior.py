@@ -1,27 +1,25 @@
-"""Where the boundary lies: below a wind with the probability that more than 1 - P of flights fail in that wind.
+"""Where the boundary lies: the wind in which 1 - P of flights fail, of each sample of what the failure modes may be.
 
-The share that fails in a wind is the mean of the failure modes over what may be drawn.  Its posterior is taken as
-normal on the link's scale, with the variance that the coefficients give it (the delta method): of a single mode that no
-draw has a part in exactly Fieller's solution ("Some problems in interval estimation", Journal of the Royal Statistical
-Society B 16, 1954), which holds, too, where more wind changes little.  In more wind no fewer flights fail: what is
-known near the boundary holds farther from it, too, where a line through few flights would know less.
+The share that fails in a wind is the mean of the failure modes over what may be drawn.  More wind never has fewer fail,
+in no sample (`censored_regression`), so that each has one boundary.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planfly.campaigns.statistics.failure_mode import FailureMode
-from planfly.campaigns.statistics.failure_modes import failing_share
+from planfly.campaigns.statistics.failure_modes import ORIGIN, regressors
 
 Floats = NDArray[np.float64]
 
-# Winds in which the probability is had, m/s apart, and how exactly a wind is found between two of them.
-_STEP, _PRECISION = 0.25, 1e-3
-# Of a share that fails, what is told from none; and of a standard deviation on a link's scale.
-_LEAST, _LEAST_DEVIATION = 1e-12, 1e-9
+# Each sample's boundary is first found over so few of what may be drawn, to so many m/s; the logarithm of the share
+# that fails, over all of it, is then nearly straight in the wind: so many steps of the secant method follow.
+_FEW, _NEAR, _SECANTS = 256, 0.1, 2
+# Of a share, what is told from none.
+_LEAST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -33,48 +31,63 @@ class WeighedModes:
 
 
 def boundary_quantiles(
-    fits: Sequence[WeighedModes], draws: Floats, share: float, most: float, parts: Sequence[float]
+    fits: Sequence[WeighedModes], draws: Floats, share: float, most: float, probabilities: Sequence[float]
 ) -> list[float]:
-    """The wind, from 0 to most, m/s, that the boundary lies below with each of these probabilities.
+    """The wind, from 0 to most, m/s, that the boundary lies below with each of these probabilities, 0 to 1.
 
-    draws: (m, d) of what may be drawn.  share: of flights that fail at the boundary.
+    draws: (m, d) of what may be drawn, spread evenly however few of the first are taken.
+    share: of flights that fail at the boundary, above 0 and below 1.
 
     >>> from planfly.campaigns.statistics.links import PROBIT
-    >>> mode = FailureMode(PROBIT, np.array([0.0, 0.5]), np.diag([0.04, 0.0]), 0.0)
-    >>> [round(one, 2) for one in boundary_quantiles([WeighedModes((mode,), 1.0)], np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
+    >>> sample = np.column_stack((np.linspace(-0.1, 0.1, 101), np.full(101, 0.5)))
+    >>> mode = FailureMode(PROBIT, sample.mean(axis=0), np.cov(sample.T), sample, 0.0)
+    >>> [round(one, 1) for one in boundary_quantiles([WeighedModes((mode,), 1.0)], np.zeros((1, 0)), 0.5, 20.0, (0.5,))]
     [10.0]
     """
-
-    def below(speed: float) -> float:
-        return sum(fit.weight * _probability_of_more(fit.modes, draws, speed, share) for fit in fits)
-
-    winds = np.linspace(0.0, most, max(2, round(most / _STEP) + 1))
-    probabilities = np.array([below(float(wind)) for wind in winds])
-    likely = int(np.argmax(np.append(probabilities, 1.0) >= 0.5))
-    # From the middle outwards, the least and the greatest so far.
-    probabilities[:likely] = np.minimum.accumulate(probabilities[:likely][::-1])[::-1]
-    probabilities[likely:] = np.maximum.accumulate(probabilities[likely:])
-    return [_crossing(below, winds, probabilities, part) for part in parts]
+    speeds = [_boundaries(fit.modes, draws, share, most) for fit in fits]
+    weights = np.concatenate(
+        [np.full(some.size, fit.weight / some.size) for fit, some in zip(fits, speeds, strict=True)]
+    )
+    every = np.concatenate(speeds)
+    order = np.argsort(every, kind="stable")
+    summed = np.cumsum(weights[order]) / weights.sum()
+    return [float(every[order][min(int(np.searchsorted(summed, part)), every.size - 1)]) for part in probabilities]
 
 
-def _crossing(below: Callable[[float], float], winds: Floats, probabilities: Floats, part: float) -> float:
-    """Where the probability reaches a part, found by halves between two winds."""
-    after = int(np.searchsorted(probabilities, part))
-    if after in (0, winds.size):
-        return float(winds[min(after, winds.size - 1)])
-    low, high = float(winds[after - 1]), float(winds[after])
-    while high - low > _PRECISION:
+def _boundaries(modes: Sequence[FailureMode], draws: Floats, share: float, most: float) -> Floats:
+    """(n,) of each sample, m/s."""
+    # The modes are known apart from each other: any one's samples go with any of another's.
+    samples = [
+        np.random.default_rng(number).permutation(mode.sample) if number else mode.sample
+        for number, mode in enumerate(modes)
+    ]
+    few, every = (_Shares(modes, samples, some) for some in (draws[:_FEW], draws))
+    low, high = np.zeros(len(samples[0])), np.full(len(samples[0]), most)
+    while (high - low).max() > _NEAR:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if below(middle) < part else (low, middle)
-    return 0.5 * (low + high)
+        fails = few.logarithms(middle) > np.log(share)
+        low, high = np.where(fails, low, middle), np.where(fails, middle, high)
+    speed: Floats = 0.5 * (low + high)
+    before = speed - _NEAR
+    off_before = every.logarithms(before) - np.log(share)
+    for _ in range(_SECANTS):
+        off = every.logarithms(speed) - np.log(share)
+        by_wind = np.maximum((off - off_before) / np.where(speed == before, 1.0, speed - before), 1e-9)
+        before, off_before, speed = speed, off, np.clip(speed - off / by_wind, 0.0, most)
+    return speed
 
 
-def _probability_of_more(modes: Sequence[FailureMode], draws: Floats, speed: float, share: float) -> float:
-    """That more than a share of flights fail in a wind, m/s."""
-    from scipy.special import ndtr
+class _Shares:
+    """The share that fails, of each sample; draws: (m, d)."""
 
-    link, failing = modes[0].link, failing_share(modes, draws, speed)
-    variance = sum(float(one @ mode.covariance @ one) for one, mode in zip(failing.slopes, modes, strict=True))
-    at, limit = link.predictor(min(max(failing.share, _LEAST), 1.0 - _LEAST)), link.predictor(share)
-    deviation = np.sqrt(variance) / max(float(link.density(np.array([at]))[0]), 1e-300)
-    return float(ndtr((at - limit) / max(deviation, _LEAST_DEVIATION)))
+    def __init__(self, modes: Sequence[FailureMode], samples: list[Floats], draws: Floats) -> None:
+        self._modes, self._samples = modes, samples
+        self._at_origin = [regressors(ORIGIN, draws) @ sample.T for sample in samples]
+
+    def logarithms(self, speeds: Floats) -> Floats:
+        """(n,) of the shares, each at its own wind, m/s."""
+        flies = np.ones_like(self._at_origin[0])
+        for mode, sample, x in zip(self._modes, self._samples, self._at_origin, strict=True):
+            flies *= mode.link.survival(x + sample[:, 1] * (speeds - ORIGIN))
+        out: Floats = np.log(np.maximum(1.0 - flies.mean(axis=0), _LEAST))
+        return out

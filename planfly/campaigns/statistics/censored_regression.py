@@ -11,9 +11,11 @@ The probability to fail is a link's function of a + b * wind + c . draws.  Three
   two-limit probit regression model", Econometrica 43, 1975);
 - of the room alone, given that a flight passed: the same regression truncated at no room.
 
-The posterior of (a, b, c, k) is taken as normal about its mode, under a weak normal prior (Gelman et al., Bayesian Data
-Analysis, 3rd edition, 2013, chapters 4.1 and 16.3); the evidence for a link, and for how wide a prior the draws'
-coefficients have, follows from it (section 7.4; MacKay, "Bayesian Interpolation", Neural Computation 4, 1992).
+Priors are weak and normal, of b's logarithm and of the others themselves.  Which flight tells most, and the evidence
+for a link and for how wide a prior the draws' coefficients have, follow from the posterior as normal about its mode
+(Gelman et al., Bayesian Data Analysis, 3rd edition, 2013, chapters 4.1, 7.4 and 16.3; MacKay, "Bayesian Interpolation",
+Neural Computation 4, 1992).  Where few flights failed it is far from that: the boundary rests on a sample of the
+posterior itself (`importance_sampling`).
 """
 
 from dataclasses import dataclass
@@ -21,6 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from planfly.campaigns.statistics.importance_sampling import importance_sample
 from planfly.campaigns.statistics.links import BinaryLink
 
 Floats = NDArray[np.float64]
@@ -37,6 +40,10 @@ _ROOM = 10.0
 # Where Newton's method begins: few fail, and more in more wind; and of the room's coefficient.
 _START, _ROOM_START = (-3.0, np.log(0.3)), 1.0
 _STEPS, _CONVERGED, _LEAST_SHARE, _LEAST_CURVATURE, _MOST_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
+# Of a flight that passed, on either link's scale.
+_MOST_PREDICTOR = 30.0
+# Points of a posterior's sample.
+_SAMPLE = 512
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,11 +76,11 @@ class Outcomes:
         return Outcomes(self.terms[known], self.failed[known], self.room[known], given_passed=True)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class RegressionFit:
     """A posterior.
 
-    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of the terms.
+    mean, covariance: (2 + d,) and (2 + d, 2 + d) of the coefficients of the terms, as of a normal law about the mode.
     log_evidence: of what came out.
     by_room: by how much the predictor falls over a scale of room; 0 where no flight told of its room.
     """
@@ -82,6 +89,12 @@ class RegressionFit:
     covariance: Floats
     log_evidence: float
     by_room: float
+    _posterior: "_Posterior"
+    _mode: Floats
+
+    def sample(self) -> Floats:
+        """(s, 2 + d) coefficients of the terms, each as likely as the other, the wind's above 0."""
+        return self._posterior.sample(self._mode)
 
 
 def fit_regression(outcomes: Outcomes, link: BinaryLink) -> RegressionFit:
@@ -128,28 +141,56 @@ class _Posterior:
             at[-1] = _ROOM_START
         return at
 
-    def coefficients(self, at: Floats) -> Floats:
-        """What terms are multiplied by."""
-        beta = at.copy()
-        beta[1] = np.exp(min(at[1], _MOST_LOGARITHM))
+    def coefficients(self, points: Floats) -> Floats:
+        """What terms are multiplied by, at any number of points."""
+        beta = points.copy()
+        beta[..., 1] = np.exp(np.minimum(points[..., 1], _MOST_LOGARITHM))
         return beta
 
-    def loss(self, at: Floats) -> float:
-        """Less the logarithm of prior and likelihood, but for what no coefficient changes."""
-        beta, off = self.coefficients(at), at - self._middle
-        if self.by_room and beta[-1] <= 0.0:
-            return np.inf
-        x = self._terms @ beta
-        fails, flies = self._link.log_shares(x)
-        logs = np.where(self._outcomes.failed, fails, flies)
+    def log_density(self, points: Floats) -> Floats:
+        """(n,) at n points, but for what no coefficient changes."""
+        beta, off, failed = self.coefficients(points), points - self._middle, self._outcomes.failed
+        x, bare = self._terms @ beta.T, self._outcomes.terms @ beta[:, : self.size].T
+        # As good as impossible, and of its logarithm's own size nothing is left of what is added to it.
+        possible = (bare[~failed] < _MOST_PREDICTOR).all(axis=0)
+        x, bare = np.where(possible, x, 0.0), np.where(possible, bare, 0.0)
+        logs: Floats = -0.5 * (off * off) @ self._precision
+        logs += self._link.log_cdf(x[failed]).sum(axis=0)
+        logs += self._link.log_survival(x[~failed & ~self._told]).sum(axis=0)
         if self.by_room:
-            logs = np.where(self._told, self._link.log_density(x) + np.log(beta[-1]), logs)
+            possible &= beta[:, -1] > 0.0
+            logs += self._link.log_density(x[self._told]).sum(axis=0)
+            logs += self._told.sum() * np.log(np.where(possible, beta[:, -1], 1.0))
         if self._outcomes.given_passed:
-            logs = logs - self._link.log_shares(self._at_no_room(beta))[1]
-        return float(0.5 * (self._precision * off * off).sum() - logs.sum())
+            logs -= self._link.log_survival(bare).sum(axis=0)
+        return np.where(possible, logs, -np.inf)
+
+    def sample(self, mode: Floats) -> Floats:
+        """(s, size) coefficients of the terms, each as likely as the other.
+
+        Of few failures the wind's coefficient is known within factors, and the constant follows from it: points are
+        spread over the predictor in the wind in which it is best known, where it does not.
+        """
+        covariance = np.linalg.inv(self.slope_and_curvature(mode)[1])
+        best_known = -covariance[0, 1] / (covariance[1, 1] * np.exp(mode[1]))
+        # By the predictor there, or by the constant: the one's density is the other's.
+        turn = np.eye(mode.size)
+        turn[0, 1] = best_known * np.exp(mode[1])
+        middle = mode.copy()
+        middle[0] += best_known * np.exp(mode[1])
+
+        def constants(points: Floats) -> Floats:
+            out = points.copy()
+            out[:, 0] -= best_known * self.coefficients(points)[:, 1]
+            return out
+
+        points = importance_sample(
+            lambda points: self.log_density(constants(points)), middle, turn @ covariance @ turn.T, _SAMPLE
+        )
+        return self.coefficients(constants(points))[:, : self.size]
 
     def slope_and_curvature(self, at: Floats) -> tuple[Floats, Floats]:
-        """First and second derivatives of the loss."""
+        """First and second derivatives of the negative logarithm of the density."""
         beta, scale = self.coefficients(at), np.ones(at.size)
         x, terms = self._terms @ beta, self._terms
         first, second = self._link.derivatives(x, self._outcomes.failed)
@@ -183,13 +224,17 @@ def _fit(posterior: _Posterior) -> RegressionFit:
     curvature's absolute eigenvalues (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, section 3.4).
     """
     at, size = posterior.start(), posterior.size
-    value = posterior.loss(at)
+
+    def loss(point: Floats) -> float:
+        return -float(posterior.log_density(point[None])[0])
+
+    value = loss(at)
     for _ in range(_STEPS):
         slope, curvature = posterior.slope_and_curvature(at)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _LEAST_CURVATURE))
         share = 1.0
-        while not (tried := posterior.loss(at - share * step)) <= value and share > _LEAST_SHARE:
+        while not (tried := loss(at - share * step)) <= value and share > _LEAST_SHARE:
             share *= 0.5
         at, value = at - share * step, tried
         if float(np.abs(share * step).max()) < _CONVERGED:
@@ -199,4 +244,5 @@ def _fit(posterior: _Posterior) -> RegressionFit:
     covariance: Floats = np.linalg.inv(curvature)[:size, :size].astype(np.float64)
     covariance[1] *= beta[1]
     covariance[:, 1] *= beta[1]
-    return RegressionFit(beta[:size], covariance, float(evidence), float(beta[-1]) if posterior.by_room else 0.0)
+    by_room = float(beta[-1]) if posterior.by_room else 0.0
+    return RegressionFit(beta[:size], covariance, float(evidence), by_room, posterior, at)

@@ -1,10 +1,10 @@
 """One way of failing as a regression on the wind and what was drawn.
 
 By how little flights passed tells of failing only where both are of one kind: an aircraft that is too fast down a leg
-fails by degrees, whatever the gusts took of the slope of those that were not.  So two hypotheses are weighed by their
-evidence: one law for failing and for the room of those that passed (Tobin's), and one for each, where the room tells
-nothing of failing (Cragg, "Some statistical models for limited dependent variables with application to the demand for
-durable goods", Econometrica 39, 1971, of which the first is a special case).
+fails by degrees, whatever the gusts took of the slope of those that were not.  So of two hypotheses the one with more
+evidence is taken: one law for failing and for the room of those that passed (Tobin's), or one for each, where the room
+tells nothing of failing (Cragg, "Some statistical models for limited dependent variables with application to the demand
+for durable goods", Econometrica 39, 1971, of which the first is a special case).
 """
 
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.statistics.censored_regression import Outcomes, fit_regression
+from planfly.campaigns.statistics.censored_regression import Outcomes, RegressionFit, fit_regression
 from planfly.campaigns.statistics.links import LINKS, BinaryLink
 
 Floats = NDArray[np.float64]
@@ -24,6 +24,7 @@ class FailureMode:
     """One way of failing.
 
     mean, covariance: (2 + d,) and (2 + d, 2 + d) of its coefficients, as those of the terms it was fitted to.
+    sample: (s, 2 + d) of what the coefficients may be, each as likely as the other.
     log_evidence: of what came out, by this link.
     by_room: by how much the predictor falls over a scale of room; 0 where room tells nothing of failing.
     """
@@ -31,6 +32,7 @@ class FailureMode:
     link: BinaryLink
     mean: Floats
     covariance: Floats
+    sample: Floats
     log_evidence: float
     by_room: float = 0.0
 
@@ -52,10 +54,14 @@ def fit_mode(terms: Floats, failed: Bools, room: Floats, link: BinaryLink) -> Fa
     outcomes = Outcomes(terms, failed, np.where(failed, 0.0, room))
     one_law = fit_regression(outcomes, link)
     if not outcomes.told.any():
-        return FailureMode(link, one_law.mean, one_law.covariance, one_law.log_evidence)
+        return _mode(link, one_law, one_law.log_evidence)
     alone, passes = fit_regression(outcomes.without_room(), link), outcomes.only_room()
     # The room's own law, of whichever link, says nothing of failing's.
     two_laws = alone.log_evidence + max(fit_regression(passes, any_link).log_evidence for any_link in LINKS)
     if two_laws > one_law.log_evidence:
-        return FailureMode(link, alone.mean, alone.covariance, two_laws)
-    return FailureMode(link, one_law.mean, one_law.covariance, one_law.log_evidence, one_law.by_room)
+        return _mode(link, alone, two_laws)
+    return _mode(link, one_law, one_law.log_evidence)
+
+
+def _mode(link: BinaryLink, fit: RegressionFit, log_evidence: float) -> FailureMode:
+    return FailureMode(link, fit.mean, fit.covariance, fit.sample(), log_evidence, fit.by_room)

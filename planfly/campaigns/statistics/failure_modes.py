@@ -20,7 +20,7 @@ from planfly.campaigns.statistics.links import BinaryLink
 Floats = NDArray[np.float64]
 
 # Winds are counted from here, m/s, where the constant's prior is meant.
-_ORIGIN = 10.0
+ORIGIN = 10.0
 
 
 def regressors(speeds: Floats | float, draws: Floats) -> Floats:
@@ -30,7 +30,7 @@ def regressors(speeds: Floats | float, draws: Floats) -> Floats:
     """
     out = np.empty((len(draws), 2 + draws.shape[1]))
     out[:, 0] = 1.0
-    out[:, 1] = np.asarray(speeds) - _ORIGIN
+    out[:, 1] = np.asarray(speeds) - ORIGIN
     out[:, 2:] = draws
     return out
 
@@ -39,13 +39,14 @@ def fit_modes(
     terms: Floats,
     failed: Sequence[frozenset[Hashable]],
     link: BinaryLink,
-    room: Sequence[Mapping[Hashable, float]] = (),
+    room: Sequence[Mapping[Hashable, float] | None] = (),
 ) -> tuple[FailureMode, ...]:
     """The ways of failing of n flights, in order: the one in which most failed, then in which most of the others did.
 
     terms: (n, 2 + d), of `regressors`.
     failed: the ways in which each failed; none where it was flyable.
-    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1; 0 where it passed all the same.
+    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1, or 0 where it passed all the same;
+    others were passed by a scale or more.  None of a flight of which that is not known.
 
     >>> from planfly.campaigns.statistics.links import PROBIT
     >>> speeds = np.linspace(0.0, 20.0, 200)
@@ -55,13 +56,13 @@ def fit_modes(
     12.0
     """
     found: list[FailureMode] = []
-    rooms = room or [{}] * len(failed)
+    rooms = room or [None] * len(failed)
     left = np.ones(len(failed), dtype=bool)
     while counts := Counter(way for here, ways in zip(left, failed, strict=True) if here for way in ways):
         # By name where as many failed, as the order of a set is not the same in every process.
         common = min(counts, key=lambda way: (-counts[way], repr(way)))
         so = np.array([common in ways for ways in failed])
-        passed_by = np.array([some.get(common, 1.0) for some in rooms])
+        passed_by = np.array([0.0 if some is None else some.get(common, 1.0) for some in rooms])
         found.append(fit_mode(terms[left], so[left], passed_by[left], link))
         left &= ~so
     return tuple(found)
@@ -71,18 +72,18 @@ def fail_shares(modes: Sequence[FailureMode], terms: Floats) -> Floats:
     """(n,) probability to fail, in any way, of flights (n, 2 + d), by the modes' means."""
     flies: Floats = np.ones(len(terms))
     for mode in modes:
-        flies *= mode.link.fly_shares(terms @ mode.mean)
+        flies *= mode.link.survival(terms @ mode.mean)
     return 1.0 - flies
 
 
 def boundary_speed(modes: Sequence[FailureMode], draws: Floats, share: float, most: float) -> float:
-    """The wind from 0 to ``most`` in which this share of draws (m, d) is expected to fail, m/s, found by halves."""
-    still = [(mode.link, regressors(_ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
+    """The wind from 0 to ``most`` in which this share of draws (m, d) is expected to fail, m/s, found by bisection."""
+    still = [(mode.link, regressors(ORIGIN, draws) @ mode.mean, float(mode.mean[1])) for mode in modes]
 
     def fails(speed: float) -> bool:
         flies: Floats = np.ones(len(draws))
         for link, x, by_wind in still:
-            flies *= link.fly_shares(x + by_wind * (speed - _ORIGIN))
+            flies *= link.survival(x + by_wind * (speed - ORIGIN))
         return bool(1.0 - flies.mean() >= share)
 
     if not fails(most):
@@ -110,7 +111,7 @@ def failing_share(modes: Sequence[FailureMode], draws: Floats, speed: float) -> 
     """The share of draws (m, d) that is expected to fail in a wind, m/s."""
     terms = regressors(speed, draws)
     predictors = [terms @ mode.mean for mode in modes]
-    flies = [mode.link.fly_shares(x) for mode, x in zip(modes, predictors, strict=True)]
+    flies = [mode.link.survival(x) for mode, x in zip(modes, predictors, strict=True)]
     slopes, by_wind = [], 0.0
     for k, mode in enumerate(modes):
         others = np.prod(flies[:k] + flies[k + 1 :], axis=0)

@@ -1,12 +1,14 @@
 """Which flights of a direction tell most of its boundary: their winds, and which draws.
 
-First by halves, until some flew and some failed.  Then each flight is the one after which the boundary's variance is
+First by bisection, until some flew and some failed.  Then each flight is the one after which the boundary's variance is
 expected to be least: the look one step ahead of adaptive psychometric testing (King-Smith et al., Vision Research 34,
-1994), by the information that a probit regression has of a flight (Chaloner and Verdinelli, "Bayesian Experimental
+1994), by the information that a binary regression has of a flight (Chaloner and Verdinelli, "Bayesian Experimental
 Design", Statistical Science 10(3), 1995, section 4).  What is drawn for a flight is known before it is flown, so the
 draw is chosen too; every third is the next one that has not been flown, whatever it is, lest a way of failing that has
 not been seen be avoided.  Only the likelihood of what was flown enters the fit: the choice does not bias it.
 """
+
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,20 +27,20 @@ _LEAST_SHARE, _MOST_SHARE, _WINDS = 1e-3, 0.2, 10
 _COMPARED, _SOUGHT = 1000, 2000
 # Every so many flights takes the next draw.
 _PLAIN = 3
-# Nearer to the largest wind that is looked at than this, by halves, it is that wind, m/s.
+# Nearer to the largest wind that is looked at than this, by bisection, it is that wind, m/s.
 _NEAR = 0.3
 
 
 def next_flights(direction: Direction, count: int) -> list[tuple[float, int]]:
     """Wind, m/s, and draw of the flights that tell most, so many."""
     if direction.all_flew or direction.all_failed:
-        speed = _by_halves(direction)
+        speed = _by_bisection(direction)
         draws = _extreme_draws(direction) if speed == direction.most else []
         return [(speed, draw) for draw in (draws + _next_draws(direction, count, draws))[:count]]
     return _most_telling(direction, count)
 
 
-def _by_halves(direction: Direction) -> float:
+def _by_bisection(direction: Direction) -> float:
     most = direction.most
     if not direction.speeds:
         return _rounded(0.5 * most, most)
@@ -115,17 +117,24 @@ class _Belief:
     def gains(self, terms: Floats) -> Floats:
         """(n,) by how much each of these flights (n, 2 + d) is expected to lessen the boundary's variance, m2/s2."""
         out: Floats = np.zeros(len(terms))
-        for mode, covariance, slope in zip(self._fit.modes, self._covariances, self._fit.slopes, strict=True):
-            known, told = terms @ covariance, mode.link.information(terms @ mode.mean, mode.by_room)
+        for k, told in enumerate(self._informations(terms)):
+            known, slope = terms @ self._covariances[k], self._fit.slopes[k]
             out += (known @ slope) ** 2 * told / (1.0 + told * (known * terms).sum(axis=1))
         return self._fit.weight * out
 
     def expect(self, row: Floats) -> None:
         """Count a flight (2 + d,) as flown, whatever comes of it."""
-        for k, mode in enumerate(self._fit.modes):
+        for k, told in enumerate(self._informations(row[None])):
             known = self._covariances[k] @ row
-            told = float(mode.link.information(row[None] @ mode.mean, mode.by_room)[0])
             self._covariances[k] = self._covariances[k] - told * np.outer(known, known) / (1.0 + told * (row @ known))
+
+    def _informations(self, terms: Floats) -> Iterator[Floats]:
+        """(n,) of each mode: a flight tells of one if it does not fail by those before."""
+        reaches: Floats = np.ones(len(terms))
+        for mode in self._fit.modes:
+            x = terms @ mode.mean
+            yield reaches * mode.link.information(x, mode.by_room)
+            reaches = reaches * mode.link.survival(x)
 
 
 def _rounded(speed: float, most: float) -> float:

@@ -1,7 +1,7 @@
 """The links of a binary regression: the probability to fail as a function of a linear predictor.
 
-`PROBIT` is that of a threshold which is distributed normally; `LEAST_OF_MANY` (complementary log-log) that of the least
-of many thresholds, Gumbel's law for minima, whose tail towards little wind is the longer one (McCullagh and Nelder,
+`PROBIT` is that of a threshold which is distributed normally; `CLOGLOG` (complementary log-log) that of the least of
+many thresholds, Gumbel's law for minima, whose tail towards little wind is the longer one (McCullagh and Nelder,
 Generalized Linear Models, 2nd edition, 1989, section 4.3).
 """
 
@@ -18,16 +18,16 @@ _MOST, _LEAST = 700.0, 1e-300
 
 
 class BinaryLink(Protocol):
-    """All of (n,) predictors."""
+    """All of predictors in an array of any shape, and each of the same shape."""
 
-    def log_shares(self, x: Floats) -> tuple[Floats, Floats]:
-        """Logarithms of the probability to fail, and to fly."""
+    def log_cdf(self, x: Floats) -> Floats:
+        """Logarithm of the probability to fail."""
 
-    def fly_shares(self, x: Floats) -> Floats:
+    def log_survival(self, x: Floats) -> Floats:
+        """Logarithm of the probability to fly."""
+
+    def survival(self, x: Floats) -> Floats:
         """Probability to fly."""
-
-    def predictor(self, share: float) -> float:
-        """Where the probability to fail is this share."""
 
     def density(self, x: Floats) -> Floats:
         """Derivative of the probability to fail."""
@@ -50,21 +50,20 @@ class BinaryLink(Protocol):
 
 
 class _Probit:
-    def log_shares(self, x: Floats) -> tuple[Floats, Floats]:
+    def log_cdf(self, x: Floats) -> Floats:
         from scipy.special import log_ndtr
 
-        return log_ndtr(x), log_ndtr(-x)
+        out: Floats = log_ndtr(x)
+        return out
 
-    def fly_shares(self, x: Floats) -> Floats:
+    def log_survival(self, x: Floats) -> Floats:
+        return self.log_cdf(-x)
+
+    def survival(self, x: Floats) -> Floats:
         from scipy.special import ndtr
 
         out: Floats = ndtr(-x)
         return out
-
-    def predictor(self, share: float) -> float:
-        from scipy.special import ndtri
-
-        return float(ndtri(share))
 
     def density(self, x: Floats) -> Floats:
         out: Floats = np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
@@ -99,20 +98,20 @@ class _Probit:
         return -x, np.full_like(x, -1.0)
 
 
-class _LeastOfMany:
-    def log_shares(self, x: Floats) -> tuple[Floats, Floats]:
-        rate = np.exp(np.minimum(x, _MOST))
+class _ComplementaryLogLog:
+    def log_cdf(self, x: Floats) -> Floats:
         with np.errstate(divide="ignore"):
             # Where the rate is 0, the probability is the rate.
-            fails = np.where(x < -30.0, x, np.log(-np.expm1(-rate)))
-        return fails, -rate
-
-    def fly_shares(self, x: Floats) -> Floats:
-        out: Floats = np.exp(-np.exp(np.minimum(x, _MOST)))
+            out: Floats = np.where(x < -30.0, x, np.log(-np.expm1(self.log_survival(x))))
         return out
 
-    def predictor(self, share: float) -> float:
-        return float(np.log(-np.log1p(-share)))
+    def log_survival(self, x: Floats) -> Floats:
+        out: Floats = -np.exp(np.minimum(x, _MOST))
+        return out
+
+    def survival(self, x: Floats) -> Floats:
+        out: Floats = np.exp(self.log_survival(x))
+        return out
 
     def density(self, x: Floats) -> Floats:
         out: Floats = np.exp(x - np.exp(np.minimum(x, _MOST)))
@@ -155,5 +154,5 @@ def _rate_ratio(rate: Floats) -> Floats:
 
 
 PROBIT: BinaryLink = _Probit()
-LEAST_OF_MANY: BinaryLink = _LeastOfMany()
-LINKS = (PROBIT, LEAST_OF_MANY)
+CLOGLOG: BinaryLink = _ComplementaryLogLog()
+LINKS = (PROBIT, CLOGLOG)

@@ -83,9 +83,9 @@ class FailureFit(WeighedModes):
 class Direction:
     """Flights in wind from one direction.
 
-    most: wind up to which is looked, m/s.
+    most: wind up to which is looked, m/s.  target, confidence: above 0 and below 1.
     speeds: m/s, in which they were flown.  draws: index of each one's draw.  failed: the ways in which each failed.
-    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1.
+    room: the ways that each passed narrowly, and by what share of a scale, 0 to 1; None where that is not known.
     """
 
     def __init__(self, most: float, target: float, numbers: DrawnNumbers, confidence: float = 0.95) -> None:
@@ -93,17 +93,22 @@ class Direction:
         self.speeds: list[float] = []
         self.draws: list[int] = []
         self.failed: list[frozenset[Hashable]] = []
-        self.room: list[Mapping[Hashable, float]] = []
+        self.room: list[Mapping[Hashable, float] | None] = []
         self._fits: tuple[int, tuple[FailureFit, ...]] | None = None
 
     def add(
         self, speed: float, draw: int, failed: frozenset[Hashable], room: Mapping[Hashable, float] | None = None
     ) -> None:
-        """Take a flight in; failed: none for one that was flyable.  room: None where nothing is known of it."""
+        """Take a flight in, of a wind from 0 to `most`, m/s; failed: none for one that was flyable.
+
+        room: None where nothing is known of how narrowly it passed.  Raises ValueError for another wind.
+        """
+        if not 0.0 <= speed <= self.most:
+            raise ValueError(f"speed: {speed}: 0 to {self.most:g} m/s is expected")
         self.speeds.append(speed)
         self.draws.append(draw)
         self.failed.append(failed)
-        self.room.append(room or {})
+        self.room.append(room)
 
     @property
     def all_flew(self) -> bool:

@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from scipy.stats import gumbel_l, lognorm, norm
 
 from planfly.campaigns.statistics.censored_regression import Outcomes, fit_regression
-from planfly.campaigns.statistics.links import LEAST_OF_MANY, PROBIT, BinaryLink
+from planfly.campaigns.statistics.links import CLOGLOG, PROBIT, BinaryLink
 
 Floats = NDArray[np.float64]
 # Of the constant, of the wind from 10 m/s on, and of two draws.
@@ -28,7 +28,7 @@ def made(count: int, seed: int, law: Any = norm) -> Outcomes:
     return Outcomes(terms, room < 0.0, room.clip(0.0, 1.0))
 
 
-@pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (LEAST_OF_MANY, gumbel_l)])
+@pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (CLOGLOG, gumbel_l)])
 @pytest.mark.parametrize("known", [True, False])
 def test_coefficients_are_found(link: BinaryLink, law: Any, known: bool) -> None:
     flights = made(20_000, 2, law)
@@ -61,7 +61,7 @@ def test_where_all_pass_by_a_scale_who_failed_is_all_there_is() -> None:
     assert fit_regression(far, PROBIT).mean == pytest.approx(fit_regression(flights.without_room(), PROBIT).mean)
 
 
-@pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (LEAST_OF_MANY, gumbel_l)])
+@pytest.mark.parametrize(("link", "law"), [(PROBIT, norm), (CLOGLOG, gumbel_l)])
 def test_room_alone_gives_the_coefficients_of_the_law_it_has(link: BinaryLink, law: Any) -> None:
     """Whoever failed is left out, and what is left is no longer the law itself but the law cut off at no room."""
     fit = fit_regression(made(20_000, 8, law).only_room(), link)
@@ -100,7 +100,7 @@ def test_the_covariance_is_the_inverse_of_the_curvature_at_the_mode() -> None:
 
 @pytest.mark.parametrize("known", [True, False])
 def test_the_evidence_is_for_the_link_that_flights_follow(known: bool) -> None:
-    for law, right, wrong in ((norm, PROBIT, LEAST_OF_MANY), (gumbel_l, LEAST_OF_MANY, PROBIT)):
+    for law, right, wrong in ((norm, PROBIT, CLOGLOG), (gumbel_l, CLOGLOG, PROBIT)):
         flights = made(6000, 3, law)
         by_right, by_wrong = (
             fit_regression(flights if known else flights.without_room(), link).log_evidence for link in (right, wrong)

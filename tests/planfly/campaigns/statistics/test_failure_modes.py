@@ -25,7 +25,7 @@ def made_flights(count: int, seed: int, link: BinaryLink = PROBIT) -> tuple[np.n
     terms = regressors(random.uniform(2.0, 18.0, count), random.normal(size=(count, 2)))
     ways: list[set[Hashable]] = [set() for _ in range(count)]
     for name, beta in (("slope", FIRST), ("threat", SECOND)):
-        for k in np.flatnonzero(np.log(random.random(count)) < link.log_shares(terms @ beta)[0]):
+        for k in np.flatnonzero(np.log(random.random(count)) < link.log_cdf(terms @ beta)):
             ways[k].add(name)
     return terms, [frozenset(some) for some in ways]
 
@@ -71,7 +71,7 @@ def test_the_way_in_which_most_failed_comes_first() -> None:
 
 
 def mode_of(beta: np.ndarray, link: BinaryLink = PROBIT) -> FailureMode:
-    return FailureMode(link, beta, np.eye(beta.size), 0.0)
+    return FailureMode(link, beta, np.eye(beta.size), beta[None], 0.0)
 
 
 def test_the_boundary_is_where_that_share_fails() -> None:
@@ -108,7 +108,7 @@ def test_the_share_that_fails_and_its_derivatives(link: BinaryLink) -> None:
     """Of two ways of which either often comes: against the share itself, a little moved."""
     draws, betas = np.random.default_rng(1).normal(size=(4096, 2)), [FIRST, SECOND]
     found = failing_share([mode_of(beta, link) for beta in betas], draws, 11.0)
-    flies = np.prod([link.fly_shares(regressors(11.0, draws) @ beta) for beta in betas], axis=0)
+    flies = np.prod([link.survival(regressors(11.0, draws) @ beta) for beta in betas], axis=0)
     assert found.share == pytest.approx(1.0 - flies.mean())
     assert 0.3 < found.share < 0.9
     for which in (0, 1):

@@ -1,11 +1,15 @@
-"""Which flights are chosen: by halves first, then in the tail, by draws that tell."""
+"""Which flights are chosen: by bisection first, then in the tail, by draws that tell."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from planfly.campaigns.statistics.flight_choice import next_flights
-from planfly.campaigns.statistics.wind_boundary import Direction
+from planfly.campaigns.statistics.failure_mode import FailureMode
+from planfly.campaigns.statistics.flight_choice import _Belief, _gains_between, next_flights
+from planfly.campaigns.statistics.links import PROBIT
+from planfly.campaigns.statistics.wind_boundary import Direction, FailureFit
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
 
 
@@ -60,8 +64,77 @@ def test_draws_that_tell_are_chosen_and_every_third_is_not() -> None:
     assert sorted(direction.draws)[:60] == list(range(60))
 
 
+def fit_of(*betas: list[float], weight: float = 1.0, speed: float = 12.0) -> FailureFit:
+    """A fit of modes by probit, each with its own covariance and slopes."""
+    random = np.random.default_rng(7)
+    modes, slopes = [], []
+    for beta in betas:
+        root = 0.3 * random.normal(size=(len(beta), len(beta)))
+        mean = np.array(beta)
+        modes.append(FailureMode(PROBIT, mean, root @ root.T + 0.05 * np.eye(len(beta)), mean[None], 0.0))
+        slopes.append(random.normal(size=len(beta)))
+    return FailureFit(tuple(modes), weight, speed, slopes)
+
+
+ROWS = np.array([[1.0, 2.0, 0.5], [1.0, -3.0, 2.0], [1.0, 4.0, -1.0]])
+
+
+def told_of(fit: FailureFit, row: np.ndarray) -> list[float]:
+    """Fisher's information of each mode, of a flight that tells of it if it did not fail by those before."""
+    out, reaches = [], 1.0
+    for mode in fit.modes:
+        x = float(row @ mode.mean)
+        out.append(reaches * norm.pdf(x) ** 2 / (norm.cdf(x) * norm.sf(x)))
+        reaches *= norm.sf(x)
+    return out
+
+
+def test_a_flight_gains_what_it_takes_from_the_boundarys_variance() -> None:
+    """By the posterior's precision with the flight's information added, inverted: of two modes, one after another."""
+    fit = fit_of([-1.0, 0.4, 0.8], [-2.0, 0.3, -0.5], weight=0.7)
+    belief, known = _Belief(fit), [mode.covariance for mode in fit.modes]
+    for _ in range(2):
+        gains, after = belief.gains(ROWS), []
+        for k, row in enumerate(ROWS):
+            changed = [
+                np.linalg.inv(np.linalg.inv(one) + told * np.outer(row, row))
+                for one, told in zip(known, told_of(fit, row), strict=True)
+            ]
+            lost = sum(s @ (one - new) @ s for s, one, new in zip(fit.slopes, known, changed, strict=True))
+            assert gains[k] == pytest.approx(0.7 * lost, rel=1e-6)
+            after.append(changed)
+        # The same once more, after the second was flown.
+        belief.expect(ROWS[1])
+        known = after[1]
+
+
+def test_a_flight_that_surely_fails_by_one_way_tells_nothing_of_the_next() -> None:
+    alone, behind = fit_of([-1.0, 0.4, 0.8]), fit_of([9.0, 0.0, 0.0], [-1.0, 0.4, 0.8])
+    behind = replace(behind, modes=(behind.modes[0], alone.modes[0]), slopes=[np.zeros(3), alone.slopes[0]])
+    assert (_Belief(alone).gains(ROWS) > 1e-3).all()
+    assert (_Belief(behind).gains(ROWS) < 1e-12).all()
+
+
+def test_what_tells_between_fits_is_what_their_boundaries_are_apart() -> None:
+    """By enumeration: the boundary's variance between fits, less what is expected of it once the outcome is known."""
+    fits = (fit_of([-1.0, 0.4, 0.8], weight=0.3, speed=11.0), fit_of([-2.0, 0.9, 0.1], weight=0.7, speed=13.0))
+    weights, speeds = np.array([0.3, 0.7]), np.array([11.0, 13.0])
+
+    def variance(of: np.ndarray) -> float:
+        return float(of @ speeds**2 - (of @ speeds) ** 2)
+
+    for row, gain in zip(ROWS, _gains_between(fits, ROWS), strict=True):
+        fails = np.array([norm.cdf(row @ fit.modes[0].mean) for fit in fits])
+        expected = variance(weights)
+        for chance in (fails, 1.0 - fails):
+            evidence = float(weights @ chance)
+            expected -= evidence * variance(weights * chance / evidence)
+        assert gain == pytest.approx(expected, rel=1e-6)
+        assert gain > 1e-4
+
+
 def test_what_is_chosen_tells_more_than_what_comes() -> None:
-    """As many flights at the boundary itself, with whatever is drawn, leave its interval twice as wide."""
+    """As many flights at and above the boundary, with whatever is drawn, leave its interval half as wide again."""
     random = np.random.default_rng(4)
 
     def outcome(speed: float, drawn: np.ndarray) -> frozenset[str]:

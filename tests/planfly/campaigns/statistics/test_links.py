@@ -7,18 +7,17 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import gumbel_l, norm
 
-from planfly.campaigns.statistics.links import LEAST_OF_MANY, LINKS, PROBIT, BinaryLink
+from planfly.campaigns.statistics.links import CLOGLOG, LINKS, PROBIT, BinaryLink
 
-CASES = [(PROBIT, norm), (LEAST_OF_MANY, gumbel_l)]
+CASES = [(PROBIT, norm), (CLOGLOG, gumbel_l)]
 X = np.linspace(-6.0, 3.0, 37)
 
 
 @pytest.mark.parametrize(("link", "law"), CASES)
 def test_shares_and_density_are_the_laws(link: BinaryLink, law: Any) -> None:
-    fails, flies = link.log_shares(X)
-    assert fails == pytest.approx(law.logcdf(X), rel=1e-9)
-    assert flies == pytest.approx(law.logsf(X), rel=1e-9)
-    assert link.fly_shares(X) == pytest.approx(law.sf(X), rel=1e-9)
+    assert link.log_cdf(X) == pytest.approx(law.logcdf(X), rel=1e-9)
+    assert link.log_survival(X) == pytest.approx(law.logsf(X), rel=1e-9)
+    assert link.survival(X) == pytest.approx(law.sf(X), rel=1e-9)
     assert link.density(X) == pytest.approx(law.pdf(X), rel=1e-9)
     assert link.log_density(X) == pytest.approx(law.logpdf(X), rel=1e-9)
     assert link.information(X) == pytest.approx(law.pdf(X) ** 2 / (law.cdf(X) * law.sf(X)), rel=1e-8)
@@ -71,9 +70,3 @@ def test_far_from_all_flights_numbers_stay_finite(link: BinaryLink) -> None:
     assert np.isfinite(link.log_density(far[:-1])).all()
     assert np.isfinite(link.density_derivatives(far)).all()
     assert np.isfinite(link.density(far)).all()
-
-
-@pytest.mark.parametrize("link", LINKS)
-def test_the_predictor_of_a_share_has_it(link: BinaryLink) -> None:
-    for share in (1e-6, 0.01, 0.5, 0.9):
-        assert 1.0 - link.fly_shares(np.array([link.predictor(share)]))[0] == pytest.approx(share)

@@ -94,6 +94,51 @@ def _limit_of(share: float) -> float:
     return 10.0 + 4.0 * (2.0 - float(norm.isf(share)) * np.hypot(1.0, 0.1))
 
 
+@pytest.mark.parametrize(
+    "counts",
+    [
+        {10.0: (6, 0), 15.0: (6, 0), 20.0: (137, 1)},
+        {10.0: (6, 0), 15.0: (6, 0), 20.0: (299, 1)},
+        {10.0: (6, 0), 15.0: (6, 0), 20.0: (298, 2)},
+        {10.0: (100, 0), 15.0: (99, 1), 20.0: (98, 2)},
+        {19.0: (3, 0), 20.0: (0, 3)},
+        {8.0: (50, 0), 10.0: (48, 2), 12.0: (30, 20)},
+    ],
+)
+def test_few_failures_leave_open_what_they_do(counts: dict[float, tuple[int, int]]) -> None:
+    """Flights that flew and failed by wind, m/s: quantiles of the posterior itself, by a sum over a grid."""
+    direction = Direction(20.0, 0.99, no_numbers())
+    for speed, (flew, failed) in counts.items():
+        for k in range(flew + failed):
+            direction.add(speed, len(direction.speeds), frozenset({"slope"} if k < failed else ()))
+    found = direction.boundary()
+    assert [found.low, found.estimate, found.high] == pytest.approx(_summed(counts), abs=0.6)
+
+
+def _summed(counts: dict[float, tuple[int, int]]) -> list[float]:
+    """Of a constant at 10 m/s, normal (20), and a wind's coefficient, log-normal about 0.5 per m/s, by either law."""
+    a, b = np.meshgrid(np.linspace(-40.0, 10.0, 1001), np.exp(np.linspace(-4.7, 3.3, 201)), indexing="ij")
+    speeds, logs = [], []
+    for law in (norm, gumbel_l):
+        density = norm.logpdf(a, scale=20.0) + norm.logpdf(np.log(b), loc=np.log(0.5))
+        for speed, (flew, failed) in counts.items():
+            x = a + b * (speed - 10.0)
+            density = density + flew * law.logsf(x) + failed * law.logcdf(x)
+        speeds.append(np.clip(10.0 + (law.ppf(0.01) - a) / b, 0.0, 20.0).ravel())
+        logs.append(density.ravel())
+    every, weights = np.concatenate(speeds), np.exp(np.concatenate(logs) - max(one.max() for one in logs))
+    order = np.argsort(every)
+    return [
+        float(np.interp(part, np.cumsum(weights[order]) / weights.sum(), every[order])) for part in (0.025, 0.5, 0.975)
+    ]
+
+
+def test_a_wind_that_is_none_is_not_taken_in() -> None:
+    for speed in (-0.1, 20.1, float("nan")):
+        with pytest.raises(ValueError, match="0 to 20 m/s is expected"):
+            Direction(20.0, 0.99, no_numbers()).add(speed, 0, frozenset())
+
+
 def test_a_long_tail_is_seen_where_it_is() -> None:
     """With the flights of Gumbel's law its own half of the weights grows, and the boundary lies lower."""
     law = gumbel_l(13.0, 1.5)
