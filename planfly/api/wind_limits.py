@@ -4,8 +4,17 @@ from pathlib import Path
 
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.own_process import in_own_process
-from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.find_winds import (
+    ASKED,
+    USUAL_FLIGHTS,
+    WindsFound,
+    WindsGoal,
+    asked_flights,
+    find_winds,
+    open_winds_store,
+)
 from planfly.campaigns.flights.campaign_base import open_campaign
+from planfly.campaigns.repeated_line import winds_line
 from planfly.campaigns.report.campaign_files import campaign_folder
 from planfly.campaigns.report.wind_files import write_winds
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
@@ -18,7 +27,7 @@ def winds(
     prove: float = 0.99,
     directions: int = 16,
     most: float = 20.0,
-    flights: int = 5000,
+    flights: int | None = None,
     confidence: float = 0.95,
     spread: str | Path | None = None,
     seed: int | None = None,
@@ -31,7 +40,8 @@ def winds(
     """The largest wind from each direction in which a mission flies with a probability, by flights put where they tell.
 
     target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
-    prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all directions.
+    prove: the probability.  directions: 4 to 72.  most: wind to look up to, m/s.  flights: at most, of all
+    directions; None takes 5,000, or those that a search which is resumed was to have.
     confidence: of each interval.  spread, seed, workers, scheduler: as of `planfly.campaign`.
     out: a folder for ``winds.html``, ``winds.png``, ``winds.json`` and the flights; None keeps none.
     resume: go on with the search that is there.  overwrite: replace it.
@@ -46,19 +56,20 @@ def winds(
     """
     for name, value, low, high in (
         ("prove", prove, 0.5, 0.9999999), ("confidence", confidence, 0.5, 0.9999999), ("directions", directions, 4, 72),
-        ("most", most, 1.0, 40.0), ("flights", flights, 1, 10_000_000),
+        ("most", most, 1.0, 40.0), ("flights", USUAL_FLIGHTS if flights is None else flights, 1, 10_000_000),
     ):  # fmt: skip
         if not low <= value <= high:
             raise ValueError(f"{name}: {value:g}: {low:g} to {high:g} is expected")
-    goal = WindsGoal(prove, confidence, directions, most, flights)
     chosen = default_spread() if spread is None else read_spread(Path(spread))
     with campaign_folder(out, WINDS_DATABASE, resume=resume, overwrite=overwrite) as asked:
         folder = asked.folder
+        goal = WindsGoal(prove, confidence, directions, most, asked_flights(flights, folder, resume=resume))
         base = asked.open(
             lambda plan: in_own_process(open_campaign, str(target), chosen.without(ASKED), planned=plan, seed=seed)
         )
         with open_winds_store(base, goal, folder, resume=resume) as store:
             found = find_winds(base, goal, Workers(workers, scheduler), store)
         if out is not None:
-            write_winds(folder, base, found, f"planfly winds {target} --seed {base.seed}")
+            line = winds_line(str(target), goal, {"seed": base.seed, "spread": spread})
+            write_winds(folder, base, found, line)
     return found

@@ -8,9 +8,12 @@ from pathlib import Path
 from planfly.campaigns.campaign_result import make_goal
 from planfly.campaigns.engine.own_process import in_own_process
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.fly_campaign import resumed_goal
+from planfly.campaigns.repeated_line import OPTIONS
 from planfly.campaigns.report.campaign_files import AskedFolder
 from planfly.campaigns.spread.spread_file import FlightSpread, default_spread, read_spread
 from planfly.campaigns.statistics.decision import Goal
+from planfly.named_fences import read_named_fences
 from planfly.pipeline import Advance
 from planfly.terminal.progress import progress
 from planfly.terminal.scenario_options import scenario_change
@@ -19,8 +22,19 @@ from world.errors import PlanflyError
 from world.interruption import Interrupted
 
 
-def campaign_goal(args: argparse.Namespace) -> Goal:
-    """The goal that the options state.  Raises PlanflyError."""
+def campaign_goal(args: argparse.Namespace, folder: Path) -> Goal:
+    """The goal that the options state, or, without any, that of the campaign which is gone on with.
+
+    Raises PlanflyError.
+    """
+    again = args.resume or args.refly is not None
+    if again and (args.flights, args.prove, args.at_least) == (None, None, None):
+        return resumed_goal(None, folder)
+    goal = _stated_goal(args)
+    return resumed_goal(goal, folder) if again else goal
+
+
+def _stated_goal(args: argparse.Namespace) -> Goal:
     try:
         return make_goal(args.flights, args.prove, args.at_least, args.confidence)
     except ValueError as error:
@@ -53,7 +67,7 @@ def tell_interrupted(stop: KeyboardInterrupt, folder: Path, flights: int) -> int
 
 def _opened(args: argparse.Namespace, spread: FlightSpread, planned: Path | None) -> CampaignBase:
     """The mission of the options, planned if it is a scenario and there is no plan of it."""
-    change = scenario_change(args)
+    change, fences = scenario_change(args), read_named_fences(args.fence)
 
     def opened(advance: Advance | None = None) -> CampaignBase:
         return in_own_process(
@@ -65,6 +79,7 @@ def _opened(args: argparse.Namespace, spread: FlightSpread, planned: Path | None
             terrain=args.terrain,
             seed=args.seed,
             change=change,
+            fences=fences,
             advance=advance,
         )
 
@@ -80,10 +95,6 @@ def default_campaign_folder(target: str, kind: str) -> Path:
     return RESULTS / f"{Path(target).stem}-{kind}"
 
 
-def command_line(args: argparse.Namespace) -> str:
-    """The line that repeats it."""
-    names = ("spread", "flights", "prove", "at_least", "seed", "scenario", "terrain")
-    given = "".join(
-        f" --{name.replace('_', '-')} {value}" for name in names if (value := getattr(args, name, None)) is not None
-    )
-    return f"planfly {args.command} {args.target}{given}"
+def repeated_options(args: argparse.Namespace) -> dict[str, object]:
+    """The options that decide what is flown, by name, as they were given."""
+    return {name: getattr(args, name) for name in OPTIONS}

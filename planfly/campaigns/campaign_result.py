@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.own_process import in_own_process
 from planfly.campaigns.flights.campaign_base import open_campaign
-from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
+from planfly.campaigns.repeated_line import campaign_line
 from planfly.campaigns.report.campaign_files import campaign_folder
 from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, summarise
@@ -113,7 +114,8 @@ def campaign(
 
     target: an embedded scenario's name, a scenario's TOML file, or a plan.json, .waypoints or .plan file.
     spread: a TOML file of what varies; None takes planfly's default.
-    flights: how many; None takes 300, or, with ``prove``, 5,000 at most.
+    flights: how many; None takes 300, or, with ``prove``, 5,000 at most.  Without flights, ``prove`` and ``at_least`` a
+    campaign that is resumed goes on with its own.
     prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
     flights.  Not both.
     confidence: of each bound.
@@ -134,12 +136,15 @@ def campaign(
     chosen = default_spread() if spread is None else read_spread(Path(spread))
     with campaign_folder(out, DATABASE, resume=resume, overwrite=overwrite) as asked:
         folder = asked.folder
+        if resume:
+            unasked = (flights, prove, at_least) == (None, None, None)
+            goal = resumed_goal(None if unasked else goal, folder)
         base = asked.open(lambda plan: in_own_process(open_campaign, str(target), chosen, planned=plan, seed=seed))
         with open_store(base, goal, folder, resume=resume) as store:
             estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)
             summary = summarise(base, goal, estimate, store) if out is None else None
         if summary is None:
-            command = f"planfly campaign {target} --seed {base.seed}"
+            command = campaign_line(str(target), goal, {"seed": base.seed, "spread": spread})
             summary = finish_campaign(base, goal, estimate, folder, command)
         table = folder / DATABASE
         return CampaignResult(summary, read_table(table), None if out is None else table)

@@ -1,5 +1,6 @@
 """The largest wind from each direction in which a mission flies: flights put where they tell most, in rounds."""
 
+import math
 from collections.abc import Callable, Hashable
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
@@ -18,7 +19,7 @@ from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.draws import standard_draws, standard_population
 from planfly.campaigns.statistics.flight_choice import next_flights
 from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more
-from planfly.campaigns.storage.held_table import StoreError
+from planfly.campaigns.storage.held_table import StoreError, kept_settings
 from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, FlownFlight, WindsStore
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
@@ -29,6 +30,8 @@ _POPULATION = 4096
 # Flights of a round, about, where few directions are open, and the fewest and the most of one direction: workers wait
 # for each round.
 _ROUND, _FEWEST_EACH, _MOST_EACH = 48, 3, 6
+# A direction that is not settled is looked at again with so many times as many flights: a posterior takes a while.
+_LOOK_AGAIN = 1.04
 # Of a spread, what the wind that is asked about takes the place of.
 ASKED = ("wind_speed", "wind_from")
 
@@ -44,6 +47,19 @@ class WindsGoal:
     directions: int
     most: float
     flights: int
+
+
+# Flights of a search that says no number.
+USUAL_FLIGHTS = 5000
+
+
+def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
+    """The most flights of a search: as asked for, or those that the one in a folder was to have.
+
+    Raises StoreError for a file that is none of ours or is held.
+    """
+    kept = kept_settings(folder / WINDS_DATABASE) if resume else {}
+    return int(kept.get("flights", USUAL_FLIGHTS)) if asked is None else asked
 
 
 @dataclass(frozen=True, repr=False)
@@ -71,7 +87,8 @@ def open_winds_store(base: CampaignBase, goal: WindsGoal, folder: Path, *, resum
     """The search's table in a folder, new or to go on with.
 
     base: of a spread without the quantities of `ASKED`.
-    Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer.
+    Raises StoreError, also for one that was asked for something else; more flights may be asked for, or fewer, of which
+    the others then stay in the table.
     """
     settings = {"name": base.name, "seed": base.seed, "spread": base.spread.to_json(), **asdict(goal)}
     return WindsStore(folder / WINDS_DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
@@ -102,7 +119,6 @@ def find_winds(
             for one in asked:
                 search.take(one, known.flown[one.number])
     pace.tell(len(search.flown), last=True)
-    store.drop_from(len(search.flown))
     return search.found()
 
 
@@ -116,12 +132,14 @@ class _Search:
         )
         self.directions = [Direction(goal.most, goal.target, numbers, goal.confidence) for _ in range(goal.directions)]
         self.open = list(range(goal.directions))
+        # Flights of each direction with which it is looked at whether it is settled.
+        self._looked_at = [FEWEST] * goal.directions
         self.flown: list[tuple[int, float, bool]] = []
         self.lost: list[int] = []
 
     def next_round(self) -> list[AskedFlight]:
         """The flights to fly next; none where all is known or used up."""
-        self.open = [number for number, one in enumerate(self.directions) if self._is_open(one)]
+        self.open = [number for number in self.open if self._is_open(number)]
         each = max(_FEWEST_EACH, min(_MOST_EACH, _ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
         for number in self.open:
@@ -129,17 +147,23 @@ class _Search:
                 asked.append(AskedFlight(len(self.flown) + len(asked), number, speed, draw))
         return asked[: max(0, self.goal.flights - len(self.flown))]
 
-    @staticmethod
-    def _is_open(direction: Direction) -> bool:
+    def _is_open(self, number: int) -> bool:
+        direction = self.directions[number]
         count = len(direction.speeds)
-        return not count or needs_more(direction.boundary(), count, ACCURACY, FEWEST)
+        if count < self._looked_at[number]:
+            return True
+        self._looked_at[number] = math.ceil(_LOOK_AGAIN * count)
+        return needs_more(direction.boundary(), count, ACCURACY, FEWEST)
 
     def take(self, asked: AskedFlight, flown: FlownFlight) -> None:
         """Take a flight in, in the order in which they were asked for."""
         flyable = flown.outcome == "flyable"
         ways: set[Hashable] = {_way(rule, place) for rule, place in flown.failed} or {flown.outcome}
-        room: dict[Hashable, float] = {_way(rule, place): share for rule, place, share in flown.narrow}
         failed = frozenset() if flyable else frozenset(ways)
+        room: dict[Hashable, float] | None = {_way(rule, place): share for rule, place, share in flown.narrow}
+        if flown.outcome == "lost" or any(rule == "completion" for rule, _ in flown.failed):
+            # What it would have passed, had it gone on, is not known.
+            room = None
         self.directions[asked.direction].add(asked.speed, asked.draw, failed, room)
         self.flown.append((asked.direction, asked.speed, flyable))
         if flown.outcome == "lost":

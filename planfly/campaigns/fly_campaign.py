@@ -1,7 +1,7 @@
 """A campaign from its first flight to its answer: flown in parallel, written down by index, told from the table."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
 from planfly.campaigns.engine.cluster import Workers
@@ -13,6 +13,7 @@ from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
+from planfly.campaigns.storage.held_table import StoreError, kept_settings
 from planfly.campaigns.storage.store import DATABASE, Store
 
 Advance = Callable[[float, float, str], None]
@@ -55,18 +56,34 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
     return Tally(flyable + (outcome == "flyable"), failed + (outcome == "not flyable"), lost + (outcome == "lost"))
 
 
+def resumed_goal(asked: Goal | None, folder: Path) -> Goal:
+    """The goal with which a folder's campaign is gone on with: that asked for now, or else its own.
+
+    Raises StoreError for a folder without a campaign.
+    """
+    path = folder / DATABASE
+    kept = kept_settings(path)
+    if not kept:
+        raise StoreError(f"{path}: no campaign there to go on with", file=path)
+    before = Goal(**{one.name: kept[one.name] for one in fields(Goal) if one.name in kept})
+    if asked is None:
+        return before
+    same = (asked.stops, asked.flights) == (before.stops, before.flights)
+    return replace(asked, changed=before.changed or not same)
+
+
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:
-    """The campaign's table in a folder, new or to go on with."""
-    settings = {
-        "name": base.name,
-        "seed": base.seed,
-        "target": goal.target,
-        "stops": goal.stops,
-        "flights": goal.flights,
-        "confidence": goal.confidence,
-        "spread": base.spread.to_json(),
-    }
-    return Store(folder / DATABASE, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
+    """The campaign's table in a folder, new or to go on with.
+
+    Raises StoreError, also where more flights than the goal's are there.
+    """
+    settings = {"name": base.name, "seed": base.seed, "spread": base.spread.to_json(), **asdict(goal)}
+    path = folder / DATABASE
+    store = Store(path, f"{base.world_hash()}-{code_hash()}", settings, resume=resume)
+    if (flown := store.tally().flown) > goal.flights:
+        with store:
+            raise StoreError(f"{path}: flights {goal.flights}: {flown} have been flown there", file=path)
+    return store
 
 
 def fly_campaign(

@@ -7,14 +7,15 @@ from logs.verdict.wording import place_text
 from planfly.campaigns.asked_campaign import (
     campaign_goal,
     campaign_spread,
-    command_line,
     default_campaign_folder,
     open_base,
+    repeated_options,
     tell_interrupted,
 )
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.repeated_line import campaign_line
 from planfly.campaigns.report.campaign_files import fly_row_again
 from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import campaign_lines
@@ -30,8 +31,8 @@ _EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none as
 
 def campaign(args: argparse.Namespace) -> int:
     """Fly a campaign, go on with one, or fly one of its flights again."""
-    goal = campaign_goal(args)
     folder = Path(args.out) if args.out else default_campaign_folder(args.target, "campaign")
+    goal = campaign_goal(args, folder)
     again = args.resume or args.refly is not None
     base = open_base(args, campaign_spread(args), folder, DATABASE, again=again)
     if args.refly is not None:
@@ -49,7 +50,8 @@ def _fly(args: argparse.Namespace, base: CampaignBase, goal: Goal, folder: Path)
         except KeyboardInterrupt as stop:
             return tell_interrupted(stop, folder, store.tally().flown)
     with progress("reporting") as advance:
-        summary = finish_campaign(base, goal, estimate, folder, command_line(args), advance)
+        line = campaign_line(args.target, goal, repeated_options(args))
+        summary = finish_campaign(base, goal, estimate, folder, line, advance)
     print("\n".join(campaign_lines(summary)))
     print(f"results   {folder}/ (report.html, summary.json, {DATABASE}, worst/)")
     give_answer(args, lambda: (folder / "summary.json").read_text(encoding="utf-8"))

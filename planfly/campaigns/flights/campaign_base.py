@@ -14,12 +14,15 @@ from flight.mission.placing import PlacedMission, place_stops
 from flight.mission_files.formats import mission_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.campaigns.spread.spread_file import FlightSpread, SpreadError
+from planfly.named_fences import NamedFences
 from planfly.open_mission import OpenedMission, ScenarioChange, open_mission
 from planfly.pipeline import Advance, make_plan, make_setup
 from planner.plan import Plan, plan_json, read_plan
 from world.atomic_files import write_whole
 from world.errors import MissionError
 from world.scenario import Scenario, load_scenario
+
+_NO_FENCES = NamedFences()
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class CampaignBase:
             json.dumps(self.scenario.to_json(), sort_keys=True),
             "" if terrain is None else hashlib.sha256(terrain.heights.tobytes()).hexdigest(),
             mission_text(self.mission, "waypoints"),
+            repr(self.mission.fences),
             model_hash(model),
             repr(self.airframe.parameters),
             json.dumps(self.spread.to_json(), sort_keys=True),
@@ -68,29 +72,30 @@ def open_campaign(
     terrain: str | None = None,
     seed: int | None = None,
     change: ScenarioChange = lambda scenario: scenario,
+    fences: NamedFences = _NO_FENCES,
     advance: Advance | None = None,
 ) -> CampaignBase:
     """The base of a campaign of a scenario, which is planned here, or of a plan or mission file.
 
     target: an embedded scenario's name, a scenario's TOML file, a plan.json, .waypoints or .plan.
     planned: where a scenario's plan is kept: it is read from there if it is there already, else written.
-    scenario_name, terrain, change: as of `planfly.open_mission.open_mission`.
+    scenario_name, terrain, change, fences: as of `planfly.open_mission.open_mission`; zones are planned around.
     seed: of plan and draws; None takes the scenario's, or 1.
     Raises a PlanflyError for bad input, a plan that is not feasible, and a spread whose middle is no aircraft that
     flies.
     """
     path = Path(target)
     if path.suffix.lower() not in (".json", ".waypoints", ".plan"):
-        scenario = change(load_scenario(target, terrain))
+        scenario = fences.on_scenario(change(load_scenario(target, terrain)))
         kept = planned is not None and planned.is_file()
         plan = read_plan(planned) if kept and planned is not None else _make_plan(scenario, seed, advance)
         if kept and plan.scenario.to_json() != scenario.to_json():
             raise MissionError(f"{planned}: is the plan of another scenario than {target}", file=str(planned))
         if planned is not None and not kept:
             write_whole(planned, plan_json(plan))
-        base = _of_plan(plan, spread, choose_seed(scenario, seed))
+        base = _of_plan(plan, fences, spread, choose_seed(scenario, seed))
     else:
-        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change)
+        opened = open_mission(path, scenario_name, terrain, seed=seed, change=change, fences=fences)
         base = _of_mission(opened, spread, path.name)
     check_middle(base)
     # A mission that cannot be laid out is refused here, not by a worker.
@@ -107,11 +112,12 @@ def _make_plan(scenario: Scenario, seed: int | None, advance: Advance | None) ->
     return plan
 
 
-def _of_plan(plan: Plan, spread: FlightSpread, seed: int) -> CampaignBase:
+def _of_plan(plan: Plan, fences: NamedFences, spread: FlightSpread, seed: int) -> CampaignBase:
     scenario = plan.scenario
     airframe = load_airframe(scenario)
     tracking = airframe.limits.tracking
     mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, source="plan.json", tracking=tracking)
+    mission = fences.on_mission(mission)
     placed = place_stops(mission, scenario.origin, scenario.terrain)
     return CampaignBase(scenario, airframe, mission, placed, plan, spread, seed, scenario.name)
 

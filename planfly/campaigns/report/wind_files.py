@@ -10,6 +10,7 @@ from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.pictures.go_no_go import Spoke, draw_go_no_go
 from planfly.campaigns.report.page import winds_page
+from planfly.campaigns.statistics.proportions import Tally, lower_bound
 from planfly.campaigns.statistics.wind_boundary import needs_more
 from world.atomic_files import write_whole
 
@@ -98,16 +99,32 @@ def _lost_lines(found: WindsFound) -> list[str]:
     return [f"lost      {len(found.lost)} could not be flown, their workers died, and count as not flyable: {named}"]
 
 
+def _none_failed_lines(found: WindsFound) -> list[str]:
+    """What the flights of directions in which none failed show by themselves."""
+    most, confidence = found.goal.most, found.goal.confidence
+    at_most = Counter(direction for direction, speed, _ in found.flights if speed == most)
+    failed = {direction for direction, _, flyable in found.flights if not flyable}
+    counts = [at_most[k] for k in range(len(found.boundaries)) if k not in failed and at_most[k]]
+    if not counts:
+        return []
+    fewest, shown = min(counts), f"{lower_bound(Tally(min(counts), 0), confidence):.3g}"
+    return [
+        f"none failed from {len(counts)} of {len(found.boundaries)} directions: {fewest} flights in {most:g} m/s from"
+        f" each show P >= {shown} by themselves"
+    ]
+
+
 def wind_lines(found: WindsFound) -> list[str]:
     """What was found, in a few lines."""
     chart = spokes(found)
     least, largest = (pick(chart, key=lambda one: one.boundary) for pick in (min, max))
-    most = found.goal.most
+    most, percent = found.goal.most, f"{100 * found.goal.confidence:g} %"
     return [
-        f"flies with P >= {found.goal.target:g} in wind up to {_speed_text(least.boundary, most)}"
-        f" from {least.from_deg:g}° (the least), {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        f"flies with P >= {found.goal.target:g}, by best estimate, in wind up to {_speed_text(least.boundary, most)}"
+        f" from {least.from_deg:g}° (the least; {least.low:.1f} to {least.high:.1f} m/s at {percent}),"
+        f" {_speed_text(largest.boundary, most)} from {largest.from_deg:g}°",
+        *_none_failed_lines(found),
         *_open_lines(found),
         *_lost_lines(found),
-        f"{len(found.flights)} flights; intervals at {100 * found.goal.confidence:g} %, by the flights"
-        " of each direction",
+        f"{len(found.flights)} flights; intervals at {percent}, by the flights of each direction",
     ]

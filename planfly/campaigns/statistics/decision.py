@@ -16,18 +16,22 @@ class Goal:
     target: the probability to reach; None where it is only to be told.
     stops: whether flying stops as soon as the answer is known (`--prove`); otherwise the number of flights is fixed.
     flights: fixed number, or the most where it stops.
+    changed: whether another number was to be fixed first, and some of its flights were flown.
     """
 
     target: float | None
     stops: bool
     flights: int
     confidence: float = 0.95
+    changed: bool = False
 
     @property
     def method(self) -> str:
         """By which the bounds are had, for a person."""
         if self.stops:
             return "beta-binomial mixture, valid at every number of flights"
+        if self.changed:
+            return "Clopper-Pearson, one-sided, but the number of flights was changed after some: it holds less often"
         return "Clopper-Pearson, one-sided, for the number of flights fixed beforehand"
 
 

@@ -4,6 +4,7 @@ import errno
 import json
 import sqlite3
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -127,6 +128,19 @@ class HeldTable:
         """How many flights came out how."""
         counts = dict(self._connection.execute("SELECT outcome, COUNT(*) FROM flights GROUP BY outcome"))
         return Tally(counts.get("flyable", 0), counts.get("not flyable", 0), counts.get("lost", 0))
+
+
+def kept_settings(path: Path) -> dict[str, Any]:
+    """What the flights of a table were asked for with; nothing where there is no such file.
+
+    Raises StoreError for a file that is none of ours or is held.
+    """
+    if not path.is_file():
+        return {}
+    with told_errors(path), closing(sqlite3.connect(path, timeout=1.0)) as connection:
+        found = connection.execute("SELECT value FROM campaign WHERE key = 'settings'").fetchone()
+    settings: dict[str, Any] = json.loads(found[0]) if found else {}
+    return settings
 
 
 def refuse_held(path: Path) -> None:

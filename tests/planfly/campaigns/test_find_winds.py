@@ -17,7 +17,7 @@ from planfly.campaigns import find_winds as module
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.flight_loop import Flown, Order
 from planfly.campaigns.engine.flight_tasks import FlyOne
-from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, asked_flights, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.flights.varied_flight import GivenWind
@@ -165,8 +165,18 @@ def test_more_flights_or_fewer_go_on_as_if_asked_at_once(wind_base: CampaignBase
     first, asked_many = (searched(wind_base, tmp_path / name, goal) for name, goal in (("a", few), ("many", many)))
     assert len(first.flights) == 31
     assert same((searched(wind_base, tmp_path / "a", many), tmp_path / "a"), (asked_many, tmp_path / "many"))
-    assert same((searched(wind_base, tmp_path / "a", few), tmp_path / "a"), (first, tmp_path / "a"))
-    assert len(table(tmp_path / "a" / WINDS_DATABASE)) == 31
+    # Fewer are told of, and none of the others is lost.
+    assert searched(wind_base, tmp_path / "a", few) == first
+    assert len(table(tmp_path / "a" / WINDS_DATABASE)) == len(asked_many.flights)
+
+
+@pytest.mark.usefixtures("here")
+def test_a_search_that_is_gone_on_with_keeps_its_number_of_flights(wind_base: CampaignBase, tmp_path: Path) -> None:
+    assert asked_flights(None, tmp_path, resume=False) == asked_flights(None, tmp_path, resume=True) == 5000
+    searched(wind_base, tmp_path, replace(GOAL, flights=31))
+    assert asked_flights(None, tmp_path, resume=True) == 31
+    assert asked_flights(48, tmp_path, resume=True) == 48
+    assert asked_flights(None, tmp_path, resume=False) == 5000
 
 
 @pytest.mark.usefixtures("here")

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,10 +19,11 @@ from planfly.campaigns.engine.flight_loop import Order, Pilots
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store
+from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
 from planfly.campaigns.report.summary import summarise
 from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally, lower_bound
+from planfly.campaigns.storage.held_table import StoreError
 from planfly.campaigns.storage.read_table import read_table
 from planfly.campaigns.storage.store import DATABASE
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
@@ -113,6 +115,42 @@ def test_the_table_is_the_same_for_any_workers_and_after_a_stop(base: CampaignBa
     keep(base, tmp_path / "part", (0, 1, 2, 5, 9))
     flown(base, goal, tmp_path / "part", Workers(2))
     assert table(tmp_path / "part" / DATABASE) == want
+
+
+def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_path: Path) -> None:
+    with pytest.raises(StoreError, match="no campaign there to go on with"):
+        resumed_goal(None, tmp_path)
+    asked = Goal(0.9, False, 40, 0.8)
+    with open_store(base, asked, tmp_path, resume=False):
+        pass
+    assert resumed_goal(None, tmp_path) == asked
+    assert resumed_goal(replace(asked, target=0.95), tmp_path) == replace(asked, target=0.95)
+
+
+def test_a_number_of_flights_that_was_changed_is_said_to_be(base: CampaignBase, tmp_path: Path) -> None:
+    """Bounds for a number fixed beforehand are no such bounds then; nor is it forgotten at the next time."""
+    keep(base, tmp_path, range(3))
+    more = resumed_goal(Goal(None, False, 6), tmp_path)
+    assert more.changed
+    assert "changed" in more.method
+    assert "changed" not in Goal(None, False, 6).method
+    with open_store(base, more, tmp_path, resume=True):
+        pass
+    assert resumed_goal(None, tmp_path) == resumed_goal(Goal(None, False, 6), tmp_path) == more
+    # One that stops is valid at any number.
+    assert "changed" not in resumed_goal(Goal(0.9, True, 6), tmp_path).method
+
+
+def test_fewer_flights_than_were_flown_are_refused_and_none_is_lost(base: CampaignBase, tmp_path: Path) -> None:
+    with open_store(base, Goal(None, False, 5), tmp_path, resume=False) as store:
+        for k in range(5):
+            store.add(made_flight(base, k, None))
+    before = table(tmp_path / DATABASE)
+    with pytest.raises(StoreError, match="flights 4: 5 have been flown there"):
+        open_store(base, Goal(None, False, 4), tmp_path, resume=True)
+    assert table(tmp_path / DATABASE) == before
+    with open_store(base, Goal(None, False, 5), tmp_path, resume=True) as store:
+        assert store.tally().flown == 5
 
 
 @pytest.mark.skipif(not SOAK, reason="flights in earnest on seven workers: in make soak")

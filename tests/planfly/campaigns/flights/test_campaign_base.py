@@ -24,7 +24,8 @@ def test_it_has_the_mission_as_fly_opens_it(base: CampaignBase, tmp_path: Path) 
 def test_the_hash_is_of_all_that_decides_a_flight(base: CampaignBase) -> None:
     other = parse_spread('[mass]\ndistribution = "norm"\nloc = 1.0\nscale = 0.02\nsource = "x"', "x")
     assert base.world_hash() == replace(base, name="another").world_hash()
-    for changed in (replace(base, seed=2), replace(base, spread=other)):
+    fenced = replace(base.mission, fences=base.mission.items[:1])
+    for changed in (replace(base, seed=2), replace(base, spread=other), replace(base, mission=fenced)):
         assert changed.world_hash() != base.world_hash()
 
 

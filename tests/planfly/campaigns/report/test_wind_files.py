@@ -20,7 +20,23 @@ FOUND = WindsFound(
 def test_flights_are_counted_by_wind() -> None:
     first = spokes(FOUND)[0]
     assert (first.from_deg, first.flights) == (0.0, ((8.0, 2, 1),))
-    assert wind_lines(FOUND)[0].startswith("flies with P >= 0.9 in wind up to 7.0 m/s from 0° (the least), over 20 m/s")
+    assert wind_lines(FOUND)[0] == (
+        "flies with P >= 0.9, by best estimate, in wind up to 7.0 m/s from 0° (the least; 6.5 to 7.5 m/s at 95 %),"
+        " over 20 m/s from 270°"
+    )
+
+
+def test_what_flights_show_by_themselves_where_none_failed() -> None:
+    """Of 132 in the largest wind 0.05 ** (1 / 132) at 95 %; fewer of one direction show less."""
+    flights = (*((3, 20.0, True) for _ in range(132)), (3, 10.0, True), (0, 20.0, False))
+    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("none failed"))
+    assert line == "none failed from 1 of 4 directions: 132 flights in 20 m/s from each show P >= 0.978 by themselves"
+    flights += tuple((2, 20.0, True) for _ in range(58))
+    (line,) = (one for one in wind_lines(replace(FOUND, flights=flights)) if one.startswith("none failed"))
+    assert "from 2 of 4 directions: 58 flights" in line
+    assert "P >= 0.95 by" in line
+    failed = replace(FOUND, flights=((3, 20.0, False), (0, 10.0, True)))
+    assert not any(one.startswith("none failed") for one in wind_lines(failed))
 
 
 def test_directions_for_which_flights_did_not_last_are_said() -> None:
