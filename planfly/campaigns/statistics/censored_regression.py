@@ -40,6 +40,7 @@ _ROOM = 10.0
 # Where Newton's method begins: few fail, and more in more wind; and of the room's coefficient.
 _START, _ROOM_START = (-3.0, np.log(0.3)), 1.0
 _STEPS, _CONVERGED, _LEAST_SHARE, _LEAST_CURVATURE, _MOST_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
+_OF_THE_WAY = 0.9
 # Of a flight that passed, on either link's scale.
 _MOST_PREDICTOR = 30.0
 # Points of a posterior's sample.
@@ -97,8 +98,10 @@ class RegressionFit:
         return self._posterior.sample(self._mode)
 
 
-def fit_regression(outcomes: Outcomes, link: BinaryLink) -> RegressionFit:
+def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | None = None) -> RegressionFit:
     """The regression by the prior of the draws' coefficients that has the most evidence.
+
+    near: another, of the same coefficients, whose mode is a place to look from, too; that of room alone may have two.
 
     >>> from planfly.campaigns.statistics.links import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
@@ -110,7 +113,12 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink) -> RegressionFit:
     """
     # Where nothing is known of what is drawn, its coefficients' prior is none's.
     priors = _DRAWS if outcomes.terms.shape[1] > 2 else _DRAWS[:1]
-    fits = (_fit(_Posterior(outcomes, link, deviation)) for deviation in priors)
+    fits = []
+    for deviation in priors:
+        posterior = _Posterior(outcomes, link, deviation)
+        fits += [
+            _fit(posterior, at) for at in ([posterior.start()] if near is None else [posterior.start(), near._mode])
+        ]
     return max(fits, key=lambda fit: fit.log_evidence)
 
 
@@ -217,13 +225,14 @@ class _Posterior:
         return self._outcomes.terms @ beta[: self.size]
 
 
-def _fit(posterior: _Posterior) -> RegressionFit:
-    """The posterior's mode, and the inverse of its curvature there.
+def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
+    """The posterior's mode, looked for from a point, and the inverse of its curvature there.
 
     By Newton's method with halved steps; where the loss is not convex, which that of room alone need not be, by the
-    curvature's absolute eigenvalues (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, section 3.4).
+    curvature's absolute eigenvalues (Nocedal and Wright, Numerical Optimization, 2nd edition, 2006, sections 3.4 and
+    19.2).
     """
-    at, size = posterior.start(), posterior.size
+    size = posterior.size
 
     def loss(point: Floats) -> float:
         return -float(posterior.log_density(point[None])[0])
@@ -233,7 +242,9 @@ def _fit(posterior: _Posterior) -> RegressionFit:
         slope, curvature = posterior.slope_and_curvature(at)
         eigenvalues, axes = np.linalg.eigh(curvature)
         step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _LEAST_CURVATURE))
-        share = 1.0
+        # The room's coefficient is above 0: towards it only so much of the way, where halves would end at it.
+        towards = step[-1] if posterior.by_room else 0.0
+        share = min(1.0, _OF_THE_WAY * at[-1] / towards) if towards > 0.0 else 1.0
         while not (tried := loss(at - share * step)) <= value and share > _LEAST_SHARE:
             share *= 0.5
         at, value = at - share * step, tried

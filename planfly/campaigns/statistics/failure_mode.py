@@ -57,7 +57,7 @@ def fit_mode(terms: Floats, failed: Bools, room: Floats, link: BinaryLink) -> Fa
         return _mode(link, one_law, one_law.log_evidence)
     alone, passes = fit_regression(outcomes.without_room(), link), outcomes.only_room()
     # The room's own law, of whichever link, says nothing of failing's.
-    two_laws = alone.log_evidence + max(fit_regression(passes, any_link).log_evidence for any_link in LINKS)
+    two_laws = alone.log_evidence + max(fit_regression(passes, any_link, one_law).log_evidence for any_link in LINKS)
     if two_laws > one_law.log_evidence:
         return _mode(link, alone, two_laws)
     return _mode(link, one_law, one_law.log_evidence)

@@ -17,14 +17,22 @@ from planfly.campaigns import find_winds as module
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.flight_loop import Flown, Order
 from planfly.campaigns.engine.flight_tasks import FlyOne
-from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, asked_flights, find_winds, open_winds_store
+from planfly.campaigns.find_winds import (
+    ASKED,
+    WindsFound,
+    WindsGoal,
+    _Search,
+    asked_flights,
+    find_winds,
+    open_winds_store,
+)
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.storage.held_table import StoreError
 from planfly.campaigns.storage.row_values import row_of
-from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight, narrow_passes_of
+from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight, FlownFlight, narrow_passes_of
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     deadly_in_the_east,
@@ -37,6 +45,7 @@ from tests.planfly.campaigns.slow_client import winds_goal
 from tests.soak import SOAK, note, scaled
 
 pytestmark = pytest.mark.filterwarnings("default")
+LEG = Place("leg", 3)
 GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
 FEWER = WindsGoal(0.9, 0.95, 4, 20.0, 200)
 
@@ -168,6 +177,26 @@ def test_more_flights_or_fewer_go_on_as_if_asked_at_once(wind_base: CampaignBase
     # Fewer are told of, and none of the others is lost.
     assert searched(wind_base, tmp_path / "a", few) == first
     assert len(table(tmp_path / "a" / WINDS_DATABASE)) == len(asked_many.flights)
+
+
+@pytest.mark.parametrize(
+    ("flown", "room"),
+    [
+        (FlownFlight("flyable", (), (("slope", LEG, 0.25),)), {("slope", "leg", 3): 0.25}),
+        (FlownFlight("flyable", ()), {}),
+        (FlownFlight("not flyable", (("threat", LEG),), (("slope", LEG, 0.25),)), {("slope", "leg", 3): 0.25}),
+        # It ended before: what it would have passed is not known, narrowly or not.
+        (FlownFlight("not flyable", (("threat", LEG), ("completion", Place("flight"))), (("slope", LEG, 0.25),)), None),
+        (FlownFlight("lost", ()), None),
+    ],
+)
+def test_a_flight_that_did_not_go_on_to_its_end_tells_of_no_room(
+    wind_base: CampaignBase, flown: FlownFlight, room: dict[Any, float] | None
+) -> None:
+    search = _Search(GOAL, wind_base)
+    search.take(AskedFlight(0, 2, 8.0, 0), flown)
+    assert search.directions[2].room == [room]
+    assert search.directions[2].speeds == [8.0]
 
 
 @pytest.mark.usefixtures("here")

@@ -41,13 +41,15 @@ def test_links_weigh_as_they_do() -> None:
         assert boundary_quantiles(mixed, NOTHING, 0.01, 20.0, (0.5,)) == pytest.approx([expected], abs=0.01)
 
 
-def test_draws_spread_the_share_that_fails() -> None:
-    """By a normal draw on a normal law: both together are normal.  And where draws decide nearly all of it."""
+@pytest.mark.parametrize(("at_10", "by_wind", "by_draw"), [(-4.0, 0.5, 1.0), (-20.0, 3.0, 8.0), (-3.0, 0.1, 0.5)])
+def test_draws_spread_the_share_that_fails(at_10: float, by_wind: float, by_draw: float) -> None:
+    """By a normal draw on a normal law: both together are normal.  Also where draws decide nearly all of it."""
     draws = norm.ppf((np.random.default_rng(2).permutation(4096)[:, None] + 0.5) / 4096)
-    for by_draw in (1.0, 8.0):
-        found = boundary_quantiles(alone(one_mode([-1.0, 0.5, by_draw], [1e-3] * 3)), draws, 0.01, 20.0, (0.5,))
-        expected = max(0.0, 12.0 + np.hypot(1.0, by_draw) * norm.ppf(0.01) / 0.5)
-        assert found == pytest.approx([expected], abs=0.03)
+    mode = one_mode([at_10, by_wind, by_draw], [1e-6] * 3, count=64)
+    found = boundary_quantiles(alone(mode), draws, 0.01, 20.0, (0.5,))
+    expected = 10.0 + (np.hypot(1.0, by_draw) * norm.ppf(0.01) - at_10) / by_wind
+    assert 5.0 < expected < 20.0
+    assert found == pytest.approx([expected], abs=0.01)
 
 
 def test_modes_are_known_apart_from_each_other() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import gumbel_l, lognorm, norm
 
-from planfly.campaigns.statistics.censored_regression import Outcomes, fit_regression
+from planfly.campaigns.statistics.censored_regression import Outcomes, _Posterior, fit_regression
 from planfly.campaigns.statistics.links import CLOGLOG, PROBIT, BinaryLink
 
 Floats = NDArray[np.float64]
@@ -68,6 +68,42 @@ def test_room_alone_gives_the_coefficients_of_the_law_it_has(link: BinaryLink, l
     assert (np.abs(fit.mean - TRUTH) < 4.0 * np.sqrt(np.diag(fit.covariance))).all()
     assert np.sqrt(np.diag(fit.covariance)).max() < 0.1
     assert fit.by_room == pytest.approx(1.0 / SPREAD, rel=0.1)
+
+
+def battery_flights(seed: int) -> Outcomes:
+    """Few that fail, all near the largest wind and by their draws: least of many thresholds, in steep regression."""
+    random = np.random.default_rng(seed)
+    wind = np.concatenate((np.repeat([0.0, 5.0, 7.5, 8.8, 9.4, 9.7], 3), np.full(120, 10.0)))
+    terms = np.column_stack((np.ones(wind.size), wind, random.normal(size=(wind.size, 2))))
+    x = terms @ np.array([-76.0, 6.7, 5.0, 2.0])
+    room = (gumbel_l.rvs(size=wind.size, random_state=random) - x) / 3.5
+    return Outcomes(terms, room < 0.0, room.clip(0.0, 1.0))
+
+
+def test_room_alone_is_looked_for_from_where_the_one_law_is_too() -> None:
+    """Its posterior may have a second mode, of exponential room whatever the wind: from afar that may be found."""
+    found = []
+    for seed in range(6):
+        flights = battery_flights(seed)
+        one_law = fit_regression(flights, CLOGLOG)
+        near, afar = (fit_regression(flights.only_room(), CLOGLOG, start) for start in (one_law, None))
+        found.append(near.log_evidence - afar.log_evidence)
+        # Whichever: it is no less than what any simplex finds that starts from the one law.
+        highest = minimize(
+            lambda at, fit=near: -float(fit._posterior.log_density(at[None])[0]), one_law._mode, tol=1e-6
+        )
+        assert near._posterior.log_density(near._mode[None])[0] >= -highest.fun - 0.01
+    assert min(found) >= 0.0
+    assert max(found) > 3.0
+
+
+def test_what_could_as_good_as_never_have_flown_is_impossible_not_certain() -> None:
+    """Where a rate is beyond all numbers, its differences with others are none."""
+    posterior = _Posterior(battery_flights(1).only_room(), CLOGLOG, 1.5)
+    points = np.array([[800.0, 0.0, 0.0, 0.0, 1.0], [40.0, -3.0, 0.0, 0.0, 1.0], [-10.0, -1.0, 0.0, 0.0, 1.0]])
+    found = posterior.log_density(points)
+    assert (found[:2] == -np.inf).all()
+    assert np.isfinite(found[2])
 
 
 def test_more_wind_never_has_fewer_fail() -> None:

@@ -62,6 +62,20 @@ def test_each_way_has_the_room_that_flights_had_of_it() -> None:
         assert one.mean == pytest.approx(same.mean)
 
 
+def test_room_that_is_not_known_is_not_taken_for_much() -> None:
+    """A flight that passed by a scale or more tells that; one of which it is not known, that it passed."""
+    random = np.random.default_rng(4)
+    terms = regressors(random.uniform(2.0, 18.0, 1500), random.normal(size=(1500, 2)))
+    slope = 0.5 * (random.normal(size=1500) - terms @ FIRST)
+    ways: list[frozenset[Hashable]] = [frozenset({"slope"} if room < 0.0 else ()) for room in slope]
+    shares: list[dict[Hashable, float] | None] = [{"slope": room} if 0.0 <= room < 1.0 else {} for room in slope]
+    half: list[dict[Hashable, float] | None] = [some if k % 2 else None for k, some in enumerate(shares)]
+    for known in (shares, half):
+        (mode,) = fit_modes(terms, ways, PROBIT, known)
+        assert mode.by_room == pytest.approx(2.0, rel=0.15)
+        assert mode.mean == pytest.approx(FIRST, abs=0.2)
+
+
 def test_the_way_in_which_most_failed_comes_first() -> None:
     """One that came only with another has no flights left to be fitted to."""
     terms, _ = made_flights(60, 5)

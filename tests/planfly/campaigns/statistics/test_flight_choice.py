@@ -90,8 +90,8 @@ def told_of(fit: FailureFit, row: np.ndarray) -> list[float]:
 
 
 def test_a_flight_gains_what_it_takes_from_the_boundarys_variance() -> None:
-    """By the posterior's precision with the flight's information added, inverted: of two modes, one after another."""
-    fit = fit_of([-1.0, 0.4, 0.8], [-2.0, 0.3, -0.5], weight=0.7)
+    """By the posterior's precision with the flight's information added, inverted: of three modes, one after another."""
+    fit = fit_of([-1.0, 0.4, 0.8], [-2.0, 0.3, -0.5], [-0.5, 0.2, 0.1], weight=0.7)
     belief, known = _Belief(fit), [mode.covariance for mode in fit.modes]
     for _ in range(2):
         gains, after = belief.gains(ROWS), []
