@@ -4,9 +4,12 @@
 metre a second below and above each boundary that ``planfly winds jacksboro`` found, in other weather and with other
 aircraft than that had, and adds the counts to ``tests/authorities/winds_reference.json``: some minutes a point.  A
 point ends early where its share of flyable flights is above or below the target with 99 % confidence, valid at every
-number of flights.  The boundary is right within half a metre a second where the share is at least the target below,
-and at most the target above; where it is otherwise by no more than 1,000 flights may be off, that is said, too: at 95 %
-by Clopper and Pearson's bound.
+number of flights.
+
+The reference's own boundary is that of the likeliest normal law through a direction's points, and its interval that of
+the likelihood ratio, with the law's slope free.  A boundary is right that lies within half a metre a second of it, and
+shown wrong if it does of no wind in the interval.  A direction with a single point, in which all fly that have to, has
+its boundary above that.
 """
 
 import argparse
@@ -16,6 +19,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.stats import chi2, norm
+
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.flight_loop import Order, hired_pilots
 from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
@@ -23,8 +29,7 @@ from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Estimator, Goal
-from planfly.campaigns.statistics.proportions import Tally, lower_bound, upper_bound
-from planfly.campaigns.statistics.wind_boundary import WindBoundary
+from planfly.campaigns.statistics.proportions import Tally
 
 REFERENCE = Path(__file__).parents[2] / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
@@ -66,30 +71,38 @@ def winds_row() -> dict[str, float]:
     """Flights that the boundaries take, and of the reference's directions those that are right within 0.5 m/s."""
     found = found_winds()
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
-    pairs = [(found.boundaries[int(direction)], points) for direction, points in kept.items()]
+    pairs = [(found.boundaries[int(direction)].estimate, points) for direction, points in kept.items()]
     return {
         "winds of the demo, 16 directions: flights": len(found.flights),
         "winds: directions with a reference": len(kept),
-        "winds: of these right within 0.5 m/s": sum(_is_right(one, points, 0.0) for one, points in pairs),
-        "winds: of these not shown wrong at 95 %": sum(_is_right(one, points, 0.95) for one, points in pairs),
+        "winds: of these right within 0.5 m/s": sum(is_within(one, points, 0.0) for one, points in pairs),
+        "winds: of these not shown wrong at 95 %": sum(is_within(one, points, 0.95) for one, points in pairs),
     }
 
 
-def _is_right(boundary: WindBoundary, points: list[dict[str, Any]], confidence: float) -> bool:
-    """Whether no point further than half a metre a second from a boundary contradicts it.
+def is_within(boundary: float, points: list[dict[str, Any]], confidence: float) -> bool:
+    """Whether a boundary, m/s, is within half a metre a second of the reference's, or, of a confidence, may be."""
+    low, high = reference_interval(points, confidence)
+    return low - WITHIN <= boundary <= high + WITHIN
 
-    confidence: with which a point does; 0 for by its share alone.
-    Above a boundary beyond all that was looked at nothing does.
+
+def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple[float, float]:
+    """Of the reference's boundary, m/s; of confidence 0 the likeliest twice.
+
+    >>> points = [{"speed": 8.0, "flights": 1000, "flyable": 995}, {"speed": 9.0, "flights": 1000, "flyable": 985}]
+    >>> [round(one, 1) for one in reference_interval(points, 0.0)]
+    [8.5, 8.5]
     """
-    for point in points:
-        tally = Tally(point["flyable"], point["flights"] - point["flyable"], 0)
-        most = upper_bound(tally, confidence) if confidence else tally.share
-        least = lower_bound(tally, confidence) if confidence else tally.share
-        if point["speed"] <= boundary.estimate - WITHIN + 0.05 and most < GOAL.target:
-            return False
-        if point["speed"] >= boundary.estimate + WITHIN - 0.05 and least > GOAL.target and not boundary.beyond:
-            return False
-    return True
+    speeds, flights, flyable = (np.array([one[name] for one in points]) for name in ("speed", "flights", "flyable"))
+    if (flyable >= GOAL.target * flights).all() and len(points) == 1:
+        return float(speeds[0]), GOAL.most
+    # Of a law that begins to fail 1 - P here and grows so steeply, 1/(m/s).
+    boundary, slope = np.arange(0.0, 30.0, 0.05), np.geomspace(0.02, 20.0, 120)
+    x = norm.isf(GOAL.target) + slope[:, None, None] * (speeds - boundary[:, None])
+    likelihood = (flyable * norm.logsf(x) + (flights - flyable) * norm.logcdf(x)).sum(axis=-1).max(axis=0)
+    likely = boundary[likelihood >= likelihood.max() - 0.5 * chi2.ppf(confidence, 1)]
+    # Beyond the largest wind that is looked at all are the same.
+    return min(float(likely[0]), GOAL.most), min(float(likely[-1]), GOAL.most)
 
 
 def main() -> None:
