@@ -91,7 +91,7 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
 
     >>> points = [{"speed": 8.0, "flights": 1000, "flyable": 995}, {"speed": 9.0, "flights": 1000, "flyable": 985}]
     >>> [round(one, 1) for one in reference_interval(points, 0.0)]
-    [8.5, 8.5]
+    [8.6, 8.6]
     """
     speeds, flights, flyable = (np.array([one[name] for one in points]) for name in ("speed", "flights", "flyable"))
     if (flyable >= GOAL.target * flights).all() and len(points) == 1:
