@@ -179,7 +179,8 @@ class _Posterior:
         Of few failures the wind's coefficient is known within factors, and the constant follows from it: points are
         spread over the predictor in the wind in which it is best known, where it does not.
         """
-        covariance = np.linalg.inv(self.slope_and_curvature(mode)[1])
+        eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
+        covariance = axes / np.maximum(np.abs(eigenvalues), _LEAST_CURVATURE) @ axes.T
         best_known = -covariance[0, 1] / (covariance[1, 1] * np.exp(mode[1]))
         # By the predictor there, or by the constant: the one's density is the other's.
         turn = np.eye(mode.size)

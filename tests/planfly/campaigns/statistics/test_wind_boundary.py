@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import gumbel_l, norm
 
 from planfly.campaigns.statistics.flight_choice import next_flights
-from planfly.campaigns.statistics.wind_boundary import Direction, WindBoundary, needs_more
+from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
 from tests.soak import scaled
 
@@ -131,6 +131,26 @@ def _summed(counts: dict[float, tuple[int, int]]) -> list[float]:
     return [
         float(np.interp(part, np.cumsum(weights[order]) / weights.sum(), every[order])) for part in (0.025, 0.5, 0.975)
     ]
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("seed", range(scaled(500, 20)))
+def test_any_flights_have_an_answer(seed: int) -> None:
+    """Of few flights or many, that fail by chance, by wind, against it, by a draw or once; in one way or several."""
+    random = np.random.default_rng(seed)
+    quantities, target = int(random.integers(0, 4)), float(random.choice([0.5, 0.9, 0.99, 0.9999]))
+    draws, population = random.normal(size=(5000, quantities)), random.normal(size=(256, quantities))
+    direction = Direction(20.0, target, DrawnNumbers(population, lambda start, stop: draws[start:stop]))
+    for k in range(int(random.integers(2, 60))):
+        speed = float(random.choice([0.0, 20.0, random.uniform(0.0, 20.0)]))
+        by_a_draw = bool(quantities and draws[k, 0] > 1.0)
+        failed = (random.random() < 0.5, speed > 10.0, speed < 10.0, by_a_draw, k == 0)[seed % 5]
+        ways = random.choice(["a", "b", "c"], size=random.integers(1, 3)).tolist() if failed else ()
+        room = {way: float(random.choice([0.0, 1e-9, 0.5, random.random()])) for way in "ab" if random.random() < 0.5}
+        direction.add(speed, k, frozenset(ways), None if random.random() < 0.2 else room)
+    found = direction.boundary()
+    assert 0.0 <= found.low <= found.estimate <= found.high <= 20.0
+    assert all(0.0 <= speed <= 20.0 for speed, _ in next_flights(direction, 3))
 
 
 def test_a_wind_that_is_none_is_not_taken_in() -> None:
