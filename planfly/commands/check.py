@@ -23,9 +23,6 @@ def check(args: argparse.Namespace) -> int:
     """Judge without flying; the exit code is the verdict's, or 3 for a log that is cut short."""
     source = Path(args.file)
     if is_field_log(source):
-        if args.fence:
-            allowed = "goes with a log of planfly's: import this one first"
-            raise ScenarioError.at(source, "--fence", args.fence, allowed, shown="")
         return _check_field_log(source, args)
     _refuse_field_options(source, args)
     fences = read_named_fences(args.fence)

@@ -2,7 +2,7 @@
 
 import hashlib
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +31,7 @@ from logs.verdict.field.wrong_plan import plan_mismatch
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight
 from planfly.airframe import find_airframe
+from planfly.named_fences import NamedFences
 from planfly.open_mission import ScenarioChange, open_plan
 from world.errors import LogError, MissionError
 from world.scenario import Scenario, load_scenario
@@ -52,6 +53,7 @@ class FieldOptions:
     datum: of the log's heights where it states none.
     number: which flight of the log, from 1.
     wind_given: the wind is another's, not the log's.
+    fences: to be kept to beside the mission's and the scenario's own.
     """
 
     plan: Path | None = None
@@ -61,6 +63,7 @@ class FieldOptions:
     datum: VerticalDatum | None = None
     number: int | None = None
     wind_given: bool = False
+    fences: NamedFences = field(default_factory=NamedFences)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,12 +94,13 @@ def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> 
     """
     flight = make_flight(open_log(path), options.number)
     mission, origin_of_mission, planned_in = _mission(path, flight, options)
+    mission = options.fences.on_mission(mission)
     plan_heights = options.plan is not None or flight.mission is None or flight.mission.with_heights
     if not plan_heights:
         mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
     scenario, placed = _world(mission, options, planned_in)
     parameters, refused = logged_parameters(flight.raw)
-    scenario, wind_source = _in_its_wind(change(scenario), flight, options)
+    scenario, wind_source = _in_its_wind(options.fences.on_scenario(change(scenario)), flight, options)
     known = options.aircraft is not None or options.scenario is not None or planned_in is not None
     setup = _setup(scenario, placed, mission, parameters, flight)
     heights = flight.heights

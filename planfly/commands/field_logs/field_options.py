@@ -4,11 +4,15 @@ import argparse
 from pathlib import Path
 
 from planfly.field.field_flights import FieldOptions
+from planfly.named_fences import read_named_fences
 from world.errors import ScenarioError
 
 
 def field_options(args: argparse.Namespace) -> FieldOptions:
-    """Plan, world and aircraft of the options.  Raises ScenarioError for one that a flown log cannot take."""
+    """Plan, world and aircraft of the options.
+
+    Raises ScenarioError for one that a flown log cannot take, and as `read_named_fences` does.
+    """
     source = args.log if hasattr(args, "target") else args.file
     for name in ("params", "guidance", "airspeed"):
         if (value := getattr(args, name, None)) is not None:
@@ -22,4 +26,5 @@ def field_options(args: argparse.Namespace) -> FieldOptions:
         datum=args.datum,
         number=args.flight,
         wind_given=args.wind is not None,
+        fences=read_named_fences(args.fence),
     )

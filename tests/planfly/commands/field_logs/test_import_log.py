@@ -1,5 +1,6 @@
 """`planfly import` and `planfly check LOG`: every format, refusals, and what the other commands make of the result."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,6 +39,27 @@ def test_each_format_becomes_a_log_of_our_own(tmp_path: Path, capsys: Output, na
     assert source is not None
     assert (source.file, source.mission, len(source.sha256)) == (name, "of plan.waypoints", 64)
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+@pytest.mark.parametrize(("radius", "code"), [(100.0, 4), (None, 0)])
+def test_a_flight_of_the_field_is_held_against_a_fence_that_is_named(
+    tmp_path: Path, capsys: Output, radius: float | None, code: int
+) -> None:
+    """An exclusion about its second waypoint; or a zone that lies far from all of it."""
+    log = dataflash(tmp_path / "a.BIN")
+    fence = tmp_path / ("around.fence" if radius else "far.geojson")
+    if radius:
+        fence.write_text(f"QGC WPL 110\n0\t0\t0\t5004\t{radius}\t0\t0\t0\t46.0089967\t8.0\t0\t1\n")
+    else:
+        ring = [[8.1, 46.1], [8.11, 46.1], [8.11, 46.11], [8.1, 46.1]]
+        fence.write_text(json.dumps({"type": "Polygon", "coordinates": [ring]}))
+    assert main(["import", str(log), str(tmp_path / "a.mcap"), "--fence", str(fence)]) == code
+    written = capsys.readouterr().out
+    assert ("fence item 0 (exclusion) violated" in written) == (code == 4)
+    assert main(["check", str(log), "--fence", str(fence)]) == code
+    assert written.startswith(capsys.readouterr().out)
+    # The log has kept it.
+    assert main(["check", str(tmp_path / "a.mcap")]) == code
 
 
 def test_the_same_log_gives_the_same_bytes(tmp_path: Path) -> None:
