@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from planfly.campaigns.engine.cluster import Workers
@@ -34,6 +35,8 @@ from planfly.campaigns.statistics.proportions import Tally
 REFERENCE = Path(__file__).parents[2] / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
 WITHIN = 0.5
+# Laws of the reference: they begin to fail 1 - P there, m/s, and grow so steeply, 1/(m/s).
+_BOUNDARIES, _SLOPES = np.arange(0.0, 30.0, 0.05), np.geomspace(0.02, 20.0, 120)
 # Of the reference's draws; the boundaries are found with seed 1.
 _SEED = 77
 
@@ -77,6 +80,7 @@ def winds_row() -> dict[str, float]:
         "winds: directions with a reference": len(kept),
         "winds: of these right within 0.5 m/s": sum(is_within(one, points, 0.0) for one, points in pairs),
         "winds: of these not shown wrong at 95 %": sum(is_within(one, points, 0.95) for one, points in pairs),
+        "winds: of these another reference would agree in": sum(agreement(points) for points in kept.values()),
     }
 
 
@@ -93,16 +97,44 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
     >>> [round(one, 1) for one in reference_interval(points, 0.0)]
     [8.6, 8.6]
     """
-    speeds, flights, flyable = (np.array([one[name] for one in points]) for name in ("speed", "flights", "flyable"))
-    if (flyable >= GOAL.target * flights).all() and len(points) == 1:
-        return float(speeds[0]), GOAL.most
-    # Of a law that begins to fail 1 - P here and grows so steeply, 1/(m/s).
-    boundary, slope = np.arange(0.0, 30.0, 0.05), np.geomspace(0.02, 20.0, 120)
-    x = norm.isf(GOAL.target) + slope[:, None, None] * (speeds - boundary[:, None])
-    likelihood = (flyable * norm.logsf(x) + (flights - flyable) * norm.logcdf(x)).sum(axis=-1).max(axis=0)
-    likely = boundary[likelihood >= likelihood.max() - 0.5 * chi2.ppf(confidence, 1)]
+    if _above_its_point(points):
+        return float(points[0]["speed"]), GOAL.most
+    likelihood = _likelihood(points).max(axis=0)
+    likely = _BOUNDARIES[likelihood >= likelihood.max() - 0.5 * chi2.ppf(confidence, 1)]
     # Beyond the largest wind that is looked at all are the same.
     return min(float(likely[0]), GOAL.most), min(float(likely[-1]), GOAL.most)
+
+
+def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
+    """How often another reference of as many flights would have its boundary within half a metre a second of this one.
+
+    As often as chance has it where this one's likeliest law is the truth; one whose only point has none fail is left
+    out as sure.
+    """
+    if _above_its_point(points):
+        return 1.0
+    likelihood = _likelihood(points)
+    k, at = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
+    boundary, random, agreed = min(float(_BOUNDARIES[at]), GOAL.most), np.random.default_rng(_SEED), 0
+    for _ in range(references):
+        other = []
+        for point in points:
+            failing = norm.cdf(norm.isf(GOAL.target) + _SLOPES[k] * (point["speed"] - _BOUNDARIES[at]))
+            other.append(point | {"flyable": point["flights"] - int(random.binomial(point["flights"], failing))})
+        agreed += abs(reference_interval(other, 0.0)[0] - boundary) <= WITHIN
+    return agreed / references
+
+
+def _above_its_point(points: list[dict[str, Any]]) -> bool:
+    return len(points) == 1 and points[0]["flyable"] >= GOAL.target * points[0]["flights"]
+
+
+def _likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
+    """(slopes, boundaries) its logarithm."""
+    speeds, flights, flyable = (np.array([one[name] for one in points]) for name in ("speed", "flights", "flyable"))
+    x = norm.isf(GOAL.target) + _SLOPES[:, None, None] * (speeds - _BOUNDARIES[:, None])
+    out: NDArray[np.float64] = (flyable * norm.logsf(x) + (flights - flyable) * norm.logcdf(x)).sum(axis=-1)
+    return out
 
 
 def main() -> None:
