@@ -8,8 +8,8 @@ number of flights.
 
 The reference's own boundary is that of the likeliest normal law through a direction's points, and its interval that of
 the likelihood ratio, with the law's slope free.  A boundary is right that lies within half a metre a second of it, and
-shown wrong if it does of no wind in the interval.  A direction with a single point, in which all fly that have to, has
-its boundary above that.
+shown wrong if it does of no wind in the interval.  A direction with a single point has its boundary above that where
+all fly that have to, and below it where they do not.
 """
 
 import argparse
@@ -97,8 +97,9 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
     >>> [round(one, 1) for one in reference_interval(points, 0.0)]
     [8.6, 8.6]
     """
-    if _above_its_point(points):
-        return float(points[0]["speed"]), GOAL.most
+    if len(points) == 1:
+        speed = float(points[0]["speed"])
+        return (speed, GOAL.most) if _above_its_point(points) else (0.0, speed - 0.05)
     likelihood = _likelihood(points).max(axis=0)
     likely = _BOUNDARIES[likelihood >= likelihood.max() - 0.5 * chi2.ppf(confidence, 1)]
     # Beyond the largest wind that is looked at all are the same.
@@ -108,10 +109,9 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
 def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
     """How often another reference of as many flights would have its boundary within half a metre a second of this one.
 
-    As often as chance has it where this one's likeliest law is the truth; one whose only point has none fail is left
-    out as sure.
+    As often as chance has it where this one's likeliest law is the truth; one with a single point is left out as sure.
     """
-    if _above_its_point(points):
+    if len(points) == 1:
         return 1.0
     likelihood = _likelihood(points)
     k, at = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
