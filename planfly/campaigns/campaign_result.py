@@ -154,7 +154,7 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
     """The goal that options come to.  Raises ValueError for numbers that are none.
 
     >>> make_goal(None, 0.99, None, 0.95)
-    Goal(target=0.99, stops=True, flights=5000, confidence=0.95)
+    Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)
     """
     if prove is not None and at_least is not None:
         raise ValueError("prove and at_least: give one of them")
