@@ -39,7 +39,7 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
     own = (wind.speed, math.degrees(wind.from_course)) if wind.speed else None
     figure = draw_go_no_go(chart, goal.most, goal.target, goal.confidence, base.name, own)
     rows = [
-        (f"{one.from_deg:g}°", _speed_text(one.boundary, goal.most), f"{one.low:.1f} to {one.high:.1f}",
+        (f"{one.from_deg:g}°", _speed_text(one.boundary, goal.most), _interval_text(one.low, one.high, goal.most),
          str(sum(count for _, count, _ in one.flights)))
         for one in chart
     ]  # fmt: skip
@@ -74,6 +74,13 @@ def write_winds(folder: Path, base: CampaignBase, found: WindsFound, command: st
 
 def _speed_text(speed: float, most: float) -> str:
     return f"over {most:g} m/s" if speed >= most - 1e-9 else f"{speed:.1f} m/s"
+
+
+def _interval_text(low: float, high: float, most: float) -> str:
+    """An interval, m/s, of which what lies beyond all that was looked at is not known."""
+    if low >= most - 1e-9:
+        return f"over {most:g}"
+    return f"{low:.1f} to {f'over {most:g}' if high >= most - 1e-9 else f'{high:.1f}'}"
 
 
 def _open_lines(found: WindsFound) -> list[str]:
