@@ -29,7 +29,7 @@ def campaign_goal(args: argparse.Namespace, folder: Path) -> Goal:
     """
     again = args.resume or args.refly is not None
     if again and (args.flights, args.prove, args.at_least) == (None, None, None):
-        return resumed_goal(None, folder)
+        return resumed_goal(None, folder, args.confidence)
     goal = _stated_goal(args)
     return resumed_goal(goal, folder) if again else goal
 

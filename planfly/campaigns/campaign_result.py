@@ -138,7 +138,7 @@ def campaign(
         folder = asked.folder
         if resume:
             unasked = (flights, prove, at_least) == (None, None, None)
-            goal = resumed_goal(None if unasked else goal, folder)
+            goal = resumed_goal(None if unasked else goal, folder, confidence)
         base = asked.open(lambda plan: in_own_process(open_campaign, str(target), chosen, planned=plan, seed=seed))
         with open_store(base, goal, folder, resume=resume) as store:
             estimate = fly_campaign(base, goal, Workers(workers, scheduler), store)

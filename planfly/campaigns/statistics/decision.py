@@ -8,6 +8,9 @@ from planfly.campaigns.statistics.stopping_bound import StoppingBound
 
 Answer = Literal["reached", "missed", "undecided", "none asked"]
 
+# Of a bound that nobody asked another of.
+USUAL_CONFIDENCE = 0.95
+
 
 @dataclass(frozen=True)
 class Goal:
@@ -22,7 +25,7 @@ class Goal:
     target: float | None
     stops: bool
     flights: int
-    confidence: float = 0.95
+    confidence: float = USUAL_CONFIDENCE
     changed: bool = False
 
     @property
