@@ -31,7 +31,7 @@ def campaign_goal(args: argparse.Namespace, folder: Path) -> Goal:
     if again and (args.flights, args.prove, args.at_least) == (None, None, None):
         return resumed_goal(None, folder, args.confidence)
     goal = _stated_goal(args)
-    return resumed_goal(goal, folder) if again else goal
+    return resumed_goal(goal, folder, args.confidence) if again else goal
 
 
 def _stated_goal(args: argparse.Namespace) -> Goal:

@@ -17,7 +17,7 @@ from planfly.campaigns.report.campaign_files import campaign_folder
 from planfly.campaigns.report.finish_campaign import finish_campaign
 from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, summarise
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
-from planfly.campaigns.statistics.decision import Answer, Goal
+from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Answer, Goal
 from planfly.campaigns.statistics.proportions import Interval
 from planfly.campaigns.storage.read_table import read_shapes, read_table
 from planfly.campaigns.storage.store import DATABASE
@@ -102,7 +102,7 @@ def campaign(
     flights: int | None = None,
     prove: float | None = None,
     at_least: float | None = None,
-    confidence: float = 0.95,
+    confidence: float | None = None,
     seed: int | None = None,
     workers: int | None = None,
     scheduler: str | None = None,
@@ -118,7 +118,7 @@ def campaign(
     campaign that is resumed goes on with its own.
     prove: a probability: fly until it is reached or missed, whichever comes first.  at_least: one to answer after all
     flights.  Not both.
-    confidence: of each bound.
+    confidence: of each bound; None takes 0.95, or what it was of a campaign that is resumed.
     seed: of plan and draws; None takes the scenario's, or 1.
     workers: processes on this machine; None for one a core.  scheduler: a running dask scheduler's address instead.
     out: folder of the campaign's files; None keeps none.  resume: go on with the campaign that is there.
@@ -150,10 +150,10 @@ def campaign(
         return CampaignResult(summary, read_table(table), None if out is None else table)
 
 
-def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float) -> Goal:
+def make_goal(flights: int | None, prove: float | None, at_least: float | None, confidence: float | None) -> Goal:
     """The goal that options come to.  Raises ValueError for numbers that are none.
 
-    >>> make_goal(None, 0.99, None, 0.95)
+    >>> make_goal(None, 0.99, None, None)
     Goal(target=0.99, stops=True, flights=5000, confidence=0.95, changed=False)
     """
     if prove is not None and at_least is not None:
@@ -164,8 +164,10 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
     if flights is not None and not 1 <= flights <= 10_000_000:
         raise ValueError(f"flights: {flights}: 1 to 10,000,000 is expected")
     number = flights or (USUAL_FLIGHTS if prove is None else MOST_FLIGHTS)
-    return Goal(prove if prove is not None else at_least, prove is not None, number, confidence)
+    return Goal(prove if prove is not None else at_least, prove is not None, number, confidence or USUAL_CONFIDENCE)
 
 
-def _shares(prove: float | None, at_least: float | None, confidence: float) -> Iterable[tuple[str, float | None]]:
+def _shares(
+    prove: float | None, at_least: float | None, confidence: float | None
+) -> Iterable[tuple[str, float | None]]:
     return (("prove", prove), ("at_least", at_least), ("confidence", confidence))

@@ -11,7 +11,7 @@ from planfly.campaigns.engine.flight_rate import FlightRate
 from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
-from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Estimate, Estimator, Goal
+from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
 from planfly.campaigns.storage.held_table import StoreError, kept_settings
 from planfly.campaigns.storage.store import DATABASE, Store
@@ -56,10 +56,10 @@ def _with_outcome(tally: Tally, outcome: str) -> Tally:
     return Tally(flyable + (outcome == "flyable"), failed + (outcome == "not flyable"), lost + (outcome == "lost"))
 
 
-def resumed_goal(asked: Goal | None, folder: Path, confidence: float = USUAL_CONFIDENCE) -> Goal:
+def resumed_goal(asked: Goal | None, folder: Path, confidence: float | None = None) -> Goal:
     """The goal with which a folder's campaign is gone on with: that asked for now, or else its own.
 
-    confidence: in place of its own's, where it is not the usual one.
+    confidence: of either; None for the campaign's own.
     Raises StoreError for a folder without a campaign.
     """
     path = folder / DATABASE
@@ -67,10 +67,9 @@ def resumed_goal(asked: Goal | None, folder: Path, confidence: float = USUAL_CON
     if not kept:
         raise StoreError(f"{path}: no campaign there to go on with", file=path)
     before = Goal(**{one.name: kept[one.name] for one in fields(Goal) if one.name in kept})
-    if asked is None:
-        return before if confidence == USUAL_CONFIDENCE else replace(before, confidence=confidence)
-    same = (asked.stops, asked.flights) == (before.stops, before.flights)
-    return replace(asked, changed=before.changed or not same)
+    goal = before if asked is None else asked
+    same = (goal.stops, goal.flights) == (before.stops, before.flights)
+    return replace(goal, confidence=confidence or before.confidence, changed=before.changed or not same)
 
 
 def open_store(base: CampaignBase, goal: Goal, folder: Path, *, resume: bool) -> Store:

@@ -26,6 +26,9 @@ def add_campaigns(command: _Command) -> None:
     goal.add_argument("--at-least", metavar="P", type=_share, help="answer after all flights whether P is reached")
     campaign.add_argument("--flights", metavar="N", type=_flights, help="how many (300), at most with --prove (5000)")
     campaign.add_argument(
+        "--confidence", metavar="C", type=_share, help="of each bound (default: 0.95; with --resume what it was)"
+    )
+    campaign.add_argument(
         "--refly", metavar="K", type=_index, help="fly flight K of the campaign in --out again, into a log"
     )
     winds = command(
@@ -35,6 +38,7 @@ def add_campaigns(command: _Command) -> None:
     )
     _shared(winds)
     winds.add_argument("--prove", metavar="P", type=_share, default=0.99, help="probability to fly (default: 0.99)")
+    winds.add_argument("--confidence", metavar="C", type=_share, default=0.95, help="of each interval (default: 0.95)")
     winds.add_argument("--directions", metavar="N", type=_directions, default=16, help="4 to 72 (default: 16)")
     winds.add_argument("--most", metavar="M/S", type=_wind, default=20.0, help="wind to look up to (default: 20)")
     winds.add_argument("--flights", metavar="N", type=_flights, help="at most, of all directions (default: 5000)")
@@ -54,7 +58,6 @@ def _shared(parser: CommandParser) -> None:
         parser.add_argument("--spread", metavar="FILE", help="what varies, as TOML (default: planfly's own)"),
         files("toml"),
     )
-    parser.add_argument("--confidence", metavar="C", type=_share, default=0.95, help="of each bound (default: 0.95)")
     parser.add_argument("--seed", metavar="N", type=seed, help="of plan and draws (default: the scenario's, or 1)")
     parser.add_argument("--workers", metavar="N", type=positive_count, help="processes here (default: one a core)")
     parser.add_argument("--scheduler", metavar="ADDRESS", help="fly on a running dask cluster: tls://HOST:PORT")

@@ -14,10 +14,12 @@ from planfly.campaigns.asked_campaign import (
     repeated_options,
 )
 from planfly.campaigns.flights.flight_row import fly_one
+from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.spread.spread_file import default_spread
+from planfly.campaigns.statistics.decision import Goal
 from planfly.campaigns.storage.store import DATABASE
 from planfly.terminal.parser import build_parser
-from tests.planfly.campaigns.made_campaigns import write_short
+from tests.planfly.campaigns.made_campaigns import short_base, write_short
 from world.errors import PlanflyError
 
 
@@ -38,6 +40,20 @@ def test_a_goal_that_is_none_is_bad_input(tmp_path: Path) -> None:
     args.prove = 0.9
     with pytest.raises(PlanflyError, match="give one of them"):
         campaign_goal(args, tmp_path)
+
+
+@pytest.mark.parametrize("goal", [[], ["--at-least", "0.9", "--flights", "9"]])
+def test_a_campaign_that_is_gone_on_with_keeps_its_confidence_unless_one_is_named(
+    goal: list[str], tmp_path: Path
+) -> None:
+    base = short_base(tmp_path)
+    with open_store(base, Goal(0.9, False, 9, 0.8), tmp_path, resume=False):
+        pass
+    named = ("0.95", "0.9", "0.8")
+    goals = [campaign_goal(parsed("--resume", *goal, "--confidence", one), tmp_path) for one in named]
+    assert [one.confidence for one in goals] == [0.95, 0.9, 0.8]
+    assert campaign_goal(parsed("--resume", *goal), tmp_path) == Goal(0.9, False, 9, 0.8)
+    assert campaign_goal(parsed("--at-least", "0.9"), tmp_path).confidence == 0.95
 
 
 def test_a_fence_that_is_named_is_kept_to(tmp_path: Path) -> None:

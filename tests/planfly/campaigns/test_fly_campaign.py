@@ -124,8 +124,9 @@ def test_a_campaign_that_is_gone_on_with_keeps_its_goal(base: CampaignBase, tmp_
     with open_store(base, asked, tmp_path, resume=False):
         pass
     assert resumed_goal(None, tmp_path) == asked
-    assert resumed_goal(None, tmp_path, 0.95) == asked
-    assert resumed_goal(None, tmp_path, 0.9) == replace(asked, confidence=0.9)
+    assert resumed_goal(None, tmp_path, 0.95) == replace(asked, confidence=0.95)
+    assert resumed_goal(Goal(0.9, False, 40), tmp_path) == asked
+    assert resumed_goal(Goal(0.9, False, 40), tmp_path, 0.95) == Goal(0.9, False, 40, 0.95)
     assert resumed_goal(replace(asked, target=0.95), tmp_path) == replace(asked, target=0.95)
 
 
