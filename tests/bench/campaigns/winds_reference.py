@@ -1,20 +1,26 @@
 """`planfly winds` on the demo against flights at fixed winds, up to 1,000 of them at each.
 
-``python -m tests.bench.campaigns.winds_reference [--directions K ...] [--flights N]`` flies the demo in wind half a
-metre a second below and above each boundary that ``planfly winds jacksboro`` found, in other weather and with other
-aircraft than that had, and adds the counts to ``tests/authorities/winds_reference.json``: some minutes a point.  A
-point ends early where its share of flyable flights is above or below the target with 99 % confidence, valid at every
-number of flights.
+``python -m tests.bench.campaigns.winds_reference [--directions K ...] [--flights N] [--even]`` flies the demo in wind
+half a metre a second below and above each boundary that ``planfly winds jacksboro`` found, in other weather and with
+other aircraft than that had, and adds the counts to ``tests/authorities/winds_reference.json``: some minutes a point.
+Where a direction has but one point, and there fewer fly than have to, it gets another a metre a second below.
+
+The draws of a point are independent of each other, or with ``--even`` spread evenly over what may be drawn (Sobol's
+points, scrambled by Owen): each is drawn from the same distribution, and as many aircraft are slippery as are to be.
+A point of independent draws ends early where its share of flyable flights is above or below the target with 99 %
+confidence, valid at every number of flights.  One of even draws does not end early.
 
 The reference's own boundary is that of the likeliest normal law through a direction's points, and its interval that of
-the likelihood ratio, with the law's slope free.  A boundary is right that lies within half a metre a second of it, and
-shown wrong if it does of no wind in the interval.  A direction with a single point has its boundary above that where
-all fly that have to, and below it where they do not.
+the likelihood ratio, with the law's slope free; even draws count as if they were independent, which leaves the interval
+wider than it has to be.  A boundary is right that lies within half a metre a second of it, and shown wrong if it does
+of no wind in the interval.  A direction with a single wind has its boundary above that where all fly that have to, and
+below it where they do not.
 """
 
 import argparse
 import json
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,20 +31,23 @@ from scipy.stats import chi2, norm
 
 from planfly.campaigns.engine.cluster import Workers
 from planfly.campaigns.engine.flight_loop import Order, hired_pilots
+from planfly.campaigns.engine.flight_tasks import FlyOne
 from planfly.campaigns.find_winds import ASKED, WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.flights.flight_row import fly_one
 from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Estimator, Goal
 from planfly.campaigns.statistics.proportions import Tally
+from tests.bench.campaigns.even_draws import EVEN_FLIGHTS, fly_even
 
 REFERENCE = Path(__file__).parents[2] / "authorities" / "winds_reference.json"
 GOAL = WindsGoal(0.99, 0.95, 16, 20.0, 5000)
 WITHIN = 0.5
 # Laws of the reference: they begin to fail 1 - P there, m/s, and grow so steeply, 1/(m/s).
 _BOUNDARIES, _SLOPES = np.arange(0.0, 30.0, 0.05), np.geomspace(0.02, 20.0, 120)
-# Of the reference's draws; the boundaries are found with seed 1.
-_SEED = 77
+# Of the reference's draws, independent and even; the boundaries are found with seed 1.
+_SEED, _EVEN_SEED = 77, 78
 
 
 def demo(seed: int) -> CampaignBase:
@@ -48,15 +57,24 @@ def demo(seed: int) -> CampaignBase:
 
 
 def share_at(base: CampaignBase, wind: GivenWind, most: int) -> Tally:
-    """Fly at one wind until it is decided, or so many flights."""
+    """Fly independent draws at one wind until it is decided, or so many flights."""
     decide = Estimator(Goal(GOAL.target, True, most, 0.99))
+    return _counted(base, wind, most, decide.decides, fly_one)
+
+
+def even_share_at(base: CampaignBase, wind: GivenWind) -> Tally:
+    """Fly all of a set of even draws at one wind."""
+    return _counted(base, wind, EVEN_FLIGHTS, lambda _: False, fly_even)
+
+
+def _counted(base: CampaignBase, wind: GivenWind, most: int, ends: Callable[[Tally], bool], fly: FlyOne) -> Tally:
     indices, flown = iter(range(most)), Tally(0, 0, 0)
 
     def following() -> Order | None:
-        index = None if decide.decides(flown) else next(indices, None)
+        index = None if ends(flown) else next(indices, None)
         return None if index is None else Order(index, wind)
 
-    with hired_pilots(Workers(2), base) as pilots:
+    with hired_pilots(Workers(2), base, fly) as pilots:
         for one in pilots.fly(following):
             good = one.row.outcome == "flyable"
             flown = Tally(flown.flyable + good, flown.failed + (not good), 0)
@@ -97,9 +115,9 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
     >>> [round(one, 1) for one in reference_interval(points, 0.0)]
     [8.6, 8.6]
     """
-    if len(points) == 1:
-        speed = float(points[0]["speed"])
-        return (speed, GOAL.most) if _above_its_point(points) else (0.0, speed - 0.05)
+    if len(speeds := {float(one["speed"]) for one in points}) == 1:
+        speed = speeds.pop()
+        return (speed, GOAL.most) if _enough_fly(points) else (0.0, speed - 0.05)
     likelihood = _likelihood(points).max(axis=0)
     likely = _BOUNDARIES[likelihood >= likelihood.max() - 0.5 * chi2.ppf(confidence, 1)]
     # Beyond the largest wind that is looked at all are the same.
@@ -109,9 +127,9 @@ def reference_interval(points: list[dict[str, Any]], confidence: float) -> tuple
 def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
     """How often another reference of as many flights would have its boundary within half a metre a second of this one.
 
-    As often as chance has it where this one's likeliest law is the truth; one with a single point is left out as sure.
+    As often as chance has it where this one's likeliest law is the truth; one with a single wind is left out as sure.
     """
-    if len(points) == 1:
+    if len({one["speed"] for one in points}) == 1:
         return 1.0
     likelihood = _likelihood(points)
     k, at = np.unravel_index(int(np.argmax(likelihood)), likelihood.shape)
@@ -125,8 +143,8 @@ def agreement(points: list[dict[str, Any]], references: int = 100) -> float:
     return agreed / references
 
 
-def _above_its_point(points: list[dict[str, Any]]) -> bool:
-    return len(points) == 1 and points[0]["flyable"] >= GOAL.target * points[0]["flights"]
+def _enough_fly(points: list[dict[str, Any]]) -> bool:
+    return sum(one["flyable"] for one in points) >= GOAL.target * sum(one["flights"] for one in points)
 
 
 def _likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
@@ -137,11 +155,21 @@ def _likelihood(points: list[dict[str, Any]]) -> NDArray[np.float64]:
     return out
 
 
+def _winds_to_fly(boundary: float, beyond: bool, points: list[dict[str, Any]]) -> list[float]:
+    """m/s, below and above a boundary; of one that is beyond what is looked at below it, and lower if it is wrong."""
+    below = round(max(0.0, boundary - WITHIN), 2)
+    if not beyond:
+        return [below, round(boundary + WITHIN, 2)]
+    there = [one for one in points if one["speed"] == below]
+    return [below, below - 2.0 * WITHIN] if there and not _enough_fly(there) else [below]
+
+
 def main() -> None:
     """Fly the points and keep them."""
     parser = argparse.ArgumentParser(prog="python -m tests.bench.campaigns.winds_reference")
     parser.add_argument("--directions", type=int, nargs="*", default=list(range(GOAL.directions)))
     parser.add_argument("--flights", type=int, default=1000, help="at each point, at most")
+    parser.add_argument("--even", action="store_true", help=f"{EVEN_FLIGHTS} even draws a point")
     parser.add_argument("--winds", type=Path, help="winds.json of a run of `planfly winds`; else they are found here")
     args = parser.parse_args()
     if args.winds is None:
@@ -149,20 +177,19 @@ def main() -> None:
     else:
         table = json.loads(args.winds.read_text(encoding="utf-8"))
         boundaries = [(float(one["boundary_mps"]), bool(one["beyond"])) for one in table["directions"]]
-    base = demo(_SEED)
+    base, draws = demo(_EVEN_SEED if args.even else _SEED), "even" if args.even else "independent"
     kept = json.loads(REFERENCE.read_text(encoding="utf-8")) if REFERENCE.exists() else {}
     for direction in args.directions:
-        points = {float(point["speed"]): point for point in kept.get(str(direction), [])}
-        boundary, beyond = boundaries[direction]
-        for speed in (boundary - WITHIN,) if beyond else (boundary - WITHIN, boundary + WITHIN):
-            speed = round(max(0.0, speed), 2)
-            if speed in points:
+        points = kept.setdefault(str(direction), [])
+        for speed in _winds_to_fly(*boundaries[direction], points):
+            if any(one["speed"] == speed and one["draws"] == draws for one in points):
                 continue
-            tally = share_at(base, GivenWind(speed, 360.0 * direction / GOAL.directions), args.flights)
-            points[speed] = {"speed": speed, "flights": tally.flown, "flyable": tally.flyable}
-            print(direction, points[speed], flush=True)
-        kept[str(direction)] = [points[speed] for speed in sorted(points)]
-        REFERENCE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+            wind = GivenWind(speed, 360.0 * direction / GOAL.directions)
+            tally = even_share_at(base, wind) if args.even else share_at(base, wind, args.flights)
+            points.append({"speed": speed, "draws": draws, "flights": tally.flown, "flyable": tally.flyable})
+            points.sort(key=lambda one: (one["speed"], one["draws"]))
+            print(direction, points, flush=True)
+            REFERENCE.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":
