@@ -135,7 +135,7 @@ def flight_that_tells_its_room(base: CampaignBase, index: int, wind: GivenWind) 
 @pytest.mark.usefixtures("here")
 def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: CampaignBase, tmp_path: Path) -> None:
     """As many flights; and what is told is still there when the search goes on."""
-    goal = replace(GOAL, flights=160)
+    goal = replace(GOAL, flights=120)
     told = searched(wind_base, tmp_path / "told", goal, fly=flight_that_tells_its_room)
     bare = searched(wind_base, tmp_path / "bare", goal)
     for some, none in zip(told.boundaries, bare.boundaries, strict=True):
@@ -228,7 +228,7 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planfly.campaigns.engine.flight_rate.TOLD_EVERY", 0.0)
     monkeypatch.setattr(module, "FEWEST", 30)
-    monkeypatch.setattr(module, "ACCURACY", 0.4)
+    monkeypatch.setattr(module, "ACCURACY", 0.8)
     goal = replace(GOAL, flights=600)
     told: list[tuple[float, float, str]] = []
     with open_winds_store(wind_base, goal, tmp_path, resume=False) as store:

@@ -43,7 +43,7 @@ def test_ways_of_failing_that_draws_decide_are_told_apart() -> None:
     for seed in range(scaled(20, 2)):
         for numbers, found in ((normal_numbers(5, seed), known), (no_numbers(), unknown)):
             direction, random = Direction(20.0, 0.99, numbers), np.random.default_rng(seed)
-            fly(direction, 300, partial(_two_ways, random), together=6)
+            fly(direction, 300, partial(_two_ways, random), together=10)
             found.append(direction.boundary())
     assert np.median([abs(one.estimate - truth) for one in known]) < 0.5
     assert sum(one.low - 0.1 <= truth <= one.high + 0.1 for one in known) >= 0.75 * len(known)
@@ -76,8 +76,8 @@ def test_narrow_passes_that_no_failing_follows_from_do_not_move_it() -> None:
     found = []
     for seed in range(scaled(20, 2)):
         direction, random = Direction(20.0, 0.99, normal_numbers(3, seed)), np.random.default_rng(seed)
-        for _ in range(100):
-            for speed, draw in next_flights(direction, 3):
+        for _ in range(50):
+            for speed, draw in next_flights(direction, 6):
                 drawn = direction.numbers.first(draw + 1)[draw]
                 failed = drawn[0] + 0.1 * random.normal() > 2.0 - 0.25 * (speed - 10.0)
                 room = abs(random.normal(0.8, 0.2))
