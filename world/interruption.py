@@ -90,6 +90,8 @@ class uninterrupted:
 def unfinished(path: Path) -> Iterator[None]:
     """Note a temporary file or folder while it is there; it is removed at the end, and by `remove_unfinished`.
 
+    One that cannot be removed at the end, as another process still writes in it, is noted until it is gone.
+
     >>> with unfinished(Path("never-made")):
     ...     pass
     """
@@ -98,8 +100,8 @@ def unfinished(path: Path) -> Iterator[None]:
         yield
     finally:
         with uninterrupted():
-            _remove(path)
-            _state.unfinished.discard(path)
+            if _remove(path):
+                _state.unfinished.discard(path)
 
 
 def remove_unfinished() -> bool:
@@ -110,18 +112,18 @@ def remove_unfinished() -> bool:
     >>> remove_unfinished()
     True
     """
-    paths = tuple(_state.unfinished)
-    for path in paths:
-        _remove(path)
-    return not any(path.exists() for path in paths)
+    gone = [_remove(path) for path in tuple(_state.unfinished)]
+    return all(gone)
 
 
-def _remove(path: Path) -> None:
+def _remove(path: Path) -> bool:
+    """Remove a file or folder as far as it can be: whether it is gone."""
     if path.is_dir():
         shutil.rmtree(path, ignore_errors=True)
-        return
-    with contextlib.suppress(OSError):
-        path.unlink(missing_ok=True)
+    else:
+        with contextlib.suppress(OSError):
+            path.unlink(missing_ok=True)
+    return not os.path.lexists(path)
 
 
 @contextlib.contextmanager

@@ -1,6 +1,7 @@
 """Interruption: what is done whole, what is removed, and children that neither hear Ctrl-C nor outlive their parent."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -35,6 +36,34 @@ def test_what_is_unfinished_is_removed(tmp_path: Path) -> None:
         assert list(tmp_path.iterdir()) == []
         file.write_text("again", encoding="utf-8")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_others_still_write_in_is_removed_after_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, remove = tmp_path / "folder", shutil.rmtree
+
+    def remove_too_soon(path: Path, **options: bool) -> None:
+        # Between its last look into the folder and the folder's own end, another process makes a file.
+        remove(path, **options)
+        path.mkdir()
+        (path / "late").write_text("", encoding="utf-8")
+
+    with monkeypatch.context() as writing:
+        writing.setattr("world.interruption.shutil.rmtree", remove_too_soon)
+        with unfinished(folder):
+            folder.mkdir()
+        assert not remove_unfinished()
+        assert (folder / "late").exists()
+    assert remove_unfinished()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_gone_is_forgotten(tmp_path: Path) -> None:
+    file = tmp_path / "file"
+    with unfinished(file):
+        file.write_text("half", encoding="utf-8")
+    file.write_text("whole, and another's", encoding="utf-8")
+    assert remove_unfinished()
+    assert file.exists()
 
 
 PARENT = """

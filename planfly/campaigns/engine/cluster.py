@@ -86,7 +86,8 @@ def connected(workers: Workers) -> Iterator[Any]:
             try:
                 yield client
             except Interrupted:
-                # This process ends, and its children with it, sooner than workers can be asked to.
+                # This process ends, and its children with it, sooner than workers can be asked to: their folder goes
+                # after them.
                 stack.pop_all()
                 raise
 
