@@ -16,8 +16,14 @@ LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/fligh
 # What pyproject.toml names.
 DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
+# Python keeps the bytecode of what is imported, and most of what is installed never is.
+INSTALL := $(BIN)/python -m pip install --quiet --no-compile
+# What is installed: an environment that is made; planfly; what the pages take, too; what the tests take, too.
+MADE := $(VENV)/.made
 READY := $(VENV)/.ready
+PAGES := $(VENV)/.ready-docs
 TESTED := $(VENV)/.ready-test
+BUILD_PAGES := $(BIN)/python -m sphinx -W -q -b html -d build/docs-trees docs build/docs
 
 # make low, make newest: the tests with the lowest versions supported, and with the newest there are
 .PHONY: demo test bench soak wheels low newest dev docs setup clients clean
@@ -25,17 +31,17 @@ TESTED := $(VENV)/.ready-test
 demo: setup
 	$(BIN)/planfly run jacksboro --seed 1
 
-test: $(TESTED) clients docs
+test: $(TESTED) clients
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-# Compiled once, while types are checked: each of pytest's processes would compile for itself.
-	$(BIN)/python -m tests.kernels >/dev/null & compiled=$$!; $(BIN)/mypy && wait $$compiled
+# Compiled once, while types are checked and pages made: each of pytest's processes would compile for itself.
+	$(BIN)/python -m tests.kernels >/dev/null & compiled=$$!; $(BIN)/mypy && $(BUILD_PAGES) && wait $$compiled
 	@echo "tested with the versions of constraints.txt:"
 	@$(BIN)/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
 	$(BIN)/python -m pytest $(TWO)
 
 bench: $(TESTED)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
+	$(INSTALL) --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
 # Full counts.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
@@ -60,7 +66,7 @@ low: SET := $(LOWEST)
 newest: SET := --upgrade
 low newest:
 	$(PYTHON) -m venv build/$@
-	build/$@/bin/python -m pip install --quiet $(SET) --editable . hypothesis pytest pytest-xdist trimesh
+	build/$@/bin/python -m pip install --quiet --no-compile $(SET) --editable . hypothesis pytest pytest-xdist trimesh
 	@echo "tested with the $(if $(filter low,$@),lowest,newest) versions:"
 	@build/$@/bin/python -m pip list 2>/dev/null | grep -i -E "$(DIRECT)"
 	NUMBA_CACHE_DIR=$(CURDIR)/build/$@/kernels build/$@/bin/python -m pytest $(TWO) $(LOW)
@@ -68,22 +74,28 @@ low newest:
 dev: $(TESTED)
 
 # The pages of docs/ as HTML, in build/docs; nothing is fetched while they are built, and every warning is an error.
-docs: $(READY)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[docs]'
-	$(BIN)/python -m sphinx -W -q -b html -d build/docs-trees docs build/docs
+docs: $(PAGES)
+	$(BUILD_PAGES)
 
 setup: $(READY)
 
-$(READY): pyproject.toml constraints.txt
+$(MADE): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "planfly needs Python 3.11 or newer: make PYTHON=python3.11")'
 	$(PYTHON) -m venv --clear $(VENV)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable .
-	touch $(READY)
+	touch $@
+
+$(READY): $(MADE)
+	$(INSTALL) --constraint constraints.txt --editable .
+	touch $@
+
+$(PAGES): $(MADE)
+	$(INSTALL) --constraint constraints.txt --editable '.[docs]'
+	touch $(READY) $@
 
 # The tests' own tools and clients, MAVSDK and MAVProxy among them, are far larger than planfly itself.
-$(TESTED): $(READY)
-	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test]'
-	touch $(TESTED)
+$(TESTED): $(MADE)
+	$(INSTALL) --constraint constraints.txt --editable '.[test,docs]'
+	touch $(READY) $(PAGES) $@
 
 # Other people's MCAP readers for Node and the judge of accessible pages, for the tests alone; without npm their tests say so.
 clients: .node/.ready

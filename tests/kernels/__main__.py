@@ -1,9 +1,9 @@
 """``python -m tests.kernels``: compile what most tests run, once, before each of pytest's workers would.
 
 First what a first start compiles, in the same two processes; then the planner's other kernels in one process, and those
-of other flights, verdicts and reports in another: they are not each other's.  At last tests run that call kernels with
-types, or in parts, that no command has, and all others are read, so that Python's own bytecode of them is kept too:
-whether they pass is seen later.  All stay in the caches for all later processes; where they are there already this
+of other flights, verdicts and reports in another: they are not each other's.  Beside them all tests are read, so that
+Python's own bytecode of them is kept too.  At last tests run that call kernels with types, or in parts, that no command
+has: whether they pass is seen later.  All stay in the caches for all later processes; where they are there already this
 takes seconds.
 """
 
@@ -97,6 +97,8 @@ TESTS = (
     "logs/verdict/measures/limits/test_along_track_limits.py::test_stays_a_microsecond_apart_are_one",
     "logs/report/test_compare.py::test_a_flight_does_not_differ_from_itself",
 )
+TESTS_FOLDER = Path(__file__).parents[1]
+PYTEST = (sys.executable, "-m", "pytest", "-q")
 
 
 def main() -> int:
@@ -111,11 +113,11 @@ def main() -> int:
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         command = [sys.executable, "-m", "tests.kernels"]
         started = [subprocess.Popen([*command, str(k)], cwd=folder, env=environment) for k in range(len(PROCESSES))]
+        reading = subprocess.Popen([*PYTEST, "-n", "0", "--collect-only"], cwd=TESTS_FOLDER.parent)
         failed = max(one.wait() for one in started)
-    tests = Path(__file__).parents[1]
-    chosen = [str(tests / one) for one in TESTS]
-    for asked in (("-n", "2", *chosen), ("-n", "0", "--collect-only")):
-        subprocess.run([sys.executable, "-m", "pytest", "-q", *asked], cwd=tests.parent, check=False)
+    chosen = [str(TESTS_FOLDER / one) for one in TESTS]
+    subprocess.run([*PYTEST, "-n", "2", *chosen], cwd=TESTS_FOLDER.parent, check=False)
+    reading.wait()
     return failed
 
 
