@@ -67,15 +67,23 @@ class HerePilots:
                 yield Flown(order, self._fly(self._base, order.index, order.wind))
 
 
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> None:
+@contextmanager
+def flying_here() -> Iterator[None]:
     """Fly without workers."""
 
     @contextmanager
     def hired(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
         yield HerePilots(base, fly)
 
-    monkeypatch.setattr(module, "hired_pilots", hired)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "hired_pilots", hired)
+        yield
+
+
+@pytest.fixture
+def here() -> Iterator[None]:
+    with flying_here():
+        yield
 
 
 def searched(
@@ -86,6 +94,14 @@ def searched(
     resume = (folder / WINDS_DATABASE).exists()
     with open_winds_store(base, goal, folder, resume=resume) as store:
         return find_winds(base, goal, Workers(workers), store, fly=fly)
+
+
+@pytest.fixture(scope="module")
+def whole(wind_base: CampaignBase, tmp_path_factory: pytest.TempPathFactory) -> tuple[WindsFound, Path]:
+    """A search that was never stopped, for `FEWER`, and its folder."""
+    folder = tmp_path_factory.mktemp("whole")
+    with flying_here():
+        return searched(wind_base, folder, FEWER), folder
 
 
 def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], goal: WindsGoal = GOAL) -> None:
@@ -149,13 +165,14 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: Campaig
 
 @pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("seed", range(4))
-def test_what_was_stopped_anywhere_comes_out_the_same(wind_base: CampaignBase, tmp_path: Path, seed: int) -> None:
-    whole = searched(wind_base, tmp_path / "whole", FEWER)
-    count = len(whole.flights)
+def test_what_was_stopped_anywhere_comes_out_the_same(
+    wind_base: CampaignBase, whole: tuple[WindsFound, Path], tmp_path: Path, seed: int
+) -> None:
+    count = len(whole[0].flights)
     # The last round that was begun has gaps; seed 0 has none at all, seed 1 all.
     last = {0: 0, 1: count}.get(seed, random.Random(seed).randrange(count))
     numbers = {k for k in range(count) if k < last - 5 or (k <= last + 5 and (k * 7 + seed) % 3)}
-    keep_part(wind_base, tmp_path / "whole", tmp_path / "part", set(range(count)) if last == count else numbers, FEWER)
+    keep_part(wind_base, whole[1], tmp_path / "part", set(range(count)) if last == count else numbers, FEWER)
     flown_now: list[int] = []
 
     def counted(base: CampaignBase, index: int, wind: Any) -> Any:
@@ -163,7 +180,7 @@ def test_what_was_stopped_anywhere_comes_out_the_same(wind_base: CampaignBase, t
         return made_flight(base, index, wind)
 
     again = searched(wind_base, tmp_path / "part", FEWER, fly=counted)
-    assert same((whole, tmp_path / "whole"), (again, tmp_path / "part"))
+    assert same(whole, (again, tmp_path / "part"))
     # What was there was not flown again.
     assert len(flown_now) == (0 if last == count else count - len(numbers & set(range(count))))
 
