@@ -1,0 +1,72 @@
+"""Searches for winds with made flights: without workers, stopped in the middle, and held against each other."""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from planfly.campaigns import find_winds as module
+from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.flight_loop import Flown, Order
+from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
+from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.storage.row_values import row_of
+from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight, narrow_passes_of
+from tests.planfly.campaigns.made_campaigns import made_flight, table
+
+GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
+
+
+class HerePilots:
+    """Pilots in this process: three at a time, the last to be sent the first to be back."""
+
+    def __init__(self, base: CampaignBase, fly: FlyOne) -> None:
+        self._base, self._fly = base, fly
+
+    def fly(self, following: Callable[[], Order | None]) -> Iterator[Flown]:
+        while orders := [one for one in (following() for _ in range(3)) if one is not None]:
+            for order in reversed(orders):
+                yield Flown(order, self._fly(self._base, order.index, order.wind))
+
+
+@contextmanager
+def flying_here() -> Iterator[None]:
+    """Fly without workers."""
+
+    @contextmanager
+    def hired(_workers: Workers, base: CampaignBase, fly: FlyOne) -> Iterator[HerePilots]:
+        yield HerePilots(base, fly)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "hired_pilots", hired)
+        yield
+
+
+def searched(
+    base: CampaignBase, folder: Path, goal: WindsGoal = GOAL, workers: int = 2, fly: FlyOne = made_flight
+) -> WindsFound:
+    """Search in a folder, or go on there."""
+    folder.mkdir(exist_ok=True)
+    resume = (folder / WINDS_DATABASE).exists()
+    with open_winds_store(base, goal, folder, resume=resume) as store:
+        return find_winds(base, goal, Workers(workers), store, fly=fly)
+
+
+def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], goal: WindsGoal = GOAL) -> None:
+    """A folder with some of the flights of another, as one who was stopped leaves it."""
+    part.mkdir()
+    with open_winds_store(base, goal, part, resume=False) as store:
+        for values in table(whole / WINDS_DATABASE):
+            if values[0] in numbers:
+                known = dict(zip(KIND.columns, (*values, 0.0, ""), strict=True))
+                row = replace(row_of(known["draw"], known), narrow=narrow_passes_of(known["narrow"]))
+                store.add(AskedFlight(*values[:4]), row)
+
+
+def same(one: tuple[WindsFound, Path], other: tuple[WindsFound, Path]) -> bool:
+    """Whether two searches found the same, by the same table."""
+    found, rows = zip(*((found, table(folder / WINDS_DATABASE)) for found, folder in (one, other)), strict=True)
+    return bool(found[0] == found[1] and rows[0] == rows[1])
