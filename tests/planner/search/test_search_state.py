@@ -79,7 +79,6 @@ def test_a_search_ends_within_fifty_milliseconds(
     """CPU time between two questions, and from an answer to the plan: generations, seeds and certificates included."""
     scenario = load_scenario(problem)
     limits = make_limits(scenario)
-    plan_path(scenario, limits, seed=1, algorithm=name)
 
     def steps() -> Floats:
         asked: list[float] = []
@@ -91,10 +90,10 @@ def test_a_search_ends_within_fifty_milliseconds(
         plan_path(scenario, limits, seed=1, algorithm=name, stop=go_on)
         return np.diff(asked)
 
-    # A search takes the same steps each time; of each the quickest of up to three counts, for a neighbour on the next
-    # core makes one slow.
+    # A search takes the same steps each time; of each the quickest of up to four counts: the first may load kernels,
+    # and a neighbour on the next core makes one slow.
     quickest = steps()
-    for _ in range(2):
+    for _ in range(3):
         if quickest.max() < AT_ONCE:
             break
         quickest = np.minimum(quickest, steps())
