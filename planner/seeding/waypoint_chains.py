@@ -33,8 +33,8 @@ TURN_COST = 2e4
 TURN_SHARE = 0.475
 # A leg that is not evaluated yet.
 UNKNOWN = -1.0
-# Legs that are evaluated before the caller may end the work: some 20 ms at most.
-LEGS_AT_ONCE = 5_000
+# Legs that are evaluated before the caller may end the work: some 20 ms at most, on a slow processor.
+LEGS_AT_ONCE = 2_500
 # How far the work is: direction, waypoint and candidate that comes next, and legs evaluated.
 _CURSOR = np.dtype([(name, np.int64) for name in ("step", "waypoint", "candidate", "legs")])
 
