@@ -16,7 +16,12 @@ LOW := tests/world tests/aircraft tests/planner tests/flight/mission tests/fligh
 # What pyproject.toml names.
 DIRECT := ^(dask|distributed|foxglove-schemas-protobuf|gpxpy|jinja2|jsbsim|llvmlite|lz4|matplotlib|mcap|numba|numpy|pillow|$\
 	platformdirs|plotly|protobuf|pydantic|pymavlink|pyproj|pyulog|rasterio|scipy|shapely|tqdm|zstandard)[ ]
-INSTALL := $(BIN)/python -m pip install --quiet
+# Bytecode is made on all cores; pip makes it on one.  What cannot be compiled is no module, but a template.
+define INSTALL
+	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.$(EXTRAS)'
+	$(BIN)/python -W ignore -m compileall -qq -j 0 $(VENV)/lib || true
+endef
+EXTRAS :=
 # What is installed: an environment that is made; planfly; what the pages take, too; what the tests take, too.
 MADE := $(VENV)/.made
 READY := $(VENV)/.ready
@@ -40,7 +45,7 @@ test: $(TESTED) clients
 	$(BIN)/python -m pytest $(TWO)
 
 bench: $(TESTED)
-	$(INSTALL) --constraint constraints.txt --editable '.[test,bench]' || true
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[test,bench]' || true
 	$(BIN)/python -m tests.bench
 
 # Full counts.  The figures of all rooms go into build/soak.json; PLANFLY_SOAK_SHARE=0.1 takes a tenth of most.
@@ -86,16 +91,18 @@ $(MADE): pyproject.toml constraints.txt
 	touch $@
 
 $(READY): $(MADE)
-	$(INSTALL) --constraint constraints.txt --editable .
+	$(INSTALL)
 	touch $@
 
+$(PAGES): EXTRAS := [docs]
 $(PAGES): $(MADE)
-	$(INSTALL) --constraint constraints.txt --editable '.[docs]'
+	$(INSTALL)
 	touch $(READY) $@
 
 # The tests' own tools and clients, MAVSDK and MAVProxy among them, are far larger than planfly itself.
+$(TESTED): EXTRAS := [test,docs]
 $(TESTED): $(MADE)
-	$(INSTALL) --constraint constraints.txt --editable '.[test,docs]'
+	$(INSTALL)
 	touch $(READY) $(PAGES) $@
 
 # Other people's MCAP readers for Node and the judge of accessible pages, for the tests alone; without npm their tests say so.
