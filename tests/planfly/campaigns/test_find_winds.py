@@ -109,7 +109,7 @@ def test_how_narrowly_flights_passed_makes_the_boundary_surer(wind_base: Campaig
 
 
 @pytest.mark.usefixtures("here")
-@pytest.mark.parametrize("seed", range(4 if SOAK else 3))
+@pytest.mark.parametrize("seed", range(4))
 def test_what_was_stopped_anywhere_comes_out_the_same(
     wind_base: CampaignBase, whole: tuple[WindsFound, Path], tmp_path: Path, seed: int
 ) -> None:
