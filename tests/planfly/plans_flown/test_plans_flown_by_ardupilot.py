@@ -1,6 +1,5 @@
 """Plans of the default planner, flown by the autopilot that they are made for: nothing comes to harm."""
 
-import os
 from pathlib import Path
 
 import pytest
@@ -9,7 +8,7 @@ from flight.mission.from_plan import plan_mission
 from planfly.airframe import load_airframe
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from tests.autopilot_plans import TERRAINS, harm_of, plan_scenario
-from tests.clients import ROOT, need
+from tests.autopilots import need_arduplane
 from tests.soak import SOAK, scaled
 
 # On each terrain with the law, and once with the program itself.
@@ -40,8 +39,7 @@ def test_nothing_comes_to_harm_with_the_law(number: int) -> None:
 
 @pytest.mark.parametrize("number", REAL_NUMBERS)
 def test_nothing_comes_to_harm_with_the_program(number: int) -> None:
-    found = os.environ.get("PLANFLY_ARDUPLANE", ROOT.parent / "shared" / "autopilot" / "arduplane")
-    fly(number, Path(need(found, "ArduPlane", "software in the loop; PLANFLY_ARDUPLANE names it")))
+    fly(number, need_arduplane())
 
 
 def test_what_is_flown_is_on_each_terrain() -> None:
