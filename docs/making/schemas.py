@@ -3,7 +3,7 @@
 import json
 from typing import Any
 
-from planfly.terminal.answers.schemas import ANSWERS, schema_text
+from planfly.terminal.answers.giving import ANSWERS, schema_text
 
 
 def schema_tables(command: str) -> str:
