@@ -1,1 +1,1 @@
-"""What pages take from the code when they are built."""
+"""Text that pages take from the code when they are built."""

@@ -1,4 +1,4 @@
-"""The reference of the command line, made from its parser's own help."""
+"""The command-line reference, generated from the help of its parser."""
 
 import os
 import re
@@ -14,7 +14,7 @@ _ENTRY = re.compile(r"^  (\S.*?)(?:  +(\S.*))?$")
 
 @contextmanager
 def _wide(columns: int) -> Iterator[None]:
-    """Help in lines of so many columns, without colour."""
+    """Formats help with so many columns and without colour."""
     before = {name: os.environ.get(name) for name in ("COLUMNS", "NO_COLOR")}
     os.environ.update(COLUMNS=str(columns), NO_COLOR="1")
     try:
@@ -25,7 +25,7 @@ def _wide(columns: int) -> Iterator[None]:
 
 
 def command_pages() -> str:
-    """A section a command: what it does, its usage, options in their groups, examples; at the end the exit codes."""
+    """One section per command: description, usage, grouped options, examples; exit codes at the end."""
     parts = [_section(name, parser) for name, parser in build_parser().commands.items()]
     return "\n\n".join([*parts, f"## Exit codes\n\n```text\n{EXIT_CODES.strip()}\n```"])
 
@@ -35,7 +35,7 @@ def _section(name: str, parser: CommandParser) -> str:
         usage = parser.format_usage().strip()
     with _wide(100_000):
         text = parser.format_help().replace(EXIT_CODES.strip(), "")
-    # After the usage come what it does, the groups of options, and examples.
+    # The usage is followed by the description, the groups of options, and examples.
     description, _, rest = text.partition("\n\n")[2].partition("\n\n")
     out = [f"## {name}", _escaped(description.strip()), f"```text\n{usage}\n```"]
     for block in re.split(r"\n(?=\S)", rest):
@@ -48,7 +48,7 @@ def _section(name: str, parser: CommandParser) -> str:
 
 
 def _definitions(entries: str) -> str:
-    """Options and what they do, as a definition list."""
+    """Options and their meaning, as a definition list."""
     found: list[list[str]] = []
     for line in entries.splitlines():
         if not line.strip():

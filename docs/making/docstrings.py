@@ -1,4 +1,4 @@
-"""Docstrings of the house laid out for Sphinx: a line ``name: what it is`` describes an argument or a field."""
+"""Lays out docstrings for Sphinx: a line ``name: what it is`` describes an argument or a field."""
 
 import re
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ _NAMED = re.compile(r"^([a-z]\w*(?:, [a-z]\w*)*): (.*)$")
 
 
 def as_rst(lines: Iterable[str]) -> list[str]:
-    """The lines with each such name in bold on a line of its own."""
+    """The lines, with each such entry as a list item and its name in bold."""
     out: list[str] = []
     named = False
     for line in lines:

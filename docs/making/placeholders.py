@@ -1,4 +1,4 @@
-"""Placeholders of a page, ``<!-- made: NAME WORD... -->`` on a line of their own, and what comes in their place."""
+"""Placeholders of a page, ``<!-- made: NAME WORD... -->`` on a line of their own, and what replaces them."""
 
 import re
 from collections.abc import Callable
@@ -22,5 +22,5 @@ MAKERS: dict[str, Callable[..., str]] = {
 
 
 def filled(text: str) -> str:
-    """A page with what its placeholders stand for.  Raises KeyError for a placeholder that is none."""
+    """The page with its placeholders replaced.  Raises KeyError for an unknown placeholder."""
     return _PLACE.sub(lambda found: MAKERS[found[1]](*found[2].split()), text)

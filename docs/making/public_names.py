@@ -1,19 +1,19 @@
-"""The reference of the Python API: every name of `planfly.__all__`, from its docstring."""
+"""The Python API reference: every name of `planfly.__all__`, from its docstring."""
 
 import inspect
 
 import planfly
 
-# Functions as a script calls them; a name that is not here comes after them.
+# Functions in the order in which a script calls them; other names follow.
 _ORDER = (
     *("plan", "fly", "plan_then_fly", "check", "read_log", "figures", "report", "compare", "export", "campaign"),
     *("winds", "scenarios", "aircraft", "optimise"),
 )
-_TITLES = {"function": "Functions", "class": "What they give", "error": "Errors"}
+_TITLES = {"function": "Functions", "class": "Classes", "error": "Errors"}
 
 
 def kind_of(name: str) -> str:
-    """function, class or error; "" for what is neither."""
+    """function, class or error; "" for anything else."""
     value = getattr(planfly, name)
     if not inspect.isclass(value):
         return "function" if callable(value) else ""
@@ -21,7 +21,7 @@ def kind_of(name: str) -> str:
 
 
 def public_names() -> str:
-    """A section a kind, an entry a name."""
+    """One section per kind, one entry per name."""
     parts = []
     for kind, title in _TITLES.items():
         names = [name for name in dict.fromkeys((*_ORDER, *planfly.__all__)) if kind_of(name) == kind]

@@ -1,4 +1,4 @@
-"""Tables of what commands answer with ``--json``, made from their JSON schemas."""
+"""Tables of the ``--json`` output of commands, generated from their JSON schemas."""
 
 import json
 from typing import Any
@@ -7,7 +7,7 @@ from planfly.terminal.answers.giving import ANSWERS, schema_text
 
 
 def schema_tables(command: str) -> str:
-    """The fields of a command's answer, and of what it is made of: name, type, meaning."""
+    """The fields of a command's answer and of its nested objects: name, type, meaning."""
     schema = json.loads(schema_text(command))
     parts = [_table(schema)]
     for name, one in schema.get("$defs", {}).items():
@@ -44,7 +44,7 @@ def _type(one: dict[str, Any]) -> str:
 
 
 def answer_table() -> str:
-    """A row a command: its schema's name, and the fields at its top."""
+    """One row per command: the name of its schema, and its top-level fields."""
     rows = []
     for command in answering_commands():
         schema = json.loads(schema_text(command))

@@ -1,4 +1,4 @@
-"""The fields of a log's `/state` channel, read from its schema."""
+"""The fields of a log's `/state` channel, from its schema."""
 
 from logs.recording.state_channel import FIELDS
 

@@ -1,4 +1,4 @@
-"""Tables of the verdict's tolerances, read from their module: value, unit, reason and source as they stand there."""
+"""Tables of the verdict's tolerances, read from their module: value, unit, reason and source."""
 
 import ast
 import math
@@ -15,7 +15,7 @@ _HEADING = re.compile(r"^# [A-Z][^.]*$")
 
 
 class Tolerance(NamedTuple):
-    """A constant: its name, its value as a person reads it, what it is, and the heading that it stands under."""
+    """A constant: its name, its formatted value, its meaning, and the heading above it."""
 
     name: str
     value: str
@@ -24,7 +24,7 @@ class Tolerance(NamedTuple):
 
 
 def _shown(value: object, angle: bool) -> str:
-    """A value in words; an angle in degrees."""
+    """A value as text; an angle in degrees."""
     if isinstance(value, dict):
         return ", ".join(f"{key} {_shown(one, angle)}" for key, one in value.items())
     if isinstance(value, int | float):
@@ -43,12 +43,12 @@ def tolerance_list() -> tuple[Tolerance, ...]:
         if line.startswith("#"):
             comment.append(line[1:].strip())
         elif number in starts:
-            # A constant without words of its own shares those of the one above.
+            # A constant without a comment shares that of the one above.
             text = " ".join(comment) or out[-1].text
             for name, expression in _assigned(starts[number]):
                 angle = "radians" in expression or "math.pi" in expression
-                told = text.removeprefix("rad.").strip() if angle else text
-                out.append(Tolerance(name, _shown(getattr(tolerances, name), angle), told, heading))
+                meaning = text.removeprefix("rad.").strip() if angle else text
+                out.append(Tolerance(name, _shown(getattr(tolerances, name), angle), meaning, heading))
         elif not line:
             if comment:
                 heading = " ".join(comment)
@@ -59,7 +59,7 @@ def tolerance_list() -> tuple[Tolerance, ...]:
 
 
 def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
-    """Each name of an assignment with the expression that it gets."""
+    """Each name of an assignment with its expression."""
     target, value = node.targets[0], node.value
     if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
         pairs = zip(target.elts, value.elts, strict=True)
@@ -69,7 +69,7 @@ def _assigned(node: ast.Assign) -> list[tuple[str, str]]:
 
 def _table(rows: list[Tolerance]) -> str:
     body = "\n".join(f"| `{one.name}` | {one.value} | {one.text.replace('|', '/')} |" for one in rows)
-    return f"| constant | value | what it is, and its source |\n|---|---|---|\n{body}"
+    return f"| constant | value | meaning and source |\n|---|---|---|\n{body}"
 
 
 def imported_tolerances(module: str) -> set[str]:
@@ -84,13 +84,13 @@ def imported_tolerances(module: str) -> set[str]:
 
 
 def rule_tolerances(*modules: str) -> str:
-    """The table of what a rule's modules use."""
+    """The table of the tolerances that a rule's modules use."""
     wanted = set().union(*(imported_tolerances(module) for module in modules))
     return _table([one for one in tolerance_list() if one.name in wanted])
 
 
 def all_tolerances() -> str:
-    """Every tolerance, a table a heading."""
+    """Every tolerance, one table per heading."""
     headings = dict.fromkeys(one.heading for one in tolerance_list())
     parts = [
         f"### {heading}\n\n{_table([one for one in tolerance_list() if one.heading == heading])}"
