@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from world.errors import FlightError
-from world.text_files import did_you_mean
+from world.files import did_you_mean
 
 _COMMANDS = ("elevator", "aileron", "rudder", "throttle")
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")

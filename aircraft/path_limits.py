@@ -19,7 +19,7 @@ from world.wind import W20, Wind, mean_wind_speed
 Floats = NDArray[np.float64]
 
 # Rolling from one bank into the other takes this long, s per rad, as far as it is more than the bank limit: that much
-# every turn rolls in from level.  From the shortest S-turn legs that flights hold (`tests.bench.limits`).
+# every turn rolls in from level.  From the shortest S-turn legs that flights hold (`benchmarks.limits`).
 ROLL_TIME = 0.8
 # Vertical acceleration where one slope blends into the next, m/s^2.
 BLEND_ACCELERATION = 1.0

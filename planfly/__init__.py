@@ -35,12 +35,15 @@ if TYPE_CHECKING:
     from logs.recording.reader import read_log as read_log
     from logs.report.compare import Comparison as Comparison
     from logs.verdict.findings import Verdict as Verdict
-    from planfly.api.aircraft_data import aircraft as aircraft
+    from planfly.api.flying import ExportedFiles as ExportedFiles
+    from planfly.api.flying import FlownMission as FlownMission
+    from planfly.api.flying import WrittenReport as WrittenReport
     from planfly.api.flying import check as check
     from planfly.api.flying import fly as fly
     from planfly.api.optimising import BestFound as BestFound
     from planfly.api.optimising import Optimiser as Optimiser
     from planfly.api.optimising import optimise as optimise
+    from planfly.api.planning import aircraft as aircraft
     from planfly.api.planning import plan as plan
     from planfly.api.planning import plan_then_fly as plan_then_fly
     from planfly.api.planning import scenarios as scenarios
@@ -48,13 +51,10 @@ if TYPE_CHECKING:
     from planfly.api.reporting import export as export
     from planfly.api.reporting import figures as figures
     from planfly.api.reporting import report as report
-    from planfly.api.results import ExportedFiles as ExportedFiles
-    from planfly.api.results import FlownMission as FlownMission
-    from planfly.api.results import WrittenReport as WrittenReport
     from planfly.api.wind_limits import winds as winds
     from planfly.campaigns.campaign_result import CampaignResult as CampaignResult
     from planfly.campaigns.campaign_result import campaign as campaign
-    from planfly.campaigns.engine.cluster import SchedulerError as SchedulerError
+    from planfly.campaigns.engine.workers import SchedulerError as SchedulerError
     from planfly.campaigns.find_winds import WindsFound as WindsFound
     from planfly.campaigns.spread.spread_file import SpreadError as SpreadError
     from planfly.pipeline import PlanThenFly as PlanThenFly
@@ -76,15 +76,13 @@ _HOMES = {
         "logs.recording.reader": ("FlightLog", "read_log"),
         "logs.report.compare": ("Comparison",),
         "logs.verdict.findings": ("Verdict",),
-        "planfly.api.aircraft_data": ("aircraft",),
-        "planfly.api.flying": ("check", "fly"),
+        "planfly.api.flying": ("ExportedFiles", "FlownMission", "WrittenReport", "check", "fly"),
         "planfly.api.optimising": ("BestFound", "Optimiser", "optimise"),
-        "planfly.api.planning": ("plan", "plan_then_fly", "scenarios"),
+        "planfly.api.planning": ("aircraft", "plan", "plan_then_fly", "scenarios"),
         "planfly.api.reporting": ("compare", "export", "figures", "report"),
-        "planfly.api.results": ("ExportedFiles", "FlownMission", "WrittenReport"),
         "planfly.api.wind_limits": ("winds",),
         "planfly.campaigns.campaign_result": ("CampaignResult", "campaign"),
-        "planfly.campaigns.engine.cluster": ("SchedulerError",),
+        "planfly.campaigns.engine.workers": ("SchedulerError",),
         "planfly.campaigns.find_winds": ("WindsFound",),
         "planfly.campaigns.spread.spread_file": ("SpreadError",),
         "planfly.pipeline": ("PlanThenFly",),

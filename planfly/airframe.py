@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 
 from aircraft.catalog import Aircraft, find_aircraft, model_hash
 from aircraft.path_limits import Limits
-from flight.ardupilot.parameters import ArduPilotParameters, load_parameters
-from flight.ardupilot.tracking_error import tracking_error
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.autopilots.arduplane.tracking_error import tracking_error
 from flight.dynamics.envelope_tables import load_envelope
-from flight.simulation.flight_setup import make_limits
+from flight.simulation.setup import make_limits
 from world.errors import FlightError, ScenarioError
 from world.scenario import Scenario
 

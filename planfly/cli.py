@@ -5,8 +5,8 @@ import os
 import sys
 from collections.abc import Sequence
 
-from planfly.terminal.colour import coloured
-from planfly.terminal.completion import ASKS_COMPLETION, answer_shell
+from planfly.terminal.arguments import ASKS_COMPLETION, answer_shell
+from planfly.terminal.command_parser import coloured
 from planfly.terminal.exit_codes import BAD_INPUT, FAULT, INTERRUPTED
 from planfly.terminal.output import open_standard_streams, printable, tolerate_closed_output
 from planfly.terminal.parser import build_parser
@@ -52,7 +52,7 @@ def _outcome(argv: Sequence[str] | None) -> int:
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
     from planfly.commands.registry import find_command
-    from planfly.first_start.announcing import announced_kernels
+    from planfly.first_start import announced_kernels
     from planfly.kernel_units.unit_kernels import COMMAND_UNITS
     from planfly.terminal.answers.giving import asked_output
     from world.errors import PlanflyError

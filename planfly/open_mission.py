@@ -1,22 +1,103 @@
 """Opening whatever a person brings: a plan, or a mission file with or without a scenario."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flight.mission.fences import fence_zones, numbered, with_fences
 from flight.mission.from_plan import plan_mission
 from flight.mission.implied_scenario import implied_scenario
-from flight.mission.items import Mission
+from flight.mission.items import Mission, MissionItem
 from flight.mission.placing import place_stops
-from flight.mission_files.formats import read_mission
-from flight.simulation.flight_setup import FlightSetup
+from flight.mission_files.formats import read_fence, read_mission
+from flight.simulation.setup import FlightSetup
+from logs.verdict.rules.fence_rule import zone_test
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.named_fences import NamedFences
 from planfly.pipeline import make_setup
 from planner.plan import Plan, parse_plan, plan_json, read_plan
+from world.airspace.zone_files import SUFFIXES, read_zone_file
 from world.errors import MissionError, PlanflyError
-from world.scenario import Scenario, load_scenario
-from world.text_files import did_you_mean
+from world.files import did_you_mean
+from world.frames import GeoOrigin
+from world.scenario import Scenario, load_scenario, with_zones
+from world.scenario_tables import ZoneTable
+
+# ----------------------------------------------------------------------
+# Fences that a command names beside its mission or log: files of fence items, and of zones.
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFences:
+    """What the files hold.
+
+    items: of fences, which join the mission's own.
+    zones: of GeoJSON and KML, by the file that each comes from; they join the scenario's.
+    """
+
+    items: tuple[MissionItem, ...] = ()
+    zones: tuple[tuple[str, tuple[ZoneTable, ...]], ...] = ()
+
+    def on_mission(self, mission: Mission) -> Mission:
+        """A mission with the fence items beside its own."""
+        if not self.items:
+            return mission
+        warnings = mission.warnings
+        if mission.fences:
+            warnings = (*warnings, f"its own fence of {len(mission.fences)} items counts beside the one named")
+        return replace(mission, fences=numbered([*mission.fences, *self.items]), warnings=warnings)
+
+    def on_scenario(self, scenario: Scenario) -> Scenario:
+        """A scenario with the zones beside its own.  Raises ScenarioError as `with_zones` does."""
+        for source, tables in self.zones:
+            scenario = with_zones(scenario, tables, source)
+        return scenario
+
+
+def read_named_fences(files: Sequence[str]) -> NamedFences:
+    """Read what the options ``--fence`` name, by the suffix of each.
+
+    Raises MissionError or ScenarioError for a file that cannot be read, that holds no fence, or one whose shapes are
+    none.
+
+    >>> read_named_fences([])
+    NamedFences(items=(), zones=())
+    """
+    items: list[MissionItem] = []
+    zones = []
+    for file in files:
+        path = Path(file)
+        if path.suffix.lower() in SUFFIXES:
+            zones.append((file, tuple(read_zone_file(path, file))))
+            continue
+        found = read_fence(path)
+        # Shapes are checked while it is known which file they are from.
+        fence_zones(found, GeoOrigin(found[0].lat_deg, found[0].lon_deg), file)
+        items += found
+    return NamedFences(tuple(items), tuple(zones))
+
+
+# ----------------------------------------------------------------------
+# A plan's threats, area and zones as the fence of its mission: one that its judge finds kept.
+
+
+def fence_of_plan(setup: FlightSetup) -> tuple[Mission, tuple[str, ...]]:
+    """The setup's mission with its scenario as a fence beside its own, and notes on what the fence cannot hold.
+
+    Each shape is asked for as the verdict's rule `fence` asks, of the planned path with its arcs: what the rule would
+    find violated is left out, and named in the notes.
+
+    >>> from logs.recording.example_log import example_log
+    >>> mission, notes = fence_of_plan(example_log().setup)
+    >>> [item.command for item in mission.fences]  # the area; the example has no missiles
+    [5001, 5001, 5001, 5001]
+    """
+    is_entered = zone_test(setup)
+
+    def passes(shape: tuple[MissionItem, ...]) -> bool:
+        return any(is_entered(zone) for zone in fence_zones(shape, setup.scenario.origin))
+
+    return with_fences(setup.mission, setup.scenario, passes)
+
 
 MCAP_MAGIC = b"\x89MCAP"
 

@@ -8,27 +8,25 @@ from typing import Literal
 import numpy as np
 
 from flight.dynamics.fdm import Variation
-from flight.mission.end_courses import with_end_courses
-from flight.mission.fence_zones import fence_zones
+from flight.mission.fences import fence_zones
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import Mission
 from flight.mission.placing import PlacedMission
-from flight.mission.routing import lay_route, make_route
+from flight.mission.route import lay_route, make_route, with_end_courses
 from flight.mission_files.formats import mission_text
 from flight.simulation.airborne import Airborne
-from flight.simulation.flight_setup import FDM_HZ, FlightSetup
+from flight.simulation.setup import FDM_HZ, FlightSetup
 from flight.simulation.simulate import Flight, fly_to_end
 from flight.simulation.track import Track, join_tracks
 from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
-from logs.verdict.levels import FlownBeside
+from logs.verdict.places import FlownBeside
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.flight_limits import FlightLimits
-from planfly.flights_beside import judge_with_flights_beside
-from planfly.whole_log import WholeLog
+from planfly.crash_safe_log import FlightLimits, WholeLog
+from planfly.reference_flights import judge_with_flights_beside
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -233,7 +231,7 @@ def _fly_program(
     most: FlightLimits,
 ) -> JudgedFlight:
     # Imported here: nobody else needs MAVLink.
-    from flight.real_autopilot.autopilot_flight import AutopilotFlight
+    from flight.autopilots.arduplane_sitl.flight import AutopilotFlight
 
     with AutopilotFlight(setup, airframe.aircraft, autopilot) as flight:
         flight.prepare()

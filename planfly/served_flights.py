@@ -21,10 +21,9 @@ from flight.live.flight_process import (
     send_event,
     serve_flights,
 )
-from flight.live.snapshot import SnapshotMaker
-from flight.live.status_text import CRITICAL, INFO, NOTICE, WARNING, StatusText
+from flight.live.telemetry import CRITICAL, INFO, NOTICE, WARNING, SnapshotMaker, StatusText
 from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import Flight
 from flight.simulation.track import Track, as_track, join_tracks
 from logs.recording.recorder import Recorder
@@ -32,15 +31,13 @@ from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
-from planfly.flights_beside import judge_with_flights_beside
-from planfly.named_fences import NamedFences
-from planfly.open_mission import open_mission
+from planfly.open_mission import NamedFences, open_mission
 from planfly.pipeline import make_setup
+from planfly.reference_flights import judge_with_flights_beside
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_when_told
-from world.scenario import Scenario, load_scenario
-from world.scenario_variants import with_flight
+from world.scenario import Scenario, load_scenario, with_flight
 
 DEFAULT_SCENARIO = "jacksboro"
 # Most texts about one verdict; the log has the rest.
@@ -185,7 +182,7 @@ class ServedLog:
         self._recorder.flush()
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
-        """Judge the flight and close the log; hurry: as of `planfly.flights_beside.judge_with_flights_beside`."""
+        """Judge the flight and close the log; hurry: as of `planfly.reference_flights.judge_with_flights_beside`."""
         track = join_tracks(self._blocks)
         if ended == "completed":
             verdict, beside = judge_with_flights_beside(self._setup, self._aircraft, track, ended, hurry)

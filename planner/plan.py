@@ -1,6 +1,7 @@
 """A plan: waypoints, how they were evaluated, and the scenario they were made for."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
@@ -12,14 +13,15 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from world.errors import MissionError
-from world.scenario import Scenario, from_spec
+from world.files import read_small_file
+from world.html_table import html_table
+from world.scenario import Scenario, fixed_ends, from_spec
 from world.scenario_file import first_fault
-from world.scenario_variants import fixed_ends
 from world.terrain import Terrain
-from world.text_files import read_small_file
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
 
 PLAN_SCHEMA = "planfly.plan/1"
 # Ten thousand waypoints among as many threats are 4 MB.
@@ -138,8 +140,6 @@ class Plan:
 
     def _repr_html_(self) -> str:
         """How a notebook shows it."""
-        from planner.plan_table import plan_html
-
         return plan_html(self)
 
 
@@ -318,3 +318,22 @@ def _refuse_constant(name: str) -> float:
 def _check_names(source: str, field: str, given: dict[str, Any], wanted: Sequence[str]) -> None:
     if sorted(given) != sorted(wanted):
         raise MissionError.at(source, field, sorted(given), f"keys {sorted(wanted)} are expected")
+
+
+# ----------------------------------------------------------------------
+# A plan as a small table for a notebook.
+
+
+def plan_html(plan: Plan) -> str:
+    """What a plan is, how far it keeps from its limits, and what of it fails."""
+    made = plan.certificate
+    rows = [
+        ("waypoints", len(plan.waypoints)),
+        ("length / straight line", f"{plan.objectives[Objective.LENGTH_RATIO]:.4f}"),
+        ("clearance to spare", f"{made.clearance:.1f} m"),
+        ("outside missiles' reach by", f"{made.kill_distance:.0f} m" if math.isfinite(made.kill_distance) else "none"),
+        ("turns and slopes to spare", f"{math.degrees(made.turn):.1f}°, {math.degrees(made.slope):.2f}°"),
+        ("algorithm, seed", f"{plan.algorithm}, {plan.seed}"),
+        *(("fails", problem) for problem in made.problems),
+    ]
+    return html_table(f"Plan {plan.scenario.name}: {plan.state}", rows)

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-_FAKE = Path(__file__).parent / "flight" / "real_autopilot" / "fake_autopilot.py"
+_FAKE = Path(__file__).parent / "flight" / "autopilots" / "arduplane_sitl" / "fake_autopilot.py"
 
 
 def write_fake(folder: Path, fault: str = "none") -> Path:
-    """Write a program that fails in one way of `tests.flight.real_autopilot.fake_autopilot.FAULTS`; its path."""
+    """Write a program that fails in one way of the fake autopilot's `FAULTS`; its path."""
     program = folder / f"autopilot-{fault}"
     program.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, str(_FAKE), fault])} "$@"\n', encoding="utf-8")
     program.chmod(0o755)

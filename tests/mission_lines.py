@@ -9,16 +9,14 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Mission
-from flight.mission.route import Route
-from flight.mission.routing import make_route
+from flight.mission.route import Route, make_route
 from flight.mission_files.formats import parse_mission
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from planner.plan import Certificate, Plan
 from tests.setups import route_along, setup_along, spec_around
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_geo
-from world.scenario import from_spec, load_scenario
-from world.scenario_variants import with_wind
+from world.scenario import from_spec, load_scenario, with_wind
 from world.terrain import Terrain, flat_terrain
 
 ORIGIN = GeoOrigin(36.5, -84.2)

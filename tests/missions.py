@@ -17,7 +17,7 @@ from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
 from flight.dynamics.envelope_tables import load_envelope
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.places import Place
 from planfly.airframe import Airframe, load_airframe
 from planfly.pipeline import make_setup

@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance.fly_by_path import FlyByPath, arc_point
-from flight.guidance.path_kernels import profile
+from flight.guidance.path import FlyByPath, arc_point, profile
 
 
 def sample_path(path: FlyByPath, step: float) -> NDArray[np.float64]:

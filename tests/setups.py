@@ -16,7 +16,7 @@ from aircraft.envelope import Envelope
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.setup import FlightSetup, make_limits
 from world.frames import GeoOrigin, to_geo
 from world.scenario import Scenario, from_spec
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, Envelope
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.setups import route_along, setup_along, spec_around
 from world.geometry import leg_courses, leg_runs, signed_turns

@@ -50,7 +50,7 @@ def test_a_modules_own_tests_come_first_and_its_limits_are_found_where_they_are_
 
 
 def test_compiled_code_that_rests_on_what_changes_is_known() -> None:
-    gusts = replacing("physics", "flight/simulation/dryden.py", "sigma_w = 0.1 * w20", "sigma_w = 0.2 * w20")
+    gusts = replacing("physics", "flight/simulation/turbulence.py", "sigma_w = 0.1 * w20", "sigma_w = 0.2 * w20")
     assert "flight/simulation/tick.py" in kernels_on(gusts)
     far = replacing("limits", "logs/verdict/tolerances.py", "FAR = 30.0", "FAR = 3.0")
     assert "logs/verdict/measures/path_sweeps.py" in kernels_on(far)

@@ -16,7 +16,7 @@ from numba.core import event
 from numpy.typing import NDArray
 from platformdirs import user_cache_dir
 
-from world.compilation.announcement import kernel_is_compiled
+from world.compile_events import kernel_is_compiled
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 _Array = TypeVar("_Array", bound=NDArray[Any])

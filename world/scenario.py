@@ -1,8 +1,9 @@
 """A scenario: where to fly from and to, over which terrain, past which threats, within which limits."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -14,26 +15,97 @@ from world.airspace.zone_files import read_zone_files
 from world.airspace.zones import Zone
 from world.airspace.zones_on_map import check_ends, make_zones
 from world.errors import ScenarioError, TerrainError
-from world.frames import GeoOrigin, to_geo
+from world.files import did_you_mean, whole_path
+from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
-from world.scenario_positions import check_inside, make_threats, map_position
 from world.scenario_tables import (
+    MOST_ZONES,
     AreaTable,
     FlightTable,
     LimitsTable,
     OriginTable,
     PlannerTable,
+    PointTable,
     ScenarioFile,
     TerrainTable,
+    ThreatTable,
+    WindTable,
+    ZoneTable,
     names_folder,
 )
 from world.terrain import Peak, Terrain, flat_terrain, peaks_terrain
-from world.text_files import did_you_mean, whole_path
-from world.threats import Threats
+from world.threats import Threats, threat_label
 from world.wind import Wind
 
 Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Positions of a scenario file on the map: its ends, and its threats on their ground.
+
+
+def map_position(table: PointTable, key: str, source: str, origin: GeoOrigin, ground: Terrain | None) -> Floats:
+    """East, north, up (3,) m of a position; a height above ground is counted from the terrain.
+
+    key, source: of the table and its file, for messages.  Raises ScenarioError where there is no terrain to count from.
+    """
+    if table.east_m is not None and table.north_m is not None:
+        east, north = table.east_m, table.north_m
+    else:
+        point = to_map(origin, float(table.lat_deg or 0.0), float(table.lon_deg or 0.0))
+        east, north = float(point[0]), float(point[1])
+    if table.amsl_m is not None:
+        return np.array([east, north, table.amsl_m])
+    under = float(ground.height(east, north)) if ground is not None else math.nan
+    if math.isnan(under):
+        raise ScenarioError(
+            f"{source}: {key}: east {east:.0f} m, north {north:.0f} m:"
+            " no terrain there to count a height from; give amsl_m",
+            file=source,
+            field=key,
+        )
+    return np.array([east, north, under + (table.height_m or 0.0)])
+
+
+def check_inside(
+    key: str, point: Floats, source: str, bounds: Floats, floor: float, ceiling: float, ground: Terrain | None
+) -> None:
+    """Raise ScenarioError for an end (3,) outside the area (2, 2), floor and ceiling (m AMSL), or in the ground."""
+    for axis, name in enumerate(("east", "north")):
+        low, high = bounds[axis]
+        if not low <= point[axis] <= high:
+            shown, allowed = f"{name} {point[axis]:.0f} m", f"outside the area {low:.0f}..{high:.0f}"
+            raise ScenarioError.at(source, key, float(point[axis]), allowed, shown=shown)
+    amsl = f"{point[2]:.0f} m AMSL"
+    if not floor <= point[2] <= ceiling:
+        allowed = f"outside floor..ceiling {floor:.0f}..{ceiling:.0f}"
+        raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
+    if ground is not None:
+        under = float(ground.height(point[0], point[1]))
+        if point[2] <= under:
+            allowed = f"not above the terrain, which is at {under:.0f} m"
+            raise ScenarioError.at(source, key, float(point[2]), allowed, shown=amsl)
+
+
+def make_threats(tables: list[ThreatTable], source: str, origin: GeoOrigin, ground: Terrain | None) -> Threats:
+    """Place the threats of a scenario file on the map, each on the ground unless it gives a height.
+
+    Raises ScenarioError for one that stands where there is no terrain, and gives no height above mean sea level.
+    """
+    positions = np.zeros((len(tables), 3))
+    for k, table in enumerate(tables):
+        on_ground = table if table.amsl_m is not None else table.model_copy(update={"height_m": table.height_m or 0.0})
+        positions[k] = map_position(on_ground, f"threats[{k}]", source, origin, ground)
+    return Threats(
+        names=tuple(threat_label(table.name or "", k) for k, table in enumerate(tables)),
+        position=positions,
+        kill_radius=np.array([table.kill_radius_m or 0.0 for table in tables]),
+        detection_radius=np.array([table.detection_radius_m or 0.0 for table in tables]),
+        kill_scale=np.array([table.kill_scale_m or 0.0 for table in tables]),
+        detection_scale=np.array([table.detection_scale_m or 0.0 for table in tables]),
+    )
+
 
 # Ground beyond the area that is kept, m: a flight may overshoot a corner at the map's edge.
 GROUND_BUFFER = 1000.0
@@ -318,3 +390,155 @@ def geographic(scenario: Scenario, points: Floats) -> tuple[Floats, Floats]:
     (46.0, 8.03356)
     """
     return to_geo(scenario.origin, points[..., 0], points[..., 1])
+
+
+# ----------------------------------------------------------------------
+# Variants of a scenario: another terrain, wind, flight or planner, or more threats.
+
+
+def over_terrain(scenario: Scenario, terrain: str) -> Scenario:
+    """A scenario over another elevation file.
+
+    Its ends keep their heights above sea level; threats that stand on the ground stand on the new one.
+    Raises TerrainError for a file that cannot be read or does not cover the area.
+
+    >>> from world.scenario import load_scenario
+    >>> over_terrain(load_scenario("jacksboro"), "jacksboro").terrain.source
+    'jacksboro'
+    """
+    spec = fixed_ends(scenario.to_json(), scenario.start, scenario.destination)
+    return from_spec(spec, scenario.name, terrain=terrain, external=scenario.external)
+
+
+def fixed_ends(spec: dict[str, Any], start: Floats, destination: Floats) -> dict[str, Any]:
+    """A scenario's JSON data with its ends at the heights of these points (m AMSL), whatever is below them.
+
+    start, destination: (3,).  A height above ground (`height_m`) gives way to the one above mean sea level.
+
+    >>> data = {"start": {"east_m": 0.0, "north_m": 0.0, "height_m": 50.0}, "destination": {"amsl_m": 300.0}}
+    >>> fixed_ends(data, np.array([0.0, 0.0, 250.0]), np.array([900.0, 0.0, 300.0]))["start"]
+    {'east_m': 0.0, 'north_m': 0.0, 'amsl_m': 250.0}
+    """
+    changed = dict(spec)
+    for key, point in (("start", start), ("destination", destination)):
+        if isinstance(spec.get(key), dict):
+            kept = {name: value for name, value in spec[key].items() if name != "height_m"}
+            changed[key] = kept | {"amsl_m": float(point[2])}
+    return changed
+
+
+def with_wind(scenario: Scenario, speed: float | None, from_course: float | None, turbulence: str | None) -> Scenario:
+    """A scenario in another wind; None keeps what it has.
+
+    speed: m/s, with from_course: rad, where it comes from.  turbulence: "none", "light" or "moderate".
+    Raises ScenarioError for a wind that a scenario file may not have either.
+
+    >>> from world.scenario import load_scenario
+    >>> with_wind(load_scenario("tight"), 5.0, math.radians(270.0), "light").wind.at(75.0)
+    (5.0, ...)
+    """
+    table = scenario.spec.wind
+    changes: dict[str, Any] = {}
+    if speed is not None and from_course is not None:
+        changes |= {"speed_mps": speed, "from_deg": math.degrees(from_course)}
+    if turbulence is not None:
+        changes["turbulence"] = turbulence
+    changed = checked_table(lambda: WindTable(**(table.model_dump() | changes)), f"{scenario.name}: wind")
+    spec = scenario.spec.model_copy(update={"wind": changed})
+    wind = replace(
+        scenario.wind,
+        speed=spec.wind.speed_mps,
+        from_course=math.radians(spec.wind.from_deg),
+        turbulence=spec.wind.turbulence,
+    )
+    return replace(scenario, spec=spec, wind=wind)
+
+
+def with_flight(scenario: Scenario, **changes: Any) -> Scenario:
+    """A scenario with other entries of [flight]; None keeps what it has.
+
+    A law of guidance takes the place of an autopilot and its parameters, and they take that of a law.
+    Raises ScenarioError for a value that a scenario file may not have either.
+
+    >>> from world.scenario import load_scenario
+    >>> with_flight(load_scenario("tight"), airspeed_mps=28.0, nav=None).flight.airspeed_mps
+    28.0
+    """
+    given = {key: value for key, value in changes.items() if value is not None}
+    kept = scenario.flight.model_dump()
+    if "guidance" in given or "params" in given or "autopilot" in given:
+        kept |= {"autopilot": None, "guidance": None, "params": None}
+    table = checked_table(lambda: FlightTable(**(kept | given)), f"{scenario.name}: flight")
+    return replace(scenario, spec=scenario.spec.model_copy(update={"flight": table}), flight=table)
+
+
+def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> Scenario:
+    """A scenario with more zones; source: names them in messages.
+
+    Raises ScenarioError for a shape that is none, for a level above ground where there is no terrain, and for more
+    zones than a scenario may have; and, but in a scenario made around a mission, for a zone that an end violates.
+
+    >>> from world.scenario import load_scenario
+    >>> mast = ZoneTable(name="mast", kind="exclusion", east_m=1300.0, north_m=400.0, radius_m=200.0)
+    >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
+    ['mast']
+    """
+    if len(scenario.zones) + len(tables) > MOST_ZONES:
+        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MOST_ZONES:,} in all", file=source)
+    zones = make_zones(tables, source, scenario.origin, scenario.terrain)
+    ends = (("start", scenario.start), ("destination", scenario.destination))
+    check_ends(zones, source, () if scenario.external else ends, scenario.terrain)
+    spec = scenario.spec.model_copy(update={"zones": [*(scenario.spec.zones or ()), *tables]})
+    return replace(scenario, spec=spec, zones=(*scenario.zones, *zones))
+
+
+def with_threats(
+    scenario: Scenario,
+    added: Sequence[tuple[float, float, float, float]],
+    source: str,
+    kept: Sequence[ThreatTable] = (),
+) -> Scenario:
+    """A scenario with more threats on its ground.
+
+    added: east, north, kill radius and detection radius of each, m; a radius of 0 for none.  Their scales are the
+    median shares of the radius of those that the scenario has, or a quarter and a third.
+    source: names them in messages.  kept: tables that come before them.
+    Raises ScenarioError for a threat that a scenario file may not have either.
+
+    >>> from world.scenario import load_scenario
+    >>> more = with_threats(load_scenario("tight"), [(1300.0, 90.0, 20.0, 0.0)], "--threat")
+    >>> more.threats.names[-1], float(more.threats.kill_radius[-1])
+    ('pop-up 1', 20.0)
+    """
+
+    def share(radius: Floats, scale: Floats, default: float) -> float:
+        armed = radius > 0.0
+        return float(np.median(scale[armed] / radius[armed])) if armed.any() else default
+
+    known = scenario.threats
+    kill_share = share(known.kill_radius, known.kill_scale, 1.0 / 4.0)
+    detection_share = share(known.detection_radius, known.detection_scale, 1.0 / 3.0)
+    tables = [*scenario.spec.threats, *kept]
+    for number, (east, north, kill, detection) in enumerate(added):
+        data: dict[str, Any] = {"name": f"pop-up {len(kept) + number + 1}", "east_m": east, "north_m": north}
+        if kill != 0.0:
+            data |= {"kill_radius_m": kill, "kill_scale_m": kill * kill_share}
+        if detection != 0.0:
+            data |= {"detection_radius_m": detection, "detection_scale_m": detection * detection_share}
+        tables.append(checked_table(partial(ThreatTable, **data), source))
+    spec = scenario.spec.model_copy(update={"threats": tables})
+    return replace(scenario, spec=spec, threats=make_threats(tables, source, scenario.origin, scenario.terrain))
+
+
+def with_planner(scenario: Scenario, source: str, **changes: Any) -> Scenario:
+    """A scenario with other keys of [planner]; ``source`` names them in messages.
+
+    Raises ScenarioError for a value that a scenario file may not have either.
+
+    >>> from world.scenario import load_scenario
+    >>> with_planner(load_scenario("tight"), "--seed", seed=7).planner.seed
+    7
+    """
+    table = scenario.planner.model_dump() | changes
+    changed = checked_table(lambda: PlannerTable(**table), source)
+    return replace(scenario, spec=scenario.spec.model_copy(update={"planner": changed}), planner=changed)

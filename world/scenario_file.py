@@ -9,8 +9,8 @@ from typing import Any, NamedTuple, TypeVar, get_args
 from pydantic import BaseModel, ValidationError
 
 from world.errors import ScenarioError
+from world.files import did_you_mean, read_small_file, toml_table
 from world.scenario_tables import ScenarioFile
-from world.text_files import did_you_mean, read_small_file, toml_table
 
 Table = TypeVar("Table", bound=BaseModel)
 

@@ -6,30 +6,138 @@ into a `Scenario`.
 
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import AfterValidator, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 
-from world.airspace.zone_tables import MOST_ZONES, ZoneTable
-from world.scenario_types import (
-    MAP_EXTENT,
-    Amsl,
-    Angle,
-    Autopilot,
-    Course,
-    FilePath,
-    Guidance,
-    Height,
-    Latitude,
-    Longitude,
-    Metres,
-    Name,
-    Navigation,
-    Radius,
-    ScenarioTable,
-    Seed,
-    Span,
-    no_line_break,
-    within,
-)
+# ----------------------------------------------------------------------
+# The numbers, names and choices that a scenario file holds, with their ranges, and what its tables share.
+
+# Positions lie within this distance of the map's origin, east or west and north or south, m.
+MAP_EXTENT = 500_000.0
+
+
+def no_line_break(text: str) -> str:
+    """The text, if it is one line."""
+    if not text.isprintable():
+        raise ValueError("control characters are not allowed")
+    return text
+
+
+def within(low: float, high: float, *, above: bool = False, below: bool = False, also: str = "") -> AfterValidator:
+    """Allow ``low``..``high``, without ``low`` if ``above`` and without ``high`` if ``below``; the error says so.
+
+    also: what else the field takes, for the message.
+    """
+
+    def check(value: float) -> float:
+        # Written so that NaN fails.
+        if (low < value if above else low <= value) and (value < high if below else value <= high):
+            return value
+        first, last = ("above " if above else ""), ("below " if below else "")
+        least, most = (x if isinstance(x, int) else f"{x:.12g}" for x in (low, high))
+        raise ValueError(f"allowed {first}{least}..{last}{most}{also}")
+
+    return AfterValidator(check)
+
+
+Metres = Annotated[float, within(-MAP_EXTENT, MAP_EXTENT)]
+Amsl = Annotated[float, within(-500.0, 9000.0)]
+Height = Annotated[float, within(0.0, 9000.0)]
+Latitude = Annotated[float, within(-89.0, 89.0)]
+Longitude = Annotated[float, within(-180.0, 180.0)]
+Course = Annotated[float, within(-360.0, 360.0)]
+Radius = Annotated[float, within(0.0, 200_000.0, above=True)]
+Name = Annotated[str, Field(min_length=1, max_length=100), AfterValidator(no_line_break)]
+FilePath = Annotated[str, Field(min_length=1, max_length=4096), AfterValidator(no_line_break)]
+Autopilot = Literal["ardupilot", "ideal"]
+Guidance = Literal["path", "l1", "vector-field"]
+Navigation = Literal["perfect", "rtk", "gnss"]
+Seed = Annotated[int, within(0, 2**63 - 1)]
+Span = Annotated[list[Metres], Field(min_length=2, max_length=2)]
+Angle = Annotated[float, within(0.0, 90.0, above=True, below=True, also=', or "aircraft"')] | Literal["aircraft"]
+
+
+class ScenarioTable(BaseModel):
+    """A table of a scenario file: unknown keys are refused."""
+
+    # Strict: pydantic would otherwise take true, "5" and "yes" for numbers and truths.  Each number states its own
+    # range, which NaN and the infinities are outside of.
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+
+# ----------------------------------------------------------------------
+# [[zones]] of a scenario file as a pydantic model.
+
+# Corners of a ring, and rings of a zone, at most.
+MOST_CORNERS, MOST_RINGS = 20_000, 1_000
+# Zones of a scenario at most, those of its files included.
+MOST_ZONES = 20_000
+
+
+def _latitude_first(corner: list[float]) -> list[float]:
+    """The corner, if its first number can be a latitude."""
+    if not -89.0 <= corner[0] <= 89.0:
+        raise ValueError(f"latitude {corner[0]:g}: allowed -89..89; a corner is [latitude, longitude]")
+    return corner
+
+
+_MetreCorner = Annotated[list[Metres], Field(min_length=2, max_length=2)]
+_Degrees = Annotated[float, within(-180.0, 180.0)]
+_DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_latitude_first)]
+_MetreRing = Annotated[list[_MetreCorner], Field(max_length=MOST_CORNERS)]
+_DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MOST_CORNERS)]
+
+
+class ZoneTable(ScenarioTable):
+    """[[zones]]: a polygon, by its corners, or a cylinder, by its centre and radius; and its band of heights.
+
+    polygon_m: corners as [east, north]; polygon_deg: as [latitude, longitude].
+    rings_m, rings_deg: several such rings, for a zone with holes or of several parts: inside is what lies in an odd
+    number of them.
+    east_m, north_m or lat_deg, lon_deg, with radius_m: a cylinder.
+    floor, ceiling: above mean sea level or above ground; none where neither is given.
+    """
+
+    name: Name
+    kind: Literal["inclusion", "exclusion"]
+    polygon_m: _MetreRing | None = None
+    polygon_deg: _DegreeRing | None = None
+    rings_m: Annotated[list[_MetreRing], Field(max_length=MOST_RINGS)] | None = None
+    rings_deg: Annotated[list[_DegreeRing], Field(max_length=MOST_RINGS)] | None = None
+    east_m: Metres | None = None
+    north_m: Metres | None = None
+    lat_deg: Latitude | None = None
+    lon_deg: Longitude | None = None
+    radius_m: Radius | None = None
+    floor_amsl_m: Amsl | None = None
+    floor_agl_m: Height | None = None
+    ceiling_amsl_m: Amsl | None = None
+    ceiling_agl_m: Height | None = None
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> "ZoneTable":
+        shapes = ("polygon_m", "polygon_deg", "rings_m", "rings_deg", "radius_m")
+        given = [key for key in shapes if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(f"polygon_m: give one of {', '.join(shapes)}, not {len(given)}")
+        metres = (self.east_m is not None, self.north_m is not None)
+        degrees = (self.lat_deg is not None, self.lon_deg is not None)
+        if self.radius_m is None:
+            if any(metres) or any(degrees):
+                raise ValueError("radius_m: missing; a centre is a cylinder's")
+        elif not ((all(metres) and not any(degrees)) or (all(degrees) and not any(metres))):
+            raise ValueError("position: give east_m and north_m, or lat_deg and lon_deg, not both")
+        return self
+
+    @model_validator(mode="after")
+    def _one_band(self) -> "ZoneTable":
+        for side in ("floor", "ceiling"):
+            if getattr(self, f"{side}_amsl_m") is not None and getattr(self, f"{side}_agl_m") is not None:
+                raise ValueError(f"{side}_agl_m: give {side}_amsl_m or {side}_agl_m, not both")
+        for datum in ("amsl", "agl"):
+            floor, ceiling = getattr(self, f"floor_{datum}_m"), getattr(self, f"ceiling_{datum}_m")
+            if floor is not None and ceiling is not None and ceiling <= floor:
+                raise ValueError(f"ceiling_{datum}_m: {ceiling:g}: must be above floor_{datum}_m {floor:g}")
+        return self
 
 
 class OriginTable(ScenarioTable):

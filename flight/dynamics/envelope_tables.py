@@ -13,7 +13,7 @@ from aircraft.catalog import Aircraft, model_hash
 from aircraft.envelope import POWERS, TABLES, Envelope
 from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
 from flight.dynamics.trim import Floats, Trim, fastest, full_throttle, idle, slowest, straight
-from world.atomic_files import write_whole
+from world.files import write_whole
 
 # Any change of what the file holds or of how it is computed counts this up.
 _SCHEMA = 4

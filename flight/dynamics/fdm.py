@@ -5,19 +5,27 @@ says that anything is wrong: after a NaN, under ground or after a crash it runs 
 it reads.
 """
 
+import contextlib
+import io
+import itertools
 import math
+import os
 import struct
-from collections.abc import Callable, Iterable, Sequence
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import jsbsim
 import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.catalog import Aircraft
-from flight.dynamics.engine import Engine
 from flight.dynamics.jsbsim_properties import (
     FLAT_DENSITY,
+    FLAT_PLANET,
     FOOT,
     FORCES,
     GUST,
@@ -33,16 +41,125 @@ from flight.dynamics.jsbsim_properties import (
     STATE_PROPERTIES,
     TERRAIN,
     WIND,
+    Getter,
+    PropertyAccess,
+    Setter,
 )
-from flight.dynamics.load_model import load_model
-from flight.dynamics.property_access import Getter, PropertyAccess, Setter
-from flight.dynamics.silence import silence
-from flight.dynamics.start_place import check_place
+from flight.dynamics.model_check import check_model, try_model
 from flight.dynamics.state import STATE
-from flight.dynamics.trim import Floats, Trim, air_velocity, body_axes, euler, first_guess, from_vector, solve
-from world.atomic_files import temporary_folder
+from flight.dynamics.trim import Engine, Floats, Trim, air_velocity, body_axes, euler, first_guess, from_vector, solve
 from world.errors import FlightError
+from world.files import temporary_folder
 from world.kernels import Record, field_names
+
+# ----------------------------------------------------------------------
+# Keeps a talkative library quiet.
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Send standard output nowhere: JSBSim prints its banner whatever its debug level, by either way out.
+
+    Its C++ side writes to file descriptor 1, its Python side to ``sys.stdout``.
+    """
+    sys.stdout.flush()
+    saved = os.dup(1)
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 1)
+        with contextlib.redirect_stdout(io.StringIO()):
+            yield
+    finally:
+        os.dup2(saved, 1)
+        os.close(nowhere)
+        os.close(saved)
+
+
+# ----------------------------------------------------------------------
+# Where a flight may begin: on the globe, off its poles, in the air and below the tropopause.
+
+
+def check_place(lat_deg: float, lon_deg: float, amsl: float, terrain_amsl: float) -> None:
+    """Refuse a place where no flight begins.
+
+    lat_deg, lon_deg: geodetic, degrees.  amsl: height, m.  terrain_amsl: of the ground there, m.  Raises FlightError.
+    """
+    if abs(lat_deg) >= 90.0 or abs(lon_deg) > 180.0:
+        field, value = ("latitude", lat_deg) if abs(lat_deg) >= 90.0 else ("longitude", lon_deg)
+        text = f"start at latitude {lat_deg}, longitude {lon_deg}: not within +-90 and +-180 degrees"
+        raise FlightError(text, field=field, value=value, allowed="not within +-90 and +-180 degrees")
+    if not terrain_amsl < amsl < 11000.0:
+        allowed = f"not between ground ({terrain_amsl} m) and 11000 m"
+        raise FlightError(f"start at {amsl} m above sea level: {allowed}", field="start", value=amsl, allowed=allowed)
+
+
+# ----------------------------------------------------------------------
+# Loads an aircraft's model into a JSBSim instance, from a checked copy.
+
+# How far a stated mass may be from the model's, as a share of it.
+MASS_TOLERANCE = 0.01
+
+
+def load_model(instance: Any, copy: Path, aircraft: Aircraft, dt: float, *, flat_earth: bool, tried: bool) -> None:
+    """Check a model, copy it into an empty folder, and load it from there: some models write into their own folder.
+
+    instance: a JSBSim instance with no model yet, made for this folder.  dt: s a step.  flat_earth, tried: see
+    `flight.dynamics.fdm.Fdm`.
+
+    Raises FlightError for a model that is missing, refused or not loadable.
+    """
+    instance.set_debug_level(0)
+    files = check_model(
+        aircraft.model_file,
+        instance.get_property_manager().hasNode,
+        aircraft.model_folders,
+        shipped=bool(aircraft.model.shipped),
+    )
+    if not tried:
+        try_model(aircraft)
+    folder = copy / aircraft.name
+    folder.mkdir()
+    for name, data in files.items():
+        # JSBSim looks for the folder's name.
+        own = f"{aircraft.name}.xml" if name == aircraft.model_file.name else name
+        (folder / own).write_bytes(data)
+    instance.set_aircraft_path(str(copy))
+    instance.set_engine_path(str(folder))
+    instance.set_systems_path(str(folder))
+    instance.set_dt(dt)
+    if flat_earth:
+        planet = copy / "flat.xml"
+        planet.write_text(FLAT_PLANET, encoding="utf-8")
+        instance.load_planet(str(planet), False)
+    try:
+        loaded = instance.load_model(aircraft.name)
+    # JSBSim's own errors are RuntimeErrors.
+    except (RuntimeError, ValueError, OSError) as error:
+        message = " ".join(str(error).split()).replace(str(folder), str(aircraft.model_file.parent))
+        raise FlightError(f"{aircraft.model_file}: JSBSim: {message}", file=aircraft.model_file) from None
+    if not loaded:
+        raise FlightError(f"{aircraft.model_file}: JSBSim cannot load this model", file=aircraft.model_file)
+    _check_mass(instance, aircraft)
+
+
+def _check_mass(instance: Any, aircraft: Aircraft) -> None:
+    """Refuse a stated mass that is not the model's, fuel included.  Raises FlightError."""
+    known = instance.get_property_manager().hasNode
+    tanks = itertools.takewhile(known, (f"propulsion/tank[{k}]/contents-lbs" for k in itertools.count()))
+    # JSBSim adds its fuel when it first runs.
+    pounds = sum(map(instance.get_property_value, tanks), instance.get_property_value("inertia/weight-lbs"))
+    mass = pounds * POUND
+    if not abs(aircraft.mass - mass) <= MASS_TOLERANCE * mass:
+        file = aircraft.folder / f"{aircraft.name}.toml"
+        raise FlightError(
+            f"{file}: mass_kg = {aircraft.mass:g}: the model"
+            f" {aircraft.model_file.name} has {mass:.5g} kg with its fuel; the two may differ by"
+            f" {100.0 * MASS_TOLERANCE:g} %",
+            file=file,
+            field="mass_kg",
+            value=aircraft.mass,
+        )
+
 
 JSBSIM_VERSION: str = jsbsim.__version__
 
@@ -91,7 +208,7 @@ class Fdm:
     rate_hz: steps a second.  motor_braking: whether the motor may brake the propeller (current below zero).
     flat_earth: the book's world of constant density 1.2682 kg/m^3 and gravity 9.81 m/s^2 over a plane that does not
     turn, for validation; degrees of latitude are then 157 times longer.  Otherwise WGS84 and the standard atmosphere.
-    tried: whether somebody's model is known not to abort JSBSim; otherwise `flight.dynamics.model_trial` finds out.
+    tried: whether somebody's model is known not to abort JSBSim; otherwise `flight.dynamics.model_check` finds out.
 
     properties: JSBSim's own, by name, in its units.
 

@@ -4,14 +4,18 @@ JSBSim opens a network port for a model with ``<input port=...>`` and writes fil
 names a property which does not exist aborts the process, at the first step or when the model is freed.
 """
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from xml.parsers import expat
 
-from aircraft.catalog import MOST_MODEL_BYTES
+from aircraft.catalog import MOST_MODEL_BYTES, Aircraft, model_hash
 from world.errors import FlightError
-from world.text_files import read_at_most
+from world.files import read_at_most
 
 # Elements whose text names a property that must exist when the model runs.
 _READERS = frozenset({"p", "property", "independentVar", "input"})
@@ -180,3 +184,56 @@ def _check_names(readers: Sequence[_Reader], provided: Callable[[str], bool]) ->
                 continue
             message = f"{reader.file}:{line}: property {name} is read, and neither JSBSim nor the model makes it"
             raise FlightError(message, file=reader.file, field=name)
+
+
+# ----------------------------------------------------------------------
+# A first run of somebody's model in a process of its own, because JSBSim may abort where it should complain.
+
+_SECONDS = 60.0
+_REFUSED = 3
+_RUN = f"""
+import sys
+from pathlib import Path
+from aircraft.catalog import read_aircraft
+from flight.dynamics.fdm import Fdm
+from world.errors import FlightError
+try:
+    fdm = Fdm(read_aircraft(Path(sys.argv[1])), tried=True)
+    fdm.move_to(500.0)
+    fdm.balance(fdm.first_guess())
+    fdm.step(10)
+    del fdm
+except FlightError:
+    sys.exit({_REFUSED})
+"""
+
+
+def try_model(aircraft: Aircraft) -> None:
+    """Load and step a model in another process, once for each version of it.
+
+    Raises FlightError where that process dies.  Where it only refuses the model, nothing is raised:
+    loading it here will refuse it again, with the reason.
+    """
+    code = _try(str(aircraft.folder), model_hash(aircraft))
+    if code not in {0, _REFUSED}:
+        how = "hangs" if code is None else "aborts the process"
+        raise FlightError(
+            f"{aircraft.model_file}: JSBSim {how} with this model, probably over an undefined property",
+            file=aircraft.model_file,
+        )
+
+
+@cache
+def _try(folder: str, _version: str) -> int | None:
+    """The exit code of the process, or None if it does not end."""
+    # The child finds our packages where this process found them.
+    root = str(Path(__file__).parents[2])
+    paths = os.pathsep.join([root, *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _RUN, folder],
+            env=os.environ | {"PYTHONPATH": paths}, capture_output=True, check=False, timeout=_SECONDS,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        return None
+    return done.returncode

@@ -7,8 +7,8 @@ import numpy as np
 
 from aircraft.catalog import Aircraft
 from world.errors import FlightError
+from world.files import did_you_mean, read_toml
 from world.kernels import Record, record_dtype
-from world.text_files import did_you_mean, read_toml
 
 GAINS_FILE = "gains.toml"
 

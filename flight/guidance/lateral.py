@@ -10,8 +10,7 @@ law alone. None asks for the wind: all steer by the velocity over the ground.  N
 import math
 
 from aircraft.envelope import GRAVITY
-from flight.guidance.guidance_memory import L1, VECTOR_FIELD
-from flight.guidance.inner_loops import roll_model, steer_bank, steer_height
+from flight.guidance.inner_loops import L1, VECTOR_FIELD, roll_model, steer_bank, steer_height
 from flight.guidance.lateral_reference_laws import (
     WAYPOINT_RADIUS,
     field_course,
@@ -21,7 +20,7 @@ from flight.guidance.lateral_reference_laws import (
     l1_length,
     l1_reached,
 )
-from flight.guidance.path_kernels import Records, mean_curvature, most_curvature, project
+from flight.guidance.path import Records, mean_curvature, most_curvature, project
 from world.geometry import wrap
 from world.kernels import Record, compiled
 
@@ -47,10 +46,10 @@ def guide(
 
     state: a record of `flight.dynamics.state.STATE`.
     estimated: of `flight.guidance.navigation_error.MOTION`.
-    pieces, nodes: of a `flight.guidance.fly_by_path.FlyByPath`.
+    pieces, nodes: of a `flight.guidance.path.FlyByPath`.
     waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
     gains: a record of `flight.guidance.gains.GAINS`.
-    memory: of `flight.guidance.guidance_memory.GUIDANCE_MEMORY`.
+    memory: of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     commands: of `flight.dynamics.state.COMMANDS`.
     """
     course = find_on_path(estimated, pieces, memory)

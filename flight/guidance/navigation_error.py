@@ -26,7 +26,7 @@ NAVIGATION_LAGS = record_dtype(("first", np.float64, (3,)), ("second", np.float6
 def start_navigation(noise: Floats, lags: Record) -> None:
     """Draw the stationary state of the lags, a record of `NAVIGATION_LAGS`, from (6,) unit normals."""
     lags.first = noise[:3]
-    # As in `flight.simulation.dryden.start_gusts`.
+    # As in `flight.simulation.turbulence.start_gusts`.
     lags.second = 0.5 * noise[:3] + 0.5 * noise[3:]
 
 

@@ -13,7 +13,7 @@ ours; nothing that a station sends is ever unpickled.
 |---|---|
 | `ProcessReady` | once, before the first order is read |
 | `MissionJudged` | for each `JudgeMission` |
-| `flight.live.snapshot.Snapshot` | in flight, `SNAPSHOT_RATE` times a second |
+| `flight.live.telemetry.Snapshot` | in flight, `SNAPSHOT_RATE` times a second |
 | `FlightEnded` | when the aircraft stops |
 | `FlightJudged` | when its log is closed |
 """
@@ -27,11 +27,10 @@ from multiprocessing.connection import Connection
 from typing import Protocol
 
 from aircraft.catalog import Aircraft
-from flight.live.snapshot import Snapshot, SnapshotMaker
-from flight.live.status_text import CRITICAL, StatusText
+from flight.live.telemetry import CRITICAL, Snapshot, SnapshotMaker, StatusText
 from flight.mission.items import Home, Mission
-from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.local_map import LocalMap
+from flight.simulation.airborne import LocalMap
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import TICK, Flight
 from flight.simulation.track import Rows, Track, as_track, join_rows
 from world.errors import PlanflyError

@@ -5,21 +5,259 @@ to the vehicle, from an address that is allowed, and signed where a key is set. 
 that falls silent leaves it.
 """
 
+import hashlib
+import hmac
 import ipaddress
+import os
+import re
 import socket
+import stat
+import struct
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import Enum, auto
+from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from pymavlink.generator.mavcrc import x25crc
 
-from flight.live.mavlink_frames import LARGEST, Decoder, split_frames
 from flight.live.mission_server import Station
-from flight.live.running_clock import RunningClock
-from flight.live.signing import Refused, Signing
 from flight.live.telemetry import PERIODS
 from world.errors import FlightError
+
+# ----------------------------------------------------------------------
+# A clock that stands still while this process does: a laptop's sleep, Ctrl-Z and a debugger take no time of it.
+
+# A step longer than this (s) is one in which the process did not run, and counts as this.
+LONGEST_STEP = 1.0
+
+
+class RunningClock:
+    """Seconds of real time that this process has run since the clock was made, as far as it is asked all the time.
+
+    What is waited for and what is played goes on where it was.  Whoever waits asks it at least each `LONGEST_STEP` s.
+
+    >>> real = iter((100.0, 100.5, 4000.5, 4000.75))
+    >>> clock = RunningClock(lambda: next(real))
+    >>> clock(), clock(), clock()
+    (0.5, 1.5, 1.75)
+    """
+
+    def __init__(self, real: Callable[[], float] | None = None) -> None:
+        """real: gives seconds from anywhere; the system's monotonic clock unless told otherwise."""
+        self._real = real or time.monotonic
+        self._last = self._real()
+        self._seconds = 0.0
+
+    def __call__(self) -> float:
+        """Return the seconds."""
+        now = self._real()
+        self._seconds += min(max(now - self._last, 0.0), LONGEST_STEP)
+        self._last = now
+        return self._seconds
+
+
+# ----------------------------------------------------------------------
+# MAVLink frames in datagrams: found, checked and decoded, whatever the bytes are.
+
+MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
+SIGNED = 0x01
+SIGNATURE = 13
+_CRC = struct.Struct("<H")
+# Largest datagram that is looked at, and most frames in it.
+LARGEST = 4096
+MOST_FRAMES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class MavlinkFrame:
+    """One frame with a good checksum.  raw: all of it.  signed: whether a signature is attached, good or not."""
+
+    raw: bytes
+    number: int
+    system: int
+    component: int
+    signed: bool
+
+
+class Decoder:
+    """Decodes frames of the dialect.  Bytes that are no frame, or a damaged one, give nothing."""
+
+    def __init__(self) -> None:
+        self._mav = mavlink.MAVLink(None)
+
+    def message(self, frame: MavlinkFrame) -> Any | None:
+        """Message of a frame, None where it cannot be read."""
+        try:
+            return self._mav.decode(bytearray(frame.raw))
+        except (mavlink.MAVError, struct.error, ValueError, IndexError, TypeError, OverflowError):
+            return None
+
+
+def split_frames(data: bytes) -> list[MavlinkFrame]:
+    """Whole frames in a datagram, in order; a damaged one is skipped to the next that is whole."""
+    found: list[MavlinkFrame] = []
+    data = data[:LARGEST]
+    at = 0
+    while at < len(data) and len(found) < MOST_FRAMES:
+        frame = _frame_at(data, at) if data[at] in (MAGIC_V1, MAGIC_V2) else None
+        if frame is None:
+            at += 1
+        else:
+            found.append(frame)
+            at += len(frame.raw)
+    return found
+
+
+def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
+    """Frame that starts at an offset, None where none does."""
+    modern = data[at] == MAGIC_V2
+    head = 10 if modern else 6
+    if len(data) - at < head + 2:
+        return None
+    flags = data[at + 2] if modern else 0
+    # Any flag but "signed" changes the frame in a way that is not known here, and the standard says to drop it.
+    if flags & ~SIGNED:
+        return None
+    end = at + head + data[at + 1] + 2
+    size = end + (SIGNATURE if flags else 0)
+    if size > len(data):
+        return None
+    if modern:
+        system, component = data[at + 5], data[at + 6]
+        number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16
+    else:
+        system, component, number = data[at + 3], data[at + 4], data[at + 5]
+    kind = mavlink.mavlink_map.get(number)
+    if kind is None:
+        return None
+    crc = x25crc(data[at + 1 : end - 2])
+    crc.accumulate(bytes([kind.crc_extra]))
+    if crc.crc != _CRC.unpack_from(data, end - 2)[0]:
+        return None
+    return MavlinkFrame(data[at:size], number, system, component, bool(flags))
+
+
+# ----------------------------------------------------------------------
+# MAVLink 2 message signing: a signature is verified before anything about its packet is believed or kept.
+#
+# (mavlink.io, "Message Signing".)  pymavlink keeps a packet's timestamp before it checks the signature: one forged
+# packet
+# from the future then locks the real station out.
+
+# Timestamps count 10 us from 2015-01-01; a stream that is new may lag by a minute.
+EPOCH = 1_420_070_400.0
+_UNITS = 100_000
+_MOST_LAG = 60 * _UNITS
+_MOST_STREAMS = 64
+_LARGEST_KEY = 1024
+
+
+def read_key(path: Path) -> bytes:
+    """Read a signing key of 32 bytes: 64 hexadecimal digits, or a passphrase that is hashed with SHA-256.
+
+    The hash is what MAVProxy's "signing setup" and Mission Planner make of a passphrase.  Raises FlightError for a file
+    that another user could read, that cannot be read, or that holds fewer than 8 or more than 1024 bytes.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile() as file:  # made for its owner alone
+    ...     _ = file.write(b"correct horse battery")
+    ...     file.flush()
+    ...     key = read_key(Path(file.name))
+    >>> key.hex()[:16], len(key)
+    ('9028ea0d15decaa3', 32)
+    """
+    try:
+        # A named pipe that nobody writes into is not waited for.
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                raise FlightError(f"{path}: not a plain file: a signing key is expected", file=path)
+            own = getattr(os, "getuid", None)
+            # Where users have no numbers, modes do not say who reads a file.
+            if own is not None and (status.st_uid != own() or stat.S_IMODE(status.st_mode) & 0o077):
+                mode = stat.S_IMODE(status.st_mode)
+                allowed = "a signing key is its owner's alone to read (chmod 600)"
+                message = f"{path}: mode {mode:03o}: {allowed}"
+                raise FlightError(message, file=path, field="mode", value=f"{mode:03o}", allowed=allowed)
+            data = file.read(_LARGEST_KEY + 1).strip()
+    except OSError as error:
+        raise FlightError(f"{path}: cannot be read: {error.strerror}", file=path) from error
+    if not 8 <= len(data) <= _LARGEST_KEY:
+        allowed = "a key of 64 hexadecimal digits or a passphrase of 8..1024"
+        raise FlightError(f"{path}: {len(data)} bytes: {allowed}", file=path, value=len(data), allowed=allowed)
+    if re.fullmatch(rb"[0-9a-fA-F]{64}", data):
+        return bytes.fromhex(data.decode())
+    return hashlib.sha256(data).digest()
+
+
+class Refused(Enum):
+    """Why a frame is not believed; see `flight.live.link.Dropped`."""
+
+    UNSIGNED = auto()
+    FORGED = auto()
+    REPLAYED = auto()
+    OLD = auto()
+    STREAMS = auto()
+
+
+@dataclass(slots=True)
+class Signing:
+    """Signs what goes out and checks what comes in.
+
+    key: 32 bytes.  link: our link id.  newest: the largest timestamp sent or believed.
+    """
+
+    key: bytes
+    link: int = 0
+    newest: int = 0
+    _streams: dict[tuple[int, int, int], int] = field(default_factory=dict)
+
+    def refuses(self, frame: MavlinkFrame, wall: float) -> Refused | None:
+        """Why a frame is not believed; None for one that is signed with our key and newer than all before it.
+
+        A stream is a system, its component and its link id.  wall: s since 1970.  A frame with a bad signature leaves
+        no trace.
+        """
+        if not frame.signed:
+            return Refused.UNSIGNED
+        body, tag = frame.raw[:-6], frame.raw[-6:]
+        if not hmac.compare_digest(hashlib.sha256(self.key + body).digest()[:6], tag):
+            return Refused.FORGED
+        link = frame.raw[-SIGNATURE]
+        stamp = int.from_bytes(frame.raw[-12:-6], "little")
+        stream = (frame.system, frame.component, link)
+        last = self._streams.get(stream)
+        if last is None:
+            # By our clock, not by others' timestamps: a station whose clock runs ahead locks nobody out.
+            if stamp + _MOST_LAG < _stamp(wall):
+                return Refused.OLD
+            if len(self._streams) >= _MOST_STREAMS:
+                return Refused.STREAMS
+        elif stamp <= last:
+            return Refused.REPLAYED
+        self._streams[stream] = stamp
+        # A clock that was set back before we started: stations that run on expect us to be later than we were.
+        self.newest = max(self.newest, stamp)
+        return None
+
+    def sign(self, packed: bytes, wall: float) -> bytes:
+        """Sign a packed MAVLink 2 frame that is not signed yet."""
+        self.newest = max(self.newest + 1, _stamp(wall))
+        number = packed[7] | packed[8] << 8 | packed[9] << 16
+        body = bytearray(packed[:-2])
+        body[2] |= SIGNED
+        crc = x25crc(bytes(body[1:]))
+        crc.accumulate(bytes([mavlink.mavlink_map[number].crc_extra]))
+        signed = bytes(body) + struct.pack("<H", crc.crc) + bytes([self.link]) + self.newest.to_bytes(6, "little")
+        return signed + hashlib.sha256(self.key + signed).digest()[:6]
+
+
+def _stamp(wall: float) -> int:
+    return max(0, int((wall - EPOCH) * _UNITS))
+
 
 Address = tuple[str, int]
 

@@ -5,15 +5,206 @@ there and replaces it only when its last item is in and every item is valid.  On
 denied until the first has been silent for `LOCK` seconds.  (mavlink.io, "Mission Protocol".)
 """
 
+import math
 from collections.abc import Hashable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.mavlink_items import MissionType, from_message, to_message
-from flight.mission.items import FENCES, Command, MissionItem
+from flight.mission.items import (
+    AMSL,
+    FENCES,
+    Command,
+    Frame,
+    Home,
+    ItemProblem,
+    Mission,
+    MissionItem,
+    is_located,
+    item_problem,
+    on_grid,
+    renumbered,
+)
 from world.errors import MissionError
+
+# ----------------------------------------------------------------------
+# Mission items on the wire: MISSION_ITEM_INT made and parsed, MISSION_ITEM parsed (MAVLink mission protocol).
+#
+# Made in the INT form alone: the float MISSION_ITEM moves a waypoint by up to 0.5 m.  pymavlink is imported when a
+# message is made, so that reading files does not wait for it.
+
+_INT32_MAX = 2**31 - 1
+
+
+class MissionType(IntEnum):
+    """MAV_MISSION_TYPE: which of a vehicle's three lists an item belongs to."""
+
+    MISSION = 0
+    FENCE = 1
+    RALLY = 2
+
+
+def item_type(item: MissionItem) -> MissionType:
+    """List that an item belongs to, by its command."""
+    if item.command in FENCES:
+        return MissionType.FENCE
+    return MissionType.RALLY if item.command == Command.NAV_RALLY_POINT else MissionType.MISSION
+
+
+def to_message(
+    item: MissionItem,
+    *,
+    target_system: int = 1,
+    target_component: int = 1,
+    current: bool = False,
+    seq: int | None = None,
+    mission_type: MissionType | None = None,
+) -> Any:
+    """MISSION_ITEM_INT of an item: x and y are rounded to 1e-7 degrees, never truncated.
+
+    seq: None keeps the item's own number.  mission_type: None takes the one of its command.
+
+    >>> message = to_message(MissionItem(3, 16, 0, (0.0,) * 4, 46.0, 8.0, 500.0))
+    >>> message.get_type(), message.seq, message.x
+    ('MISSION_ITEM_INT', 3, 460000000)
+    """
+    from pymavlink.dialects.v20 import common
+
+    return common.MAVLink_mission_item_int_message(
+        target_system,
+        target_component,
+        item.seq if seq is None else seq,
+        int(item.frame),
+        int(item.command),
+        int(current),
+        int(item.autocontinue),
+        *item.params,
+        item.x,
+        item.y,
+        item.alt,
+        int(item_type(item) if mission_type is None else mission_type),
+    )
+
+
+def from_message(message: Any, source: str) -> MissionItem:
+    """Item of a MISSION_ITEM_INT or MISSION_ITEM message; ``source`` names the sender in messages.
+
+    INT32_MAX in an integer x or y is NaN (MAVLink's "unset").  A float's latitude and longitude go to the nearest
+    1e-7 degrees.  Raises MissionError, one line: item, field, value, what is allowed.
+    """
+    command, frame = int(message.command), int(message.frame)
+    located = is_located(command, frame)
+    if message.get_type() == "MISSION_ITEM":
+        lat, lon = (on_grid(value) if located else value + 0.0 for value in (message.x, message.y))
+    else:
+        scale = 1e7 if located else 1.0
+        lat, lon = (math.nan if value == _INT32_MAX else value / scale for value in (message.x, message.y))
+    params = tuple(float(value) for value in (message.param1, message.param2, message.param3, message.param4))
+    p1, p2, p3, p4 = (value + 0.0 for value in params)
+    item = MissionItem(
+        int(message.seq), command, frame, (p1, p2, p3, p4), lat, lon, float(message.z), bool(message.autocontinue)
+    )
+    for name, value in (*zip(("p1", "p2", "p3", "p4"), params, strict=True), ("altitude", item.alt)):
+        if math.isinf(value):
+            problem = ItemProblem(name, value, "a finite number, or NaN for unset")
+            raise MissionError(**problem.at(source, f"{source}: item {item.seq}"))
+    fault = item_problem(item)
+    if fault is not None:
+        raise MissionError(**fault.at(source, f"{source}: item {item.seq}"))
+    return item
+
+
+# ----------------------------------------------------------------------
+# Missions as stations number them, and as they are flown: home, seq and jumps from one to the other.
+
+
+def uploaded(lists: dict[MissionType, tuple[MissionItem, ...]], own: Home) -> tuple[Mission, int]:
+    """Mission of the lists, and what to add to its items' seq for the numbers that stations know.
+
+    Item 0 is home, as ArduPilot has it, if it is a waypoint above mean sea level, or one with no parameter set:
+    MAVSDK's `mission` plugin sends no home, and its waypoints are relative and have a radius.
+    ``own``: the vehicle's home, for a mission that brings none.
+    """
+    items = lists[MissionType.MISSION]
+    home = own
+    if items and _is_home(items[0]):
+        first = items[0]
+        home = Home(first.lat_deg, first.lon_deg, first.alt) if first.has_position else own
+        items = items[1:]
+        shift = 0
+    else:
+        shift = -1
+    mission = Mission(
+        home=home,
+        items=items,
+        fences=tuple(item for item in lists[MissionType.FENCE] if item.command in FENCES),
+        rally=lists[MissionType.RALLY],
+        source="upload",
+    )
+    return renumbered(mission), shift
+
+
+def _is_home(item: MissionItem) -> bool:
+    if item.command != Command.NAV_WAYPOINT or not is_located(item.command, item.frame):
+        return False
+    return item.frame in AMSL or not any(item.params)
+
+
+def listed(mission: Mission) -> tuple[tuple[MissionItem, ...], ...]:
+    """Lists of a mission as stations see them: home first, seq without gaps, jumps moved with their targets.
+
+    >>> place = MissionItem(4, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> items, fences, rally = listed(Mission(Home(46.0, 8.0, 0.0), (place, replace(place, seq=7))))
+    >>> [item.seq for item in items], fences, rally
+    ([0, 1, 2], (), ())
+    """
+    home = mission.home
+    first = MissionItem(0, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, 0.0, 0.0, 0.0)
+    if home is not None:
+        first = replace(first, lat_deg=home.lat_deg, lon_deg=home.lon_deg, alt=home.alt)
+    numbers = {item.seq: k for k, item in enumerate(mission.items, 1)}
+    items = [first]
+    for item in mission.items:
+        params = item.params
+        if item.command == Command.DO_JUMP:
+            params = (float(numbers.get(int(params[0]), 65535)), *params[1:])
+        items.append(replace(item, seq=numbers[item.seq], params=params))
+    return (
+        tuple(items),
+        tuple(replace(item, seq=k) for k, item in enumerate(mission.fences)),
+        tuple(replace(item, seq=k) for k, item in enumerate(mission.rally)),
+    )
+
+
+def start_problem(mission: Mission, first: int) -> str:
+    """Why a mission cannot be flown from the item of this seq on; "" if it can.
+
+    >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> way = Mission(None, (place, replace(place, seq=2), replace(place, seq=3)))
+    >>> start_problem(way, 2), start_problem(way, 3)
+    ('', 'from there on no leg is left to fly')
+    """
+    if not mission.items or not 0 <= first <= mission.items[-1].seq:
+        return "the mission has no such item"
+    places = [item for item in mission.items if item.seq >= first and item.has_position]
+    return "" if first <= mission.items[0].seq or len(places) > 1 else "from there on no leg is left to fly"
+
+
+def flown_from(mission: Mission, first: int) -> Mission:
+    """Mission from the item of this seq on, at the speed that the items before it have set; its numbers are kept.
+
+    >>> place = MissionItem(1, 16, 0, (0.0,) * 4, 46.0, 8.0, 75.0)
+    >>> speed = MissionItem(2, 178, 2, (0.0, 22.0, -1.0, 0.0), 0.0, 0.0, 0.0)
+    >>> way = Mission(None, (place, speed, replace(place, seq=3), replace(place, seq=4)))
+    >>> [item.seq for item in flown_from(way, 4).items], flown_from(way, 1) == way
+    ([2, 4], True)
+    """
+    before = [item for item in mission.items if item.seq < first]
+    speeds = [item for item in before if item.command == Command.DO_CHANGE_SPEED][-1:]
+    return replace(mission, items=(*speeds, *(item for item in mission.items if item.seq >= first)))
+
 
 # Most items that an upload may announce: bounds what a station can make the vehicle hold (some 2 MB a list).
 MOST_UPLOADED = 5_000

@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from multiprocessing.connection import Connection, wait
 from typing import Any, NamedTuple
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from flight.live.arming import ACCEPTED, DENIED, REJECTED, ArmingState, CommandResult
-from flight.live.downlink import Downlink, ShowText
 from flight.live.flight_process import (
     EndFlight,
     Event,
@@ -22,16 +23,177 @@ from flight.live.flight_process import (
     read_event,
 )
 from flight.live.link import Link, Peer
-from flight.live.mavlink_items import MissionType
-from flight.live.mission_progress import MissionProgress
-from flight.live.mission_server import MissionServer, Station
-from flight.live.parameters import Parameters
-from flight.live.snapshot import Snapshot
-from flight.live.station_missions import flown_from, listed, start_problem, uploaded
-from flight.live.station_requests import Requests, Response
-from flight.live.status_text import CRITICAL, INFO, WARNING, StatusText
-from flight.live.telemetry import Status
+from flight.live.mission_server import MissionServer, MissionType, Station, flown_from, listed, start_problem, uploaded
+from flight.live.station_requests import PARAMETERS_PER_SECOND, Parameters, Requests, Response
+from flight.live.telemetry import (
+    ACTIVE,
+    COMPLETE,
+    CRITICAL,
+    INFO,
+    WARNING,
+    Snapshot,
+    Status,
+    StatusText,
+    heartbeat,
+    status_texts,
+    telemetry_message,
+)
 from flight.mission.items import Home, Mission, MissionItem
+
+# ----------------------------------------------------------------------
+# What a live vehicle sends without being asked: heartbeats, telemetry, texts, parameters that stream.
+
+# A message that is late by more than this (s) is not made up for.
+_LATE = 0.5
+# Between heartbeats, and between checks of a message that a station has switched off, s.
+_SECOND = 1.0
+
+# Shows a text to a person at the terminal.
+ShowText = Callable[[str], None]
+
+
+class Downlink:
+    """Sends to every station that has sent a heartbeat.
+
+    show: gets each text too.  pause: how long the caller sleeps at most, s.
+    """
+
+    def __init__(self, link: Link, status: Status, parameters: Parameters, show: ShowText, pause: float) -> None:
+        """Send the first heartbeat at once."""
+        self._link = link
+        self._status = status
+        self._parameters = parameters
+        self._show = show
+        self._pause = pause
+        self._texts = 0
+        self._next_heartbeat = link.clock()
+
+    def send_text(self, text: str, severity: int = INFO) -> None:
+        """Send a text to every station, and show it at the terminal."""
+        self._show(text)
+        self._texts = self._texts % 65535 + 1
+        for peer in self._link.peers.values():
+            for piece in status_texts(text, severity, self._texts):
+                self._link.send(piece, peer)
+
+    def send_to_all(self, message: Any) -> None:
+        """Send one message to every station."""
+        for peer in self._link.peers.values():
+            self._link.send(message, peer)
+
+    def heartbeat_now(self) -> None:
+        """Send the next heartbeat at once: its contents have changed."""
+        self._next_heartbeat = self._link.clock()
+
+    def wait(self, now: float, patience: float) -> float:
+        """Return the time until something is due, s, at most ``patience``."""
+        due = min((at for peer in self._link.peers.values() for at in peer.due.values()), default=now + patience)
+        return max(0.0, min(patience, due - now, self._next_heartbeat - now))
+
+    def tick(self, now: float) -> None:
+        """Send what is due."""
+        if now >= self._next_heartbeat:
+            self._next_heartbeat = (
+                now + _SECOND if now - self._next_heartbeat > _LATE else self._next_heartbeat + _SECOND
+            )
+            self._link.forget_silent()
+            self._link.send_heartbeat(heartbeat(self._status))
+        for peer in self._link.peers.values():
+            self._telemetry(peer, now)
+            self._stream_parameters(peer)
+
+    def _telemetry(self, peer: Peer, now: float) -> None:
+        for name, due in peer.due.items():
+            if now < due:
+                continue
+            period = peer.periods[name]
+            if period is None:
+                peer.due[name] = now + _SECOND
+                continue
+            self._link.send(telemetry_message(name, self._status), peer)
+            peer.due[name] = due + period if now - due < _LATE else now + period
+
+    def _stream_parameters(self, peer: Peer) -> None:
+        if peer.parameter is None:
+            return
+        last, entries = int(peer.parameter), self._parameters.entries
+        peer.parameter += max(1.0, PARAMETERS_PER_SECOND * self._pause)
+        for number in range(last, min(int(peer.parameter), len(entries))):
+            self._link.send(self._parameters.message(number), peer)
+        if peer.parameter >= len(entries):
+            peer.parameter = None
+
+
+# ----------------------------------------------------------------------
+# How far a flight is along its mission, in the numbers that stations have for its items.
+
+
+class MissionProgress:
+    """Tells stations which item is flown to and which were reached.
+
+    shift: what to add to an item's seq for the station's number.
+    first: the station's number of the item that the next flight starts at; 0 for the whole mission.
+    """
+
+    def __init__(self, server: MissionServer, arming: ArmingState, status: Status, down: Downlink) -> None:
+        """Start with a mission that is flown as a whole, from its first item."""
+        self._server = server
+        self._arming = arming
+        self._status = status
+        self._down = down
+        self._leg = -1
+        self.shift = 0
+        self.first = 0
+
+    def started(self) -> None:
+        """A flight begins."""
+        self._leg = -1
+
+    def at_start(self) -> None:
+        """The item that a mission that is not being flown starts with."""
+        self._status.current = self.first or (self._item(0) if self._arming.judged is not None else 0)
+
+    def refresh(self) -> None:
+        """Bring what the status says of the mission up to date."""
+        items = self._server.lists[MissionType.MISSION]
+        self._status.total = max(0, len(items) - 1) if items else 0
+        if self._arming.mission_state not in (ACTIVE, COMPLETE):
+            self.at_start()
+
+    def on_leg(self, leg: int) -> None:
+        """Send the waypoints that were reached since the last snapshot."""
+        if leg == self._leg or leg < 0:
+            return
+        for waypoint in range(max(0, self._leg + 1), leg + 1):
+            self._reached(waypoint)
+        self._leg = leg
+        self._status.current = self._item(leg + 1)
+        self.send_current()
+
+    def completed(self) -> None:
+        """The last waypoint is reached."""
+        self._reached(len(self._items()) - 1)
+
+    def send_current(self) -> None:
+        """Send the item that is flown to."""
+        message: Any = telemetry_message("MISSION_CURRENT", self._status)
+        self._down.send_to_all(message)
+
+    def _reached(self, waypoint: int) -> None:
+        items = self._items()
+        if 0 <= waypoint < len(items) and items[waypoint] >= 0:
+            self._down.send_to_all(mavlink.MAVLink_mission_item_reached_message(self._item(waypoint)))
+
+    def _items(self) -> tuple[int, ...]:
+        """Seq of the item at each waypoint of the judged mission, -1 for none."""
+        return () if self._arming.judged is None else self._arming.judged.items
+
+    def _item(self, waypoint: int) -> int:
+        """Station's number of the item at a waypoint, or of the next that is one."""
+        items = self._items()
+        following = [item for item in items[waypoint:] if item >= 0] or [item for item in items if item >= 0][-1:]
+        return following[0] + self.shift if following else 0
+
 
 # Longest wait for the network or the flight, s.
 _NAP = 0.02

@@ -1,20 +1,104 @@
-"""Geofences and rally points: made of a scenario, grouped into shapes, and asked whether a position is allowed."""
+"""Geofences and rally points: shapes, exchange with the scenario's zones, and whether a path keeps to them."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem
-from flight.mission.zone_fences import fence_item, zone_fences
-from world.airspace.zones import Zone, make_cylinder
+from flight.mission.items import Command, Frame, Home, ItemProblem, Mission, MissionItem, on_grid
+from world.airspace.zones import Cylinder, Polygon, Ring, Zone, ZoneKind, is_hole, make_cylinder, make_polygon
+from world.airspace.zones_on_map import ring_on_map
 from world.errors import MissionError
-from world.frames import GeoOrigin, to_map
+from world.frames import GeoOrigin, to_geo, to_map
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# A scenario's zones as the fence that they are, and what of them a fence cannot hold.
+
+_CIRCLES = {
+    "inclusion": Command.NAV_FENCE_CIRCLE_INCLUSION,
+    "exclusion": Command.NAV_FENCE_CIRCLE_EXCLUSION,
+}
+_POLYGONS = {
+    "inclusion": Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION,
+    "exclusion": Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
+}
+
+
+def fence_item(origin: GeoOrigin, command: Command, p1: float, position: Sequence[float] | Floats) -> MissionItem:
+    """An item of a fence at a position (east, north, m); p1: corners of its polygon, or radius of its circle, m.
+
+    >>> item = fence_item(GeoOrigin(36.5, -84.2), Command.NAV_FENCE_CIRCLE_EXCLUSION, 200.0, (0.0, 0.0))
+    >>> item.params[0], round(item.lat_deg, 6)
+    (200.0, 36.5)
+    """
+    lat, lon = to_geo(origin, float(position[0]), float(position[1]))
+    params = (round(p1, 3), 0.0, 0.0, 0.0)
+    return MissionItem(0, int(command), int(Frame.GLOBAL), params, on_grid(float(lat)), on_grid(float(lon)), 0.0)
+
+
+def zone_fences(zones: Sequence[Zone], origin: GeoOrigin) -> tuple[list[MissionItem], list[str]]:
+    """Fence items of zones, and notes for people on what a fence cannot hold.
+
+    A cylinder is a circle and an outline a polygon.  A hole of an inclusion is an exclusion.  A hole of an exclusion is
+    closed with it, and an inclusion of several parts has no fence: every inclusion counts.  No fence has a height.
+
+    >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
+    >>> items, notes = zone_fences([zone], GeoOrigin(36.5, -84.2))
+    >>> [(item.command, item.params[0]) for item in items], notes
+    ([(5004, 200.0)], [])
+    """
+    items, closed, left_out = [], [], []
+    for zone in zones:
+        rings = () if isinstance(zone.shape, Cylinder) else zone.shape.rings
+        holes = [ring for ring in rings if is_hole(ring)]
+        if zone.kind == "inclusion" and len(rings) - len(holes) > 1:
+            left_out.append(zone.name)
+            continue
+        if zone.kind == "exclusion" and holes:
+            closed.append(zone.name)
+        items += list(_zone_items(zone, origin))
+    bands = [zone.name for zone in zones if zone.floor is not None or zone.ceiling is not None]
+    notes = []
+    if bands:
+        notes.append(f"a fence has no floor and no ceiling: {_names(bands)} in the fence at every height")
+    if closed:
+        notes.append(f"a fence has no holes in what it excludes: {_names(closed)} in the fence without them")
+    if left_out:
+        notes.append(f"every inclusion of a fence counts: {_names(left_out)} left out, being of several parts")
+    return items, notes
+
+
+def _zone_items(zone: Zone, origin: GeoOrigin) -> Iterator[MissionItem]:
+    if isinstance(zone.shape, Cylinder):
+        yield fence_item(origin, _CIRCLES[zone.kind], zone.shape.radius, (zone.shape.east, zone.shape.north))
+        return
+    for ring in zone.shape.rings:
+        if not is_hole(ring):
+            yield from _ring_items(ring, _POLYGONS[zone.kind], origin)
+        elif zone.kind == "inclusion":
+            yield from _ring_items(ring, _POLYGONS["exclusion"], origin)
+
+
+def _ring_items(ring: Ring, command: Command, origin: GeoOrigin) -> Iterator[MissionItem]:
+    for corner in ring:
+        yield fence_item(origin, command, float(len(ring)), corner)
+
+
+def _names(names: list[str]) -> str:
+    """Up to three names, and how many more."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more + (" is" if len(names) == 1 else " are")
+
+
+# ----------------------------------------------------------------------
+# Geofences and rally points: made of a scenario, grouped into shapes, and asked whether a position is allowed.
+
 
 POLYGONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
 INCLUSIONS = (Command.NAV_FENCE_POLYGON_VERTEX_INCLUSION, Command.NAV_FENCE_CIRCLE_INCLUSION)
@@ -85,7 +169,7 @@ def with_fences(mission: Mission, scenario: Scenario, passes: PassTest) -> tuple
 
     The area becomes an inclusion polygon, its four corners; each missile's kill radius an exclusion circle, which has
     no height.  Radars are no fence: being detected is not forbidden.  Zones follow as
-    `flight.mission.zone_fences` makes them.  What is to be kept out of and ``passes`` says that the mission passes, as
+    `flight.mission.fences` makes them.  What is to be kept out of and ``passes`` says that the mission passes, as
     it does above or below it, is left out: an autopilot with such a fence refuses the mission or breaks it off.  Rally
     points are the first and last position of the mission, at the mission's height over home.  The notes say, for
     people, what a fence cannot hold, and what was left out for it.
@@ -183,3 +267,38 @@ def _in_polygon(corners_east: Floats, corners_north: Floats, east: float, north:
     rise = np.where(spans, n1 - n0, 1.0)
     at = e0 + (north - n0) / rise * (e1 - e0)
     return bool((spans & (at > east)).sum() % 2)
+
+
+# ----------------------------------------------------------------------
+# A mission's own fence as zones of airspace: the one place where its latitudes and longitudes become metres.
+
+
+def fence_zones(fences: tuple[MissionItem, ...], origin: GeoOrigin, source: str = "fence") -> tuple[Zone, ...]:
+    """Zones of a fence's items 5001..5004, without floor and ceiling: MAVLink's fences have none.
+
+    source: names the mission in messages.  Each zone is named by its first item.  Raises MissionError for a polygon of
+    fewer corners than it counts, and for a shape that is none.
+
+    >>> from flight.mission.items import Command, Frame
+    >>> radius = (500.0, 0.0, 0.0, 0.0)
+    >>> circle = MissionItem(0, Command.NAV_FENCE_CIRCLE_INCLUSION, Frame.GLOBAL, radius, 36.5, -84.2, 0.0)
+    >>> zone, = fence_zones((circle,), GeoOrigin(36.5, -84.2))
+    >>> zone.name, zone.kind, zone.shape.radius
+    ('fence item 0', 'inclusion', 500.0)
+    """
+    zones = []
+    shape: Polygon | Cylinder
+    for corners in fence_shapes(fences, source):
+        first = corners[0]
+        try:
+            if first.command in POLYGONS:
+                shape = make_polygon([ring_on_map(origin, [(corner.lat_deg, corner.lon_deg) for corner in corners])])
+            else:
+                east, north = to_map(origin, first.lat_deg, first.lon_deg)
+                shape = make_cylinder(float(east), float(north), first.params[0])
+        except ValueError as error:
+            item = f"fence item {first.seq}"
+            raise MissionError(f"{source}: {item}: {error}", file=source, field=item) from error
+        kind: ZoneKind = "inclusion" if first.command in INCLUSIONS else "exclusion"
+        zones.append(Zone(f"fence item {first.seq}", kind, shape))
+    return tuple(zones)

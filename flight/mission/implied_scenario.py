@@ -15,8 +15,7 @@ from world.errors import MissionError, TerrainError
 from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
 from world.scenario import GROUND_BUFFER, Scenario, from_spec
-from world.scenario_tables import AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
-from world.scenario_types import MAP_EXTENT
+from world.scenario_tables import MAP_EXTENT, AreaTable, EndTable, FlightTable, OriginTable, ScenarioFile, TerrainTable
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]

@@ -15,9 +15,9 @@ from flight.mission.items import (
     ItemProblem,
     Mission,
     MissionItem,
+    Notes,
     command_name,
 )
-from flight.mission.notes import Notes
 from world.errors import MissionError
 
 # A mission unrolls to no more places than this, and no more items are walked through on the way.

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from flight.mission.items import Notes
 from flight.mission.itinerary import MOST_STOPS, ItineraryStop, Loiter
-from flight.mission.notes import Notes
 from world.errors import MissionError
 
 Floats = NDArray[np.float64]

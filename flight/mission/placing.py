@@ -6,14 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission
+from flight.mission.items import AMSL, OVER_HOME, TAKEOFFS, Home, Mission, Notes
 from flight.mission.itinerary import Itinerary, ItineraryStop, make_itinerary
 from flight.mission.loiter_circles import PlacedStop
-from flight.mission.notes import Notes
 from world.errors import MissionError
 from world.frames import GeoOrigin, to_map
 from world.geometry import leg_courses
-from world.scenario_types import MAP_EXTENT
+from world.scenario_tables import MAP_EXTENT
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]

@@ -1,10 +1,21 @@
 """A mission as the aircraft flies it: world-frame waypoints with speeds, jumps unrolled."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits, turn_radius_between
+from flight.mission.items import Mission, Notes, command_name
+from flight.mission.itinerary import Itinerary, ItineraryStop
+from flight.mission.loiter_circles import PLAIN_SLOPE, OwnRadius, PlacedStop, SpiralSlopes, lay_circles
+from flight.mission.placing import PlacedMission, place_stops
+from world.errors import MissionError
+from world.frames import GeoOrigin, to_geo
+from world.geometry import fly_by_offset, leg_courses, signed_turns, wrap
+from world.scenario import Scenario
+from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
 
@@ -52,3 +63,259 @@ class Route:
     def legs(self) -> int:
         """How many legs there are."""
         return len(self.waypoints) - 1
+
+
+# ----------------------------------------------------------------------
+# Which waypoints a fly-by arc would miss: by more than the acceptance radius that the mission states there.
+
+
+def arc_misses(points: Floats, airspeed: Floats, acceptance: Floats, limits: Limits | None) -> NDArray[np.bool_]:
+    """Whether the arc at the bank limit passes each waypoint beyond its acceptance radius, (w,).
+
+    points: (w, 3) m.  airspeed: (w - 1,) m/s.  acceptance: (w,) m, 0 where none is stated, which no arc misses.
+    limits: None where they are not known, and so no arc.
+    A corner of ``turn`` is passed at R(1/cos(turn/2) - 1): at 25 m/s and 30 degrees of bank, R is 110 m, by 46 m at 90
+    degrees, and by 110 m at 120.
+
+    >>> from types import SimpleNamespace
+    >>> from aircraft.path_limits import PerformanceTable
+    >>> nothing = np.zeros(2)
+    >>> table = PerformanceTable(25.0, 0.57735, 0.0, 0.0, 0.0, 0.0, 0.0, nothing, nothing, nothing)
+    >>> limits = SimpleNamespace(performance=lambda airspeed: table)
+    >>> corner = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 500.0]])
+    >>> [arc_misses(corner, np.full(2, 25.0), np.array([0.0, m, 0.0]), limits).tolist()[1] for m in (0.0, 45.0, 46.0)]
+    [False, True, False]
+    """
+    out = np.zeros(len(points), dtype=np.bool_)
+    if limits is None:
+        return out
+    courses, turns = leg_courses(points), np.abs(signed_turns(points))
+    tables = {float(speed): limits.performance(float(speed)) for speed in set(airspeed.tolist())}
+    for i in np.flatnonzero(acceptance[1:-1] > 0.0) + 1:
+        table = tables[float(max(airspeed[i - 1], airspeed[i]))]
+        radius = turn_radius_between(table, courses[i - 1], courses[i], points[i, 2])
+        # Where the wind leaves no way along a leg there is no arc to miss with.
+        out[i] = np.isfinite(radius) and fly_by_offset(float(turns[i - 1]), float(radius)) > acceptance[i]
+    return out
+
+
+# ----------------------------------------------------------------------
+# Straight lead-in and lead-out legs that give a route the courses its scenario asks for at its ends.
+
+# Length of these legs beyond what the turn itself uses, m: the aircraft is level and on course again by then.
+END_LEG_LENGTH = 100.0
+# An end within this of the scenario's is the scenario's, m.
+_SAME = 1.0
+# A course that differs by less than this needs no turn, rad.
+_STRAIGHT = math.radians(0.5)
+
+
+def with_end_courses(route: Route, scenario: Scenario, limits: Limits) -> Route:
+    """Start a route on the scenario's start course, and end it on its destination course.
+
+    A level lead-in leg before the first waypoint, or lead-out leg after the last, is as long as the turn's tangent and
+    `END_LEG_LENGTH`: so the turn onto the first leg, or off the last, is flown and judged as any other.  A route whose
+    scenario asks for no course, or that ends elsewhere, stays as it is.
+
+    >>> from types import SimpleNamespace
+    >>> from world.scenario import load_scenario
+    >>> scenario = replace(load_scenario("tight"), start_course=0.0)  # north, and the route goes east
+    >>> limits = SimpleNamespace(turn_radius=lambda *_: 110.0)  # all that is asked of the aircraft's limits
+    >>> ends = np.array([scenario.start, scenario.destination])
+    >>> route = Route(ends, np.array([25.0]), np.zeros(2), np.zeros(2, dtype=bool), np.array([1, 2]), "no TAKEOFF")
+    >>> longer = with_end_courses(route, scenario, limits)
+    >>> longer.waypoints.round().tolist()
+    [[0.0, -210.0, 75.0], [0.0, 0.0, 75.0], [2600.0, 0.0, 75.0]]
+    >>> longer.started
+    "no TAKEOFF; on the scenario's start course, from a lead-in leg of 210 m"
+    """
+    points, courses = route.waypoints, leg_courses(route.waypoints)
+    lead_in = lead_out = None
+    if scenario.start_course is not None and math.dist(points[0], scenario.start) < _SAME:
+        lead_in = _lead_point(points[0], scenario.start_course, float(courses[0]), limits, -1.0)
+    if scenario.destination_course is not None and math.dist(points[-1], scenario.destination) < _SAME:
+        lead_out = _lead_point(points[-1], scenario.destination_course, float(courses[-1]), limits, 1.0)
+    head = 0 if lead_in is None else 1
+    tail = 0 if lead_out is None else 1
+    if not head + tail:
+        return route
+    started = route.started
+    if lead_in is not None:
+        length = math.dist(lead_in[:2], points[0][:2])
+        started += f"; on the scenario's start course, from a lead-in leg of {length:.0f} m"
+    # Radii at the ends of the mission say nothing of turns that it does not have.
+    acceptance = np.array(route.acceptance)
+    acceptance[:head], acceptance[len(acceptance) - tail :] = 0.0, 0.0
+    chain = [point for point in (lead_in, *points, lead_out) if point is not None]
+    return replace(
+        route,
+        waypoints=np.array(chain),
+        airspeed=np.pad(route.airspeed, (head, tail), mode="edge"),
+        acceptance=np.pad(acceptance, (head, tail)),
+        fly_over=np.pad(route.fly_over, (head, tail), mode="edge"),
+        items=np.pad(route.items, (head, tail), constant_values=-1),
+        arcs=np.pad(route.arcs, (head, tail)),
+        started=started,
+    )
+
+
+def _lead_point(point: np.ndarray, course: float, leg: float, limits: Limits, side: float) -> np.ndarray | None:
+    """Other end of the lead-in (side -1) or lead-out leg (side 1) at an end of the route; None where no turn is due.
+
+    point: (3,) m.  course: that the scenario asks for; leg: of the route's first or last leg, rad.
+    """
+    turn = abs(float(wrap(course - leg)))
+    if turn < _STRAIGHT:
+        return None
+    radius = limits.turn_radius(*((course, leg) if side < 0.0 else (leg, course)), float(point[2]))
+    # A reversal has no tangent; twice the radius shows it as the sharp corner that it is.
+    tangent_length = radius * min(math.tan(min(turn, math.radians(170.0)) / 2.0), 2.0)
+    step = side * ((tangent_length if math.isfinite(tangent_length) else 0.0) + END_LEG_LENGTH)
+    return point + step * np.array([math.sin(course), math.cos(course), 0.0])
+
+
+# ----------------------------------------------------------------------
+# From a mission's places to the route that is flown, with circles and spirals that its aircraft can fly.
+
+# Radius of a loiter that states none (m, PX4's default), if the aircraft can turn as tightly, this much tighter.
+DEFAULT_RADIUS = 80.0
+OVER_TIGHTEST = 1.1
+# A spiral climbs and sinks with this share of the aircraft's limits in straight flight.
+SPIRAL_SHARE = 0.6
+
+
+def make_route(
+    mission: Mission,
+    origin: GeoOrigin,
+    terrain: Terrain | None,
+    default_airspeed: float,
+    fly_over: bool,
+    limits: Limits | None = None,
+) -> Route:
+    """Route of a mission on the map about ``origin``: `place_stops`, then `lay_route`.
+
+    terrain: None where none is known; heights above terrain are then an error.
+    default_airspeed: m/s until the mission sets one (a `.plan` file's cruiseSpeed, a station's estimate, sets none).
+    fly_over: whether waypoints are flown through instead of by; one whose arc would miss its acceptance always is.
+    limits: the aircraft's, for these arcs, the radius of a loiter that states none (None takes 80 m), and the slope of
+        a spiral (5 %).
+
+    Without TAKEOFF the route starts at the first position item; with one, over home at that item's height.  Every leg
+    has a horizontal length of at least `flight.mission.placing.SAME_PLACE`.  Raises MissionError, naming the item, for
+    what cannot be placed, and for a mission of fewer than two positions.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> items = [
+    ...     MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, lat, -84.2, 700.0)
+    ...     for k, lat in enumerate((36.50, 36.51, 36.52), 1)
+    ... ]
+    >>> route = make_route(Mission(None, tuple(items)), GeoOrigin(36.5, -84.2), None, 25.0, fly_over=False)
+    >>> route.waypoints.round().tolist()
+    [[0.0, 0.0, 700.0], [0.0, 1110.0, 700.0], [0.0, 2219.0, 700.0]]
+    >>> route.started
+    'no TAKEOFF: starts trimmed at the first position, item 1: 36.5000000, ... 700.0 m AMSL, on course 0 degrees'
+    """
+    return lay_route(place_stops(mission, origin, terrain), default_airspeed, fly_over, limits)
+
+
+def lay_route(placed: PlacedMission, default_airspeed: float, fly_over: bool, limits: Limits | None = None) -> Route:
+    """Route through the places of a mission; arguments as of `make_route`.
+
+    Raises MissionError for fewer than two places, and for a loiter too wide or too long to lay out.
+
+    >>> from flight.mission.items import Command, Frame, MissionItem
+    >>> items = [MissionItem(k, Command.NAV_WAYPOINT, Frame.GLOBAL, (0.0,) * 4, 36.5 + k, 8.0, 700.0) for k in (0, 1)]
+    >>> placed = place_stops(Mission(None, tuple(items)), GeoOrigin(36.5, 8.0), None)
+    >>> lay_route(placed, 25.0, fly_over=False).airspeed.tolist()
+    [25.0]
+    """
+    mission, notes = placed.mission, Notes()
+    kept = [_with_airspeed(place, default_airspeed) for place in placed.stops]
+    points = lay_circles(mission.source, kept, notes, _own_radius(limits), _spiral_slopes(limits))
+    if len(points) < 2:
+        raise MissionError(
+            f"{mission.source}: {len(points)} place to fly to: at least two different ones are expected",
+            file=mission.source,
+        )
+    stops = [point.stop for point in points]
+    waypoints = np.array([point.position for point in points])
+    arcs = np.array([point.arc for point in points])
+    airspeed = np.array([stop.airspeed for stop in stops[1:]])
+    acceptance = np.array([stop.acceptance for stop in stops])
+    _note_cruise_speed(mission, default_airspeed, stops[1], notes)
+    return Route(
+        waypoints=waypoints,
+        airspeed=airspeed,
+        acceptance=acceptance,
+        fly_over=np.where(arcs > 0.0, False, fly_over | arc_misses(waypoints, airspeed, acceptance, limits)),
+        items=np.array([stop.item for stop in stops], dtype=np.int64),
+        started=_started(placed.itinerary, stops[0], placed.origin, waypoints),
+        notes=placed.itinerary.notes + placed.notes + notes.lines(),
+        arcs=arcs,
+        endless=placed.itinerary.endless,
+        takeoff_ground=placed.takeoff_ground,
+        landing_ground=placed.landing_ground,
+    )
+
+
+def _with_airspeed(place: PlacedStop, default: float) -> PlacedStop:
+    """A place with the default airspeed (m/s) where the mission sets none."""
+    if not math.isnan(place.stop.airspeed):
+        return place
+    return PlacedStop(replace(place.stop, airspeed=default), place.position)
+
+
+def _note_cruise_speed(mission: Mission, airspeed: float, first: ItineraryStop, notes: Notes) -> None:
+    """Note a cruiseSpeed other than the default airspeed (m/s), if that is flown to the first stop."""
+    if mission.cruise_speed not in (None, airspeed) and first.airspeed == airspeed:
+        notes.add(
+            f"cruiseSpeed {mission.cruise_speed:g} m/s is the ground station's estimate and no command:"
+            f" started at {airspeed:g} m/s"
+        )
+
+
+def _own_radius(limits: Limits | None) -> OwnRadius:
+    """Radius of a loiter that states none: a tenth over the bank limit's in this wind, in whole tens of metres."""
+
+    def radius(airspeed: float, up: float) -> float:
+        if limits is None:
+            return DEFAULT_RADIUS
+        tightest = max(limits.turn_radius(course, course + math.pi, up, airspeed) for course in (0.0, math.pi))
+        if not math.isfinite(tightest):
+            return DEFAULT_RADIUS
+        return max(DEFAULT_RADIUS, math.ceil(OVER_TIGHTEST * tightest / 10.0) * 10.0)
+
+    return radius
+
+
+def _spiral_slopes(limits: Limits | None) -> SpiralSlopes:
+    """Slopes of a spiral: a share of the aircraft's limits on the worst course around it."""
+
+    def slopes(airspeed: float, up: float) -> tuple[float, float]:
+        if limits is None:
+            return PLAIN_SLOPE, PLAIN_SLOPE
+        found = []
+        for k, most in enumerate((limits.max_climb, limits.max_dive)):
+            limit = min(limits.slopes(course, up, airspeed)[k] for course in np.arange(8) * (math.pi / 4.0))
+            least = min(limit, math.inf if most is None else most)
+            # An aircraft that cannot climb at all gets a plain spiral, and the slope rule says so.
+            found.append(SPIRAL_SHARE * math.tan(least) if 0.0 < least < 1.5 else PLAIN_SLOPE)
+        return found[0], found[1]
+
+    return slopes
+
+
+def _started(itinerary: Itinerary, first: ItineraryStop, origin: GeoOrigin, waypoints: Floats) -> str:
+    course = math.degrees(float(leg_courses(waypoints)[0])) % 360.0
+    lat, lon = first.lat_deg, first.lon_deg
+    if first.loiter is not None:
+        lat, lon = (float(value) for value in to_geo(origin, waypoints[0, 0], waypoints[0, 1]))
+    where = f"{lat:.7f}, {lon:.7f}, {waypoints[0, 2]:.1f} m AMSL, on course {course:.0f} degrees"
+    item = itinerary.takeoff
+    name = "no TAKEOFF" if item is None else f"{command_name(item.command)} (item {item.seq})"
+    if first.loiter is not None:
+        return f"{name}: starts trimmed in the air on the circle of item {first.item}: {where}"
+    if item is not None:
+        over = "home" if itinerary.has_home else "the first position, as there is no home,"
+        return f"{name}: starts trimmed in the air over {over} at that item's height: {where}"
+    return f"{name}: starts trimmed at the first position, item {first.item}: {where}"

@@ -5,11 +5,17 @@ from pathlib import Path
 from typing import Literal
 
 from flight.mission.items import MOST_BYTES, Mission, MissionItem
-from flight.mission_files.fence_points import is_point_list, parse_fence_points
 from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
-from flight.mission_files.wpl import fence_text, parse_waypoints, rally_text, waypoints_text
+from flight.mission_files.wpl import (
+    fence_text,
+    is_point_list,
+    parse_fence_points,
+    parse_waypoints,
+    rally_text,
+    waypoints_text,
+)
 from world.errors import MissionError
-from world.text_files import read_small_file, utf8_text
+from world.files import read_small_file, utf8_text
 
 FileKind = Literal["waypoints", "plan", "fence", "rally"]
 

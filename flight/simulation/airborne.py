@@ -1,6 +1,6 @@
 """An aircraft in the air, whoever steers it: its start, its ground and wind, and how long it may fly.
 
-`flight.simulation.simulate.Flight` steers it by our guidance, `flight.real_autopilot.autopilot_flight.AutopilotFlight`
+`flight.simulation.simulate.Flight` steers it by our guidance, `flight.autopilots.arduplane_sitl.flight.AutopilotFlight`
 by another program.
 """
 
@@ -11,27 +11,166 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from aircraft.catalog import Aircraft
+from aircraft.catalog import Aircraft, load_aircraft
 from aircraft.path_limits import Limits, ground_speed_on
-from flight.ardupilot.speed_commands import speeds_flown
+from flight.autopilots.arduplane.parameters import speeds_flown
 from flight.dynamics.fdm import Fdm, Variation
 from flight.dynamics.trim import Trim
-from flight.guidance.fly_by_path import waypoint_records
 from flight.guidance.gains import Gains
 from flight.guidance.navigation_error import ERRORS, start_navigation
-from flight.simulation.dryden import start_gusts
-from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.local_map import Ground, LocalMap
-from flight.simulation.tick import ENDS
-from flight.simulation.track import Rows, join_rows, quantised
-from flight.simulation.workspace import BLOCK_TICKS, Workspace
+from flight.guidance.path import waypoint_records
+from flight.simulation.setup import FlightSetup
+from flight.simulation.tick import BLOCK_TICKS, ENDS, Workspace
+from flight.simulation.track import Rows, Track, join_rows, quantised
+from flight.simulation.turbulence import start_gusts
 from world.errors import FlightError, StartError
-from world.frames import to_geo
+from world.frames import GeoOrigin, PolyMap, fit_polymap, to_geo, to_map
 from world.geometry import leg_courses
 from world.random_streams import NAVIGATION, TURBULENCE, stream
+from world.terrain import Heights, Terrain
 from world.wind import W20
 
 Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# The aircraft's controls: their limits, and when a flight asked for all that they give.
+
+# A control counts as at its limit within this share of its range.
+_EDGE = 1e-3
+
+
+def control_limits(aircraft: str) -> list[tuple[str, float]]:
+    """Each control and its limit either way (rad; 1 for the throttle; NaN for an aircraft that is not known).
+
+    >>> for name, limit in control_limits("aerosonde"):
+    ...     print(f"{name} {limit:.2f}")
+    elevator 0.52
+    aileron 0.52
+    rudder 0.52
+    throttle 1.00
+    """
+    try:
+        known = load_aircraft(aircraft)
+    except FlightError:
+        limits = (math.nan, math.nan, math.nan)
+    else:
+        limits = (known.max_elevator, known.max_aileron, known.max_rudder)
+    return list(zip(("elevator", "aileron", "rudder", "throttle"), (*limits, 1.0), strict=True))
+
+
+def held_at_limit(track: Track, k: int, low: float, high: float) -> NDArray[np.bool_]:
+    """Rows at which control k (a column of `Track.commands`) is asked for its limit or more, (t,).
+
+    low, high: its limits; none of the rows for NaN.
+
+    >>> from flight.simulation.track import THROTTLE, TRACK_ROW, as_track
+    >>> rows = np.zeros(3, TRACK_ROW)
+    >>> rows["commands"][:, THROTTLE] = 0.5, 1.0, 0.9
+    >>> held_at_limit(as_track(rows), THROTTLE, 0.0, 1.0)
+    array([False,  True, False])
+    """
+    command = track.commands[:, k].astype(np.float64)
+    edge = _EDGE * (high - low)
+    return np.asarray((command <= low + edge) | (command >= high - edge))
+
+
+# ----------------------------------------------------------------------
+# The world as the compiled loop needs it: from JSBSim's latitude and longitude to the map, and the ground below.
+
+
+# The local map extends this far (m) beyond the area and the route.
+MAP_BUFFER = 5000.0
+# Worst error of the local map that a flight accepts, m and rad.
+WORST = (0.01, 1e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class LocalMap:
+    """From geodetic radians to the map, fitted around one flight: a copy of the projection that compiled code takes.
+
+    position: (latitude, longitude) to (east, north).
+    angle: (latitude, longitude) to the map course of true north (rad), and 0.
+    middle: longitude of its middle, rad; longitudes are taken within half a turn of it.
+    """
+
+    position: PolyMap
+    angle: PolyMap
+    middle: float
+
+    @staticmethod
+    def around(setup: FlightSetup) -> "LocalMap":
+        """Fit the area and the route with `MAP_BUFFER` around them; 0.1 mm and 1e-9 rad on areas up to 600 km wide.
+
+        Raises FlightError where the map cannot be fitted: an area about a pole.
+        """
+        origin: GeoOrigin = setup.scenario.origin
+        points = np.concatenate([setup.route.waypoints[:, :2], setup.scenario.bounds.T])
+        low, high = points.min(axis=0) - MAP_BUFFER, points.max(axis=0) + MAP_BUFFER
+        outline = np.array([[e, n] for e in (low[0], 0.5 * (low[0] + high[0]), high[0]) for n in (low[1], high[1])])
+        lat, lon = (np.radians(values) for values in to_geo(origin, outline[:, 0], outline[:, 1]))
+        # Longitudes about the origin's, so that an area may lie across the 180th meridian.
+        here = math.radians(origin.lon_deg)
+        lon = here + (lon - here + math.pi) % (2.0 * math.pi) - math.pi
+        bounds = np.array([[lat.min(), lat.max()], [lon.min(), lon.max()]])
+        if not (np.isfinite(bounds).all() and np.ptp(bounds[1]) < math.pi):
+            raise FlightError(f"{setup.mission.source}: the area lies about a pole", file=setup.mission.source)
+
+        def position(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            return to_map(origin, np.degrees(phi), np.degrees(lam))
+
+        def angle(phi: Floats, lam: Floats) -> tuple[Floats, Floats]:
+            step = 1e-5
+            east0, north0 = position(phi - step, lam)
+            east1, north1 = position(phi + step, lam)
+            return np.arctan2(east1 - east0, north1 - north0), np.zeros_like(phi)
+
+        middle = float((bounds[1, 0] + bounds[1, 1]) / 2)
+        local = LocalMap(fit_polymap(position, bounds, 1e-4), fit_polymap(angle, bounds, 1e-9), middle)
+        if not (local.position.residual <= WORST[0] and local.angle.residual <= WORST[1]):
+            raise FlightError(
+                f"{setup.mission.source}: the area is too large to fly in: its map is out by"
+                f" {local.position.residual:.2g} m; {WORST[0]:g} m is allowed",
+                file=setup.mission.source,
+            )
+        return local
+
+    def convergence(self, lat_deg: float, lon_deg: float) -> float:
+        """Map course of true north at a position, rad."""
+        lon = self.middle + math.remainder(math.radians(lon_deg) - self.middle, 2.0 * math.pi)
+        return float(self.angle(math.radians(lat_deg), lon)[0])
+
+
+class Ground:
+    """Terrain for the compiled tick; unknown ground is a raster without data.
+
+    known: whether there is terrain.  heights: (rows, cols) m.  to_pixel: from the map to the raster.
+    """
+
+    def __init__(self, terrain: Terrain | None) -> None:
+        self.known = terrain is not None
+        self.terrain = terrain
+        self.heights: Heights
+        if terrain is None:
+            self.heights, self.to_pixel = np.full((2, 2), np.nan, dtype=np.float32), _off_the_raster()
+            # Locked like a terrain's: a compiled function has one type for locked arrays and one for others.
+            self.heights.setflags(write=False)
+        else:
+            self.heights, self.to_pixel = terrain.heights, terrain.to_pixel
+
+    def height(self, east: float, north: float) -> float:
+        """Ground height at a map position, m; NaN where it is unknown."""
+        return math.nan if self.terrain is None else float(self.terrain.height(east, north))
+
+
+def _off_the_raster() -> PolyMap:
+    """Make a map that takes every position to a pixel that no raster has."""
+
+    def nowhere(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        return np.full_like(x, -9.0), np.full_like(y, -9.0)
+
+    return fit_polymap(nowhere, [[-1.0, 1.0], [-1.0, 1.0]], 1e-6)
+
 
 # A flight may take this much longer than its length over its slowest ground speed, s on top.
 PATIENCE = 1.5
@@ -64,7 +203,7 @@ class Airborne(ABC):
     dt: of a tick, s.
     path: that it is to follow.
     map: from JSBSim's positions, around area and route.
-    memory: guidance's, a record of `flight.guidance.guidance_memory.GUIDANCE_MEMORY`.
+    memory: guidance's, a record of `flight.guidance.inner_loops.GUIDANCE_MEMORY`.
     fdm: the aircraft that flies.
     most_ticks: after so many its time is up.
     """

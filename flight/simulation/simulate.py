@@ -1,25 +1,82 @@
 """The flight: JSBSim under guidance along a route, over its terrain, until its end or its failure."""
 
 import math
-from collections.abc import Callable
+import struct
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 from aircraft.catalog import Aircraft
-from flight.ardupilot.pilot import true_by_equivalent
+from flight.autopilots.arduplane.law import true_by_equivalent
 from flight.dynamics.fdm import Fdm, LoopAccess, Variation
+from flight.dynamics.jsbsim_properties import Getter, Setter
 from flight.dynamics.trim import straight
-from flight.guidance.fly_by_path import FlyByPath
 from flight.guidance.gains import load_gains
-from flight.guidance.guidance_memory import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
-from flight.simulation.airborne import Airborne
-from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.local_map import LocalMap
-from flight.simulation.loop import make_loop
-from flight.simulation.tick import tick_in_block
+from flight.guidance.inner_loops import ARDUPILOT, CROSS_TRACK, L1, VECTOR_FIELD
+from flight.guidance.path import FlyByPath
+from flight.simulation.airborne import Airborne, LocalMap
+from flight.simulation.setup import FlightSetup
+from flight.simulation.tick import READ_FIELDS, Workspace, tick_in_block
 from flight.simulation.track import Rows, Track, as_track, join_rows
-from flight.simulation.workspace import READ_FIELDS
 from world.errors import StartError
+
+# ----------------------------------------------------------------------
+# The flight loop: read JSBSim, do a tick, set JSBSim, step it, with as little Python between as there can be.
+
+
+def make_loop(
+    getters: Sequence[Getter],
+    setters: Sequence[Setter],
+    tick: Callable[[], int],
+    workspace: Workspace,
+    run: Callable[[], object],
+    steps: int,
+) -> Callable[[int], int]:
+    """Make what flies up to a number of ticks and returns the last one's status: 0, or how the flight ended.
+
+    getters: of the state, by `flight.simulation.tick.READ_FIELDS`.
+    setters: by `flight.simulation.tick.OUTPUT`.
+    tick: `flight.simulation.tick.tick` on this workspace.
+    run: steps JSBSim, ``steps`` times a tick.
+    """
+    # Each by its name: going through a list of them takes half as long again.
+    (
+        latitude, longitude, amsl, velocity_north, velocity_east, velocity_down, roll, pitch, yaw,
+        roll_rate, pitch_rate, yaw_rate, airspeed, alpha, beta, elevator, aileron, rudder, throttle,
+        current, power, load_factor,
+    ) = getters  # fmt: skip
+    (
+        set_elevator, set_aileron, set_rudder, set_throttle, set_gust_north, set_gust_east, set_gust_down, set_ground,
+    ) = setters  # fmt: skip
+    # struct writes so many floats in half the time of a slice assignment.
+    pack: Callable[..., None] = struct.Struct(f"{len(READ_FIELDS)}d").pack_into
+    readings, output, repeat = workspace.readings, workspace.output.tolist, (None,) * steps
+
+    def fly(count: int) -> int:
+        for _ in range(count):
+            pack(
+                readings, 0,
+                latitude(), longitude(), amsl(), velocity_north(), velocity_east(), velocity_down(),
+                roll(), pitch(), yaw(), roll_rate(), pitch_rate(), yaw_rate(), airspeed(), alpha(), beta(),
+                elevator(), aileron(), rudder(), throttle(), current(), power(), load_factor(),
+            )  # fmt: skip
+            if status := tick():
+                return status
+            elevator_out, aileron_out, rudder_out, throttle_out, north_out, east_out, down_out, ground_out = output()
+            set_elevator(elevator_out)
+            set_aileron(aileron_out)
+            set_rudder(rudder_out)
+            set_throttle(throttle_out)
+            set_gust_north(north_out)
+            set_gust_east(east_out)
+            set_gust_down(down_out)
+            set_ground(ground_out)
+            for _ in repeat:
+                run()
+        return 0
+
+    return fly
+
 
 Progress = Callable[[float, float], None]
 Sink = Callable[[Rows], None]
@@ -69,7 +126,7 @@ def simulate(
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission
     >>> from flight.mission.route import Route
-    >>> from flight.simulation.flight_setup import make_limits
+    >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> scenario, aerosonde = load_scenario("tight"), load_aircraft("aerosonde")
     >>> way = scenario.start + np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0]])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from aircraft.envelope import Envelope, turn_radius
 from flight.dynamics.characteristics import TRIM_AMSL, Mode, StepResponse, TrimRow
-from logs.figures.elements import style
+from logs.figures import style
 
 Floats = NDArray[np.float64]
 

@@ -7,15 +7,16 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.track import Track
-from logs.figures.elements import style
-from logs.figures.elements.legend import NamedWind
-from logs.figures.elements.panels import Axis, Panel, Series, Stack, doubles, draw_stack
-from logs.figures.map import DrawnTrack, draw_tracks_on_map
-from logs.verdict.measures.airspace import with_fence_zones
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import TRACK_ROW, Track, as_track
+from logs.figures import style
+from logs.figures.map import DrawnTrack, NamedWind, draw_tracks_on_map
+from logs.figures.time_series import Axis, Panel, Series, Stack, doubles, draw_panels, draw_stack
+from logs.verdict.imported.model_comparison import Reflight
+from logs.verdict.measures.route_requirements import with_fence_zones
 
 Floats = NDArray[np.float64]
+
 
 _SECOND = "#D55E00"
 _POINTS = 3000
@@ -113,3 +114,63 @@ def _above(flight: NamedFlight) -> Floats:
     if terrain is None:
         return np.full(len(position), np.nan)
     return np.asarray(position[:, 2] - terrain.height(position[:, 0], position[:, 1]))
+
+
+# ----------------------------------------------------------------------
+# A flight of the field and the model's of the same mission: a picture for each quantity, over the way.
+
+_SIMULATED = "#D55E00"
+# File name, field of a profile, axis label, factor, least span.
+_PICTURES = (
+    ("refly-cross-track.png", "cross_track", "right of the\nlegs (m)", 1.0, 4.0),
+    ("refly-height.png", "height_error", "above the\nlegs (m)", 1.0, 4.0),
+    ("refly-ground-speed.png", "ground_speed", "ground speed\n(m/s)", 1.0, 4.0),
+    ("refly-bank.png", "bank", "bank, right +\n(°)", 180.0 / np.pi, 10.0),
+    ("refly-energy.png", "energy", "energy used\n(Wh)", 1.0, 1.0),
+)
+
+
+def refly_pictures(again: Reflight) -> dict[str, bytes]:
+    """PNG files by name, one a quantity; that of the energy only where the log holds it.
+
+    >>> from flight.simulation.setup import MissionStretch
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.imported.flown_legs import flown_legs
+    >>> from logs.verdict.imported.model_comparison import compare_with_model
+    >>> log = example_log()
+    >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+    >>> again = compare_with_model(log.setup, flown, log.track, "completed")
+    >>> list(refly_pictures(again))[:2]
+    ['refly-cross-track.png', 'refly-height.png']
+    """
+    return {name: style.png_bytes(figure) for name, figure in refly_figures(again).items()}
+
+
+def refly_figures(again: Reflight) -> dict[str, Figure]:
+    """Draw each quantity over the way: as flown, and as simulated."""
+    axis = Axis("along the legs (km)", again.distance / 1e3)
+    legs, out = _legs(again), {}
+    for file, name, label, factor, span in _PICTURES:
+        flown, model = factor * getattr(again.flown, name), factor * getattr(again.model, name)
+        if not np.isfinite(flown).any():
+            continue
+        series = [
+            Series("flown", flown, width=1.3),
+            Series("simulated", model, color=_SIMULATED, width=1.1, dashes=(0, (4, 1.2))),
+        ]
+        difference = Series("flown less simulated", flown - model, color=style.QUIET, filled=True)
+        panels = [
+            Panel(label, series, least_span=span),
+            Panel("difference", [difference], limits=(("", 0.0),), least_span=0.5 * span),
+        ]
+        title = f"{style.shorten(again.setup.scenario.name, 40)}: flown, and by the model {again.setup.aircraft}"
+        out[file] = draw_panels(title, panels, axis, legs)
+    return out
+
+
+def _legs(again: Reflight) -> Track:
+    """Rows that say which leg each place is on."""
+    rows = np.zeros(len(again.distance), TRACK_ROW)
+    rows["time"] = np.arange(len(rows))
+    rows["leg"] = again.first + np.searchsorted(again.ends, again.distance, side="right")
+    return as_track(rows)

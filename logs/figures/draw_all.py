@@ -9,19 +9,18 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.elements.style import png_bytes, svg_bytes
 from logs.figures.envelope import draw_envelope_and_flight
-from logs.figures.exposure import draw_exposure
 from logs.figures.map import draw_map
 from logs.figures.profile import draw_profile
 from logs.figures.scene import draw_scene
-from logs.figures.time_series import draw_controls, draw_energy, draw_time_plots
+from logs.figures.style import png_bytes, svg_bytes
+from logs.figures.time_series import draw_controls, draw_energy, draw_exposure, draw_time_plots
 from logs.figures.turns import draw_turns
 from logs.verdict.findings import Verdict
-from logs.verdict.measures.airspace import with_fence_zones
-from world.atomic_files import write_whole
+from logs.verdict.measures.route_requirements import with_fence_zones
+from world.files import write_whole
 
 __all__ = [
     "FIGURE_FILES", "draw_figures", "draw_map", "draw_pictures", "draw_profile", "draw_time_plots", "write_png",
@@ -77,7 +76,7 @@ def write_png(figure: Figure, path: Path) -> None:
     """Write the figure as a PNG, whole or not at all.  Raises OSError.
 
     >>> import tempfile
-    >>> from logs.figures.elements.style import new_figure
+    >>> from logs.figures.style import new_figure
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_png(new_figure(2.0), Path(folder) / "empty.png")
     ...     (Path(folder) / "empty.png").read_bytes()[1:4]

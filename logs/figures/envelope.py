@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from aircraft.envelope import Envelope
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.elements import style
+from logs.figures import style
 from world.geometry import leg_slopes
 
 Floats = NDArray[np.float64]

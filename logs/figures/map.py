@@ -6,26 +6,184 @@ from typing import Any
 
 import numpy as np
 from matplotlib import patheffects
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Rectangle
+from matplotlib.patches import Circle, Patch, Rectangle
 from matplotlib.ticker import FuncFormatter, MultipleLocator
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
-from logs.figures.elements import style
-from logs.figures.elements.failure_labels import draw_inside, inside_threats, radius_of, write_fail_labels
-from logs.figures.elements.failures import Failures, failures, paths_differ
-from logs.figures.elements.ground import draw_ground
-from logs.figures.elements.labels import LabelPlacer
-from logs.figures.elements.legend import NamedWind, draw_compass, draw_legend, failing_handles
-from logs.figures.elements.threats import draw_threat_circles
-from logs.figures.elements.zones import draw_zone_shapes, name_zones
+from logs.figures import style
+from logs.figures.failures import (
+    Failures,
+    LabelPlacer,
+    draw_inside,
+    failures,
+    inside_threats,
+    paths_differ,
+    radius_of,
+    write_fail_labels,
+)
+from logs.figures.threats_and_zones import draw_threat_circles, draw_zone_shapes, name_zones
 from logs.verdict.findings import Verdict
 from world.scenario import Scenario
+from world.terrain import Terrain
 from world.threats import Threats
+from world.wind import Wind
 
 Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# The ground under a map: shaded heights, contours and their colour bar.
+
+
+def draw_ground(figure: Figure, axes: Any, terrain: Terrain | None, column: float, top: float) -> list[Any]:
+    """Shaded heights with labelled contours and a colour bar, or a note where there is no terrain.
+
+    column: left edge (inches) of the column beside the map.  top: inches above it.  Returns what the legend shows.
+    """
+    note: dict[str, Any] = {"x": column / style.WIDTH, "y": 0.6, "color": style.QUIET}
+    east_range, north_range = axes.get_xlim(), axes.get_ylim()
+    if terrain is None:
+        figure.text(s="no terrain\nwas given", **note)
+        return []
+    pitch = max(terrain.spacing * 0.5, np.ptp(east_range) / 900.0)
+    east = np.linspace(east_range[0], east_range[1], 2 + int(np.ptp(east_range) / pitch))
+    north = np.linspace(north_range[0], north_range[1], 2 + int(np.ptp(north_range) / pitch))
+    heights = terrain.height(east[None, :], north[:, None])
+    if not np.isfinite(heights).any():
+        figure.text(s="no terrain\nhere", **note)
+        return []
+    low, high = float(np.nanmin(heights)), float(np.nanmax(heights))
+    flat = high - low < 1.0
+    colours = LinearSegmentedColormap.from_list("ground", style.GROUND)
+    norm = Normalize(low - 0.5, high + 0.5) if flat else Normalize(low, high)
+    picture = colours(norm(heights))
+    picture[..., :3] *= 1.0 if flat else _shade(heights, float(north[1] - north[0]), high - low)[..., None]
+    picture[np.isnan(heights)] = (0.93, 0.93, 0.93, 1.0)
+    extent = (*east_range, *north_range)
+    axes.imshow(picture, extent=extent, origin="lower", interpolation="bilinear", zorder=1, aspect="equal")
+    if flat:
+        figure.text(s=f"level ground,\n{low:.0f} m AMSL", **note)
+        return []
+    step = style.nice_step(high - low, 10)
+    levels = np.arange(np.ceil(low / step) * step, high, step)
+    lines = axes.contour(east, north, heights, levels=levels, colors="#6b5a3a", linewidths=0.45, alpha=0.75, zorder=2)
+    axes.clabel(lines, levels[1::2], fmt="%.0f", fontsize=5.5, colors="#4d3f25", inline_spacing=1, zorder=2.1)
+    _colour_bar(figure, colours, norm, levels, column, top)
+    return [Line2D([], [], color="#6b5a3a", linewidth=0.8, label=f"contours every {step:g} m AMSL")]
+
+
+def _shade(heights: Floats, pitch: float, span: float) -> Floats:
+    """Brightness under light from the north-west, about 0.75 to 1.1 clipped at 1; level ground where unknown."""
+    filled = np.where(np.isfinite(heights), heights, np.nanmean(heights))
+    up_north, up_east = np.gradient(filled, pitch)
+    # Gentle country is exaggerated, so that its ridges show.
+    gain = float(np.clip(600.0 / span, 0.5, 4.0))
+    slope_e, slope_n = gain * up_east, gain * up_north
+    lit = (0.5 * slope_e - 0.5 * slope_n + 0.707) / np.sqrt(1.0 + slope_e**2 + slope_n**2)
+    return np.asarray(np.clip(0.96 + 0.42 * (lit - 0.707), 0.55, 1.0))
+
+
+def _colour_bar(figure: Figure, colours: Any, norm: Any, levels: Floats, column: float, top: float) -> None:
+    total = float(figure.get_figheight())
+    tall = min(2.6, total - 3.4)
+    frame = (column / style.WIDTH, (total - top - tall - 0.25) / total, 0.16 / style.WIDTH, tall / total)
+    bar = figure.colorbar(ScalarMappable(norm, colours), cax=figure.add_axes(frame))
+    bar.set_ticks(levels[:: max(1, len(levels) // 8)].tolist())
+    bar.set_label("ground height (m AMSL)", fontsize=8)
+    bar.ax.tick_params(labelsize=7.5)
+
+
+# ----------------------------------------------------------------------
+# What stands around a map or a profile: the legend below, and the compass with the wind.
+
+# Inches from a line of the wind's note to the next.
+_LINE = 0.145
+
+
+def draw_legend(figure: Figure, handles: list[Any], left: float, top: float) -> None:
+    """Write the legend below the picture, where it hides nothing.
+
+    left: inches from the figure's edge.  top: its upper edge as a share of the figure's height.
+    """
+    figure.legend(
+        handles=handles,
+        loc="upper left",
+        bbox_to_anchor=(left / style.WIDTH - 0.01, top),
+        ncols=4,
+        columnspacing=1.4,
+        handlelength=2.0,
+        borderaxespad=0.0,
+        borderpad=0.2,
+        labelspacing=0.45,
+    )
+
+
+def failing_handles(failed: Failures) -> list[Any]:
+    """List the legend's entries for the marks of failing legs and waypoints, as far as there are any."""
+    handles: list[Any] = []
+    if failed.legs:
+        handles.append(Line2D([], [], color=style.FAIL, linewidth=6, alpha=0.9, label="leg that fails a rule"))
+    if failed.waypoints:
+        ring: dict[str, Any] = {"marker": "o", "linestyle": "", "markersize": 9, "mfc": "none", "markeredgewidth": 2.0}
+        handles.append(Line2D([], [], color=style.FAIL, label="waypoint that fails a rule", **ring))
+    if failed.threats:
+        handles.append(Patch(facecolor="none", edgecolor=style.FAIL, linewidth=2.2, label="threat that is entered"))
+    return handles
+
+
+@dataclass(frozen=True, slots=True)
+class NamedWind:
+    """A wind of the compass; name: of the flight that it belongs to, "" where there is one wind alone."""
+
+    wind: Wind
+    name: str = ""
+    colour: str = style.BLUE
+
+
+def draw_compass(figure: Figure, winds: Sequence[NamedWind], column: float) -> None:
+    """Show north, and where each wind blows to, in the column (its left edge in inches) beside the map."""
+    total = float(figure.get_figheight())
+    side = 1.0
+    notes = [(_wind_text(named), named.colour if len(winds) > 1 else style.INK) for named in winds]
+    lines = sum(text.count("\n") + 1 for text, _ in notes)
+    base = max(1.35, 0.2 + _LINE * (lines + len(notes) - 1))
+    dial = figure.add_axes((column / style.WIDTH - 0.01, base / total, side / style.WIDTH, side / total))
+    dial.set(xlim=(-1.25, 1.25), ylim=(-1.25, 1.25), aspect="equal")
+    dial.axis("off")
+    dial.add_patch(Circle((0, 0), 1.0, fill=False, edgecolor="#999999", linewidth=0.8))
+    dial.text(0, 1.05, "N", ha="center", va="bottom", fontsize=8.5, fontweight="bold")
+    dial.plot([0, 0], [0.82, 1.0], color=style.INK, linewidth=1.2)
+    blowing = [named for named in winds if named.wind.speed > 0.0]
+    for k, named in enumerate(blowing):
+        east, north = np.sin(named.wind.from_course), np.cos(named.wind.from_course)
+        # A second arrow is dashed and shorter, so that both show where they lie on each other.
+        arrow: dict[str, Any] = {"arrowstyle": "-|>", "linewidth": 1.8, "shrinkA": 0, "shrinkB": 0}
+        arrow |= {"color": named.colour, "linestyle": (0, (3, 1.5)) if k else "-"}
+        length = 0.8 - 0.25 * k
+        dial.annotate("", (-length * east, -length * north), (length * east, length * north), arrowprops=arrow)
+    if not blowing:
+        dial.text(0, 0, "calm", ha="center", va="center", fontsize=7.5, color=style.QUIET)
+    top = base - 0.02
+    for text, colour in notes:
+        look: dict[str, Any] = {"ha": "center", "va": "top", "fontsize": 7.5, "color": colour}
+        figure.text((column + 0.4) / style.WIDTH, top / total, text, **look)
+        top -= _LINE * (text.count("\n") + 2)
+
+
+def _wind_text(named: NamedWind) -> str:
+    wind = named.wind
+    note = f"{style.shorten(named.name, 22)}:\n" if named.name else ""
+    if wind.speed > 0.0:
+        note += f"wind {wind.speed:.1f} m/s\nfrom {round(np.degrees(wind.from_course)) % 360:03d}°"
+    else:
+        note += "no mean wind"
+    return note + (f"\n{wind.turbulence} turbulence" if wind.turbulence != "none" else "")
+
 
 # Inches: the map's own width, and what stands around it.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55

@@ -15,12 +15,12 @@ from matplotlib.markers import MarkerStyle
 from matplotlib.transforms import Affine2D
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.elements import style
+from logs.figures import style
 from logs.figures.map import draw_map
-from logs.verdict.measures.airspace import with_fence_zones
-from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
+from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.uint8]

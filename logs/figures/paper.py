@@ -11,11 +11,10 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
 from numpy.typing import NDArray
 
-from logs.figures.elements import style
-from logs.figures.elements.ground import draw_ground
-from logs.figures.elements.labels import LabelPlacer
-from logs.figures.elements.legend import draw_legend
-from logs.figures.elements.threats import draw_threat_circles
+from logs.figures import style
+from logs.figures.failures import LabelPlacer
+from logs.figures.map import draw_ground, draw_legend
+from logs.figures.threats_and_zones import draw_threat_circles
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]

@@ -10,13 +10,20 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from flight.simulation.track import Track
-from logs.figures.elements import style
-from logs.figures.elements.failure_labels import draw_inside, inside_threats, write_fail_labels
-from logs.figures.elements.failures import Failures, failures, route_distance, route_samples, track_distance
-from logs.figures.elements.labels import LabelPlacer
-from logs.figures.elements.legend import draw_legend, failing_handles
-from logs.figures.elements.threats import SphereName, draw_entered_cuts, draw_threat_cuts
-from logs.figures.elements.zones import draw_zone_cuts, zone_handles
+from logs.figures import style
+from logs.figures.failures import (
+    Failures,
+    LabelPlacer,
+    draw_inside,
+    failures,
+    inside_threats,
+    route_distance,
+    route_samples,
+    track_distance,
+    write_fail_labels,
+)
+from logs.figures.map import draw_legend, failing_handles
+from logs.figures.threats_and_zones import SphereName, draw_entered_cuts, draw_threat_cuts, draw_zone_cuts, zone_handles
 from logs.verdict.findings import Verdict
 from world.scenario import Scenario
 from world.threats import Threats

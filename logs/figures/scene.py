@@ -1,5 +1,7 @@
 """The 3-D picture: ground, threats, plan and flight from aside, for paper and for where no script runs."""
 
+import base64
+import json
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -12,19 +14,140 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.elements import style
-from logs.figures.elements.failures import Failures, failures, route_distance, route_samples
-from logs.figures.elements.labels import LabelPlacer
-from logs.figures.elements.legend import draw_legend, failing_handles
-from logs.figures.elements.scene_data import GroundGrid, drawn_rows, exaggeration, ground_grid, scene_bounds
-from logs.figures.elements.zones import zone_handles
+from logs.figures import style
+from logs.figures.failures import Failures, LabelPlacer, failures, route_distance, route_samples
+from logs.figures.map import draw_legend, failing_handles
+from logs.figures.threats_and_zones import zone_handles
 from logs.verdict.findings import Verdict
-from world.airspace.zone_outlines import zone_walls
+from world.airspace.zones_on_map import zone_walls
 from world.terrain import Terrain
 
 Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Ground, threats and plan as the data of the 3-D pictures; for the report's page as what JSON can hold.
+
+
+MOST_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536
+MISSING = 65535
+
+
+@dataclass(frozen=True, slots=True)
+class GroundGrid:
+    """Heights (n, e) m AMSL at the crossings of ``north`` (n,) and ``east`` (e,) m; NaN where unknown."""
+
+    east: Floats
+    north: Floats
+    heights: Floats
+
+
+def scene_bounds(setup: FlightSetup, track: Track | None) -> Floats:
+    """East and north range (2, 2) m of area, route and flight."""
+    points = [setup.scenario.bounds.T, setup.route.waypoints[:, :2]]
+    if track is not None:
+        points.append(track.position[np.isfinite(track.position).all(axis=1), :2])
+    together = np.vstack(points)
+    return np.stack([together.min(axis=0), together.max(axis=0)], axis=1)
+
+
+def ground_grid(terrain: Terrain | None, bounds: Floats, most: int) -> GroundGrid | None:
+    """Sample the ground at no more than ``most`` crossings a side, square as far as that goes; None without any."""
+    if terrain is None:
+        return None
+    spans = np.ptp(bounds, axis=1)
+    pitch = max(float(spans.max()) / (most - 1), terrain.spacing, 1.0)
+    axes = [
+        np.linspace(float(low), float(high), int(np.clip(np.ceil((high - low) / pitch) + 1, 2, most)))
+        for low, high in bounds
+    ]
+    heights = np.asarray(terrain.height(axes[0][None, :], axes[1][:, None]), dtype=np.float64)
+    return GroundGrid(axes[0], axes[1], heights) if np.isfinite(heights).any() else None
+
+
+def exaggeration(setup: FlightSetup, bounds: Floats, grid: GroundGrid | None) -> float:
+    """How many times heights are stretched, so that they show: 1, 1.5, 2 or 3."""
+    up = setup.route.waypoints[:, 2]
+    low, high = float(up.min()), float(up.max())
+    if grid is not None:
+        low, high = min(low, float(np.nanmin(grid.heights))), max(high, float(np.nanmax(grid.heights)))
+    wanted = 0.09 * float(np.ptp(bounds, axis=1).max()) / max(high - low, 50.0)
+    return max(value for value in (1.0, 1.5, 2.0, 3.0) if value <= max(wanted, 1.0))
+
+
+def drawn_rows(track: Track, most: int) -> NDArray[np.intp]:
+    """At most ``most`` rows of the track at which its position is a number, first and last of those among them."""
+    good = np.flatnonzero(np.isfinite(track.position).all(axis=1))
+    return good[np.unique(np.linspace(0, max(len(good) - 1, 0), min(len(good), most)).astype(np.intp))]
+
+
+def script_json(data: object) -> str:
+    """JSON that may stand inside an HTML script element: "<" would end that early where a name holds one.
+
+    >>> "<" in script_json({"name": "</script>"}), json.loads(script_json({"name": "</script>"}))
+    (False, {'name': '</script>'})
+    """
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def scene_data(setup: FlightSetup, track: Track | None, failed: Failures) -> dict[str, object]:
+    """The scene as what JSON can hold; the flight itself is not in it.
+
+    track: for how far the scene reaches.
+    Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
+    """
+    bounds = scene_bounds(setup, track)
+    grid = ground_grid(setup.scenario.terrain, bounds, MOST_GROUND)
+    threats = setup.scenario.threats
+    return {
+        "name": setup.scenario.name,
+        "bounds": np.round(bounds, 1).tolist(),
+        "stretch": exaggeration(setup, bounds, grid),
+        "ground": None if grid is None else _ground(grid),
+        "threats": [
+            {
+                "name": name,
+                "at": np.round(threats.position[k], 1).tolist(),
+                "kill": round(float(threats.kill_radius[k]), 1),
+                "detection": round(float(threats.detection_radius[k]), 1),
+            }
+            for k, name in enumerate(threats.names)
+        ],
+        **_zone_walls(setup),
+        "plan": np.round(setup.route.waypoints, 1).tolist(),
+        "failing": {"legs": list(failed.legs), "waypoints": list(failed.waypoints)},
+    }
+
+
+def _zone_walls(setup: FlightSetup) -> dict[str, object]:
+    """Names, kinds and rings of zones, each corner's foot and upper edge; nothing where there are none."""
+    zones, up = setup.scenario.zones, setup.route.waypoints[:, 2]
+    if not zones:
+        return {}
+    walls = [zone_walls(zone, setup.scenario.terrain, float(up.min()), float(up.max()) + 50.0) for zone in zones]
+    return {
+        "zones": [
+            {"name": zone.name, "keep_out": zone.kind == "exclusion", "rings": [np.round(w, 1).tolist() for w in rings]}
+            for zone, rings in zip(zones, walls, strict=True)
+        ]
+    }
+
+
+def _ground(grid: GroundGrid) -> dict[str, object]:
+    low, high = float(np.nanmin(grid.heights)), float(np.nanmax(grid.heights))
+    share = (grid.heights - low) / max(high - low, 1e-6)
+    steps = np.where(np.isfinite(share), np.round(share * (MISSING - 1)), MISSING).astype("<u2")
+    return {
+        "columns": len(grid.east),
+        "rows": len(grid.north),
+        "low": low,
+        "high": high,
+        "heights": base64.b64encode(steps.tobytes()).decode("ascii"),
+    }
+
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
 _ELEVATION = math.radians(36.0)
@@ -79,7 +202,7 @@ def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None)
     failed = failures(verdict, len(route))
     with style.clean_style():
         figure, axes = _frame(setup, projection, bounds, grid)
-        handles = _ground(axes, projection, grid, bounds)
+        handles = _ground_surface(axes, projection, grid, bounds)
         handles += _threats(axes, projection, setup, failed)
         handles += _zones(axes, projection, setup)
         placer = LabelPlacer(axes)
@@ -144,7 +267,7 @@ def _frame(setup: FlightSetup, projection: Projection, bounds: Floats, grid: Gro
     return figure, axes
 
 
-def _ground(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
+def _ground_surface(axes: Any, projection: Projection, grid: GroundGrid | None, bounds: Floats) -> list[Any]:
     """Cells from the farthest to the nearest, shaded by light from the north-west."""
     if grid is None:
         base = float(projection.middle[2])

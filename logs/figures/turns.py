@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from logs.figures.elements import style
-from logs.figures.elements.legend import draw_legend
+from logs.figures import style
+from logs.figures.map import draw_legend
 from logs.verdict.findings import Finding, Verdict
 
 _LEFT, _RIGHT, _TOP, _BOTTOM, _PANEL, _GAP = 0.85, 0.25, 0.6, 0.85, 1.55, 0.62

@@ -9,7 +9,7 @@ from aircraft.envelope import Envelope
 from flight.mission.items import Command, Mission, MissionItem
 from flight.mission.route import Route
 from flight.mission_files.formats import mission_text
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.recording.reader import FlightLog, LogEvent
 from logs.recording.recorder import Recorder

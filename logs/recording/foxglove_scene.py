@@ -3,13 +3,18 @@
 Frame `map` is the scenario's east, north and up (AMSL) in metres; `aircraft` is forward, left, up.
 """
 
+import json
 import math
+import struct
 from collections.abc import Iterable, Sequence
+from importlib import resources
+from typing import Any
 
 import numpy as np
 from foxglove_schemas_protobuf.Color_pb2 import Color
 from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
 from foxglove_schemas_protobuf.Log_pb2 import Log
+from foxglove_schemas_protobuf.ModelPrimitive_pb2 import ModelPrimitive
 from foxglove_schemas_protobuf.Point3_pb2 import Point3
 from foxglove_schemas_protobuf.Pose_pb2 import Pose
 from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
@@ -21,13 +26,15 @@ from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
 from google.protobuf.timestamp_pb2 import Timestamp
 from numpy.typing import ArrayLike, NDArray
 
-from logs.recording.protobuf_arrays import length_delimited, repeated_submessages
-from world.airspace.zone_outlines import zone_walls
+from logs.recording.state_channel import length_delimited, repeated_submessages
+from world.airspace.zones_on_map import zone_walls
 from world.scenario import Scenario
 from world.terrain import Terrain
 from world.threats import Threats
 
 Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
 
 MAP, AIRCRAFT = "map", "aircraft"
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
@@ -237,3 +244,107 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
                 entity.lines[-1].points.extend(_points(path))
         entity.texts.append(_name(_above_ground(walls[0][0, 1], scenario.terrain), zone.name))
     return _update(entity)
+
+
+# ----------------------------------------------------------------------
+# A small aircraft of our own for 3-D viewers: triangles as binary glTF 2.0, its left wing red, its right one green.
+
+
+# m, whatever the aircraft: at its true size it could not be seen among hills.
+SPAN = 100.0
+MEDIA_TYPE = "model/gltf-binary"
+
+# Forward, left, up in spans.
+_NOSE, _TAIL = (0.45, 0.0, 0.0), (-0.46, 0.0, 0.03)
+_RING = ((0.12, 0.05, 0.0), (0.12, 0.0, 0.06), (0.12, -0.05, 0.0), (0.12, 0.0, -0.05))
+_BODY = [
+    *([_NOSE, _RING[k], _RING[(k + 1) % 4]] for k in range(4)),
+    *([_TAIL, _RING[(k + 1) % 4], _RING[k]] for k in range(4)),
+    [(-0.34, 0.0, 0.03), (-0.47, 0.0, 0.03), (-0.47, 0.0, 0.20)],
+]
+_LEFT = [
+    [(0.16, 0.0, 0.03), (0.02, 0.5, 0.05), (-0.08, 0.0, 0.03)],
+    [(-0.32, 0.0, 0.03), (-0.42, 0.18, 0.03), (-0.46, 0.0, 0.03)],
+]
+_RIGHT = [[(x, -y, z) for x, y, z in reversed(triangle)] for triangle in _LEFT]
+_PARTS = ((_BODY, (0.92, 0.92, 0.88, 1.0)), (_LEFT, (0.85, 0.10, 0.10, 1.0)), (_RIGHT, (0.10, 0.60, 0.20, 1.0)))
+# Chunk types of a .glb, and glTF's numbers for float32 and for what a buffer's view is used for.
+_JSON, _BIN, _FLOAT, _VERTICES = b"JSON", b"BIN\0", 5126, 34962
+
+
+def model_corners() -> Singles:
+    """(t, 3, 3) corners of the triangles, m forward, left and up of the aircraft, `SPAN` wide."""
+    return np.array([triangle for triangles, _ in _PARTS for triangle in triangles], dtype=np.float32) * SPAN
+
+
+def model_colours() -> Singles:
+    """(t, 4) colours of the triangles: red, green, blue, opacity, 0 to 1."""
+    return np.array([colour for triangles, colour in _PARTS for _ in triangles], dtype=np.float32)
+
+
+def aircraft_glb() -> bytes:
+    """The model as a `.glb` file: one unit wide, in glTF's axes (right-handed, y up), each part with its colour."""
+    pieces = b""
+    views: list[dict[str, Any]] = []
+    accessors, primitives, materials = [], [], []
+    for triangles, colour in _PARTS:
+        forward_left_up = np.array(triangles, dtype=np.float32).reshape(-1, 3)
+        points = np.stack([forward_left_up[:, 0], forward_left_up[:, 2], -forward_left_up[:, 1]], axis=1)
+        data = points.tobytes()
+        number = len(views)
+        views.append({"buffer": 0, "byteOffset": len(pieces), "byteLength": len(data), "target": _VERTICES})
+        accessors.append(
+            {
+                "bufferView": number, "componentType": _FLOAT, "count": len(points), "type": "VEC3",
+                "min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist(),
+            }
+        )  # fmt: skip
+        primitives.append({"attributes": {"POSITION": number}, "material": number, "mode": 4})
+        surface = {"baseColorFactor": list(colour), "metallicFactor": 0.0, "roughnessFactor": 0.9}
+        materials.append({"pbrMetallicRoughness": surface, "doubleSided": True})
+        pieces += data
+    about: dict[str, Any] = {
+        "asset": {"version": "2.0", "generator": "planfly"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "name": "aircraft"}],
+        "meshes": [{"primitives": primitives}],
+        "materials": materials,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(pieces)}],
+    }
+    text = json.dumps(about, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in ((_JSON, text), (_BIN, pieces)))
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
+
+
+def aircraft_scene(time_ns: int) -> bytes:
+    """The model in the aircraft's own frame, so that its transforms move it: a SceneUpdate."""
+    model = ModelPrimitive(
+        pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
+        scale=Vector3(x=SPAN, y=SPAN, z=SPAN),
+        color=Color(r=1.0, g=1.0, b=1.0, a=1.0),
+        media_type=MEDIA_TYPE,
+        data=aircraft_glb(),
+    )
+    entity = SceneEntity(
+        timestamp=timestamp(time_ns), frame_id=AIRCRAFT, id="aircraft", frame_locked=True, models=[model]
+    )
+    data: bytes = SceneUpdate(entities=[entity]).SerializeToString(deterministic=True)
+    return data
+
+
+# ----------------------------------------------------------------------
+# The layout for Foxglove that shows a flight log whole: 3-D, map, plots, events and the state.
+
+
+def layout_text() -> str:
+    """Return the layout file that ships with the package, as JSON text.
+
+    >>> import json
+    >>> sorted(json.loads(layout_text()))
+    ['configById', 'globalVariables', 'layout', 'playbackConfig', 'userNodes']
+    """
+    return resources.files("logs.recording").joinpath("templates", "foxglove-layout.json").read_text(encoding="utf-8")

@@ -5,6 +5,7 @@ A recorded verdict is given as it stands in the log, for comparison; nothing her
 
 import json
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,15 +15,23 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from google.protobuf.message import DecodeError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema
+from mcap.records import Message as MessageRecord
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.attachment_names import BESIDE_FILE, RECOVERY_FILE, RESULT_FILE, SETUP_FILE, VERDICT_FILE
-from logs.recording.chunk_layout import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.foxglove_scene import LEVELS
-from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream
+from logs.recording.foxglove_updates import NAME as NOTED_IN_FLIGHT
+from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, read_chunks, record_stream, records
+from logs.recording.mcap_writer import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.recorder import LONGEST
-from logs.recording.setup_attachments import unpack_setup
+from logs.recording.setup_attachments import (
+    BESIDE_FILE,
+    RECOVERY_FILE,
+    RESULT_FILE,
+    SETUP_FILE,
+    VERDICT_FILE,
+    unpack_setup,
+)
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
@@ -37,11 +46,96 @@ from logs.recording.state_channel import (
     parse_row,
     state_class,
 )
-from logs.recording.viewers.flight_events import NAME as NOTED_IN_FLIGHT
-from logs.verdict.beside_file import parse_beside
-from logs.verdict.levels import FlownBeside
+from logs.verdict.findings import parse_beside
+from logs.verdict.places import FlownBeside
 from world.errors import LogError
-from world.notebooks.html_table import html_table
+from world.html_table import html_table
+
+# ----------------------------------------------------------------------
+# The messages of a log as they were written, for viewers that take them as they are.
+
+
+@dataclass(frozen=True, slots=True)
+class LogChannel:
+    """A topic of a log: encoding of its messages, and their schema's name, encoding and data."""
+
+    topic: str
+    encoding: str
+    schema: str
+    schema_encoding: str
+    schema_data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class LogMessage:
+    """One message; log_time in ns since 1970."""
+
+    channel: LogChannel
+    log_time: int
+    data: bytes
+
+
+def log_messages(path: Path) -> Iterator[LogMessage]:
+    """Give the messages of a log in the order of the file, up to its first damage.  Raises OSError.
+
+    >>> import tempfile
+    >>> from collections import Counter
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = write_example_log(Path(folder) / "example.mcap")
+    ...     counts = Counter(message.channel.topic for message in log_messages(path))
+    >>> counts["/state"], counts["/tf"], counts["/fix"]
+    (366, 183, 37)
+    """
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, LogChannel] = {}
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        for data in read_chunks(file, Container()):
+            try:
+                yield from _messages(data, schemas, channels)
+            except (*PARSE_ERRORS, DecodeError, KeyError):
+                return
+
+
+def log_channels(path: Path) -> list[LogChannel]:
+    """List the channels that the first chunk of a log declares: all that a `logs.recording.recorder.Recorder` uses.
+
+    Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import write_example_log
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     channels = log_channels(write_example_log(Path(folder) / "example.mcap"))
+    >>> channels[0].topic, channels[0].encoding, channels[0].schema
+    ('/state', 'protobuf', 'planfly.State')
+    """
+    channels: dict[int, LogChannel] = {}
+    with path.open("rb") as file:
+        file.seek(len(MAGIC))
+        for data in read_chunks(file, Container()):
+            for _ in _messages(data, {}, channels):
+                pass
+            break
+    return list(channels.values())
+
+
+def _messages(data: bytes, schemas: dict[int, Schema], channels: dict[int, LogChannel]) -> Iterator[LogMessage]:
+    for opcode, _, content in records(data):
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(record_stream(content))
+            schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(record_stream(content))
+            if channel.id not in channels:
+                known = schemas[channel.schema_id]
+                channels[channel.id] = LogChannel(
+                    channel.topic, channel.message_encoding, known.name, known.encoding, known.data
+                )
+        elif opcode == Opcode.MESSAGE:
+            message = MessageRecord.read(record_stream(content), len(content))
+            yield LogMessage(channels[message.channel_id], message.log_time, message.data)
+
 
 _MESSAGE = struct.Struct("<HIQQ")
 _LEVEL_NAMES = {number: name for name, number in LEVELS.items()}

@@ -19,42 +19,41 @@ from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import COLUMNS, TRACK_ROW, Rows, Track, join_rows, track_rows
 from logs.recording import foxglove_scene as scene
-from logs.recording.attachment_names import BESIDE_FILE, RESULT_FILE, VERDICT_FILE, media_type
-from logs.recording.chunk_layout import (
+from logs.recording import foxglove_updates as clouds
+from logs.recording.foxglove_scene import aircraft_scene
+from logs.recording.foxglove_updates import FIX_TOPIC, TF_TOPIC, TRACK_POINTS, TRACK_TOPIC, FlightEvents, Poses
+from logs.recording.mcap_writer import (
     CHUNK,
     NOT_INCREASING,
     OUT_OF_RANGE,
     SECOND_NS,
+    ChannelIndex,
+    ChunkContent,
+    ContainerWriter,
     Layout,
     MessageRecords,
     last_log_time,
     lay_out,
     single_record,
 )
-from logs.recording.foxglove_poses import FIX_TOPIC, TF_TOPIC, TRACK_POINTS, TRACK_TOPIC, Poses
-from logs.recording.mcap_writer import ChannelIndex, ChunkContent, ContainerWriter
-from logs.recording.protobuf_arrays import as_bytes
-from logs.recording.setup_attachments import pack_setup
+from logs.recording.setup_attachments import BESIDE_FILE, RESULT_FILE, VERDICT_FILE, media_type, pack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
     STATE_NAME,
     STATE_TOPIC,
+    as_bytes,
     encode_rows,
     schema_of,
     state_schema,
     times_ns,
 )
-from logs.recording.viewers import point_clouds as clouds
-from logs.recording.viewers.aircraft_model import aircraft_scene
-from logs.recording.viewers.flight_events import FlightEvents
-from logs.verdict.beside_file import beside_json
-from logs.verdict.findings import Verdict, verdict_json
-from logs.verdict.levels import FlownBeside
-from logs.verdict.measures.airspace import with_fence_zones
+from logs.verdict.findings import Verdict, beside_json, verdict_json
+from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.verdict.places import FlownBeside
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"

@@ -8,11 +8,11 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from logs.recording.attachment_names import RECOVERY_FILE, RESULT_FILE, VERDICT_FILE, media_type
 from logs.recording.mcap_reader import MAGIC, PARSE_ERRORS, Container, read_chunks
 from logs.recording.mcap_writer import ContainerWriter
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import PROFILE
+from logs.recording.setup_attachments import RECOVERY_FILE, RESULT_FILE, VERDICT_FILE, media_type
 
 RECOVERY_SCHEMA = "planfly.recovery/1"
 

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from aircraft.envelope import Envelope
-from flight.ardupilot.parameters import ArduPilotParameters, Origin, stored_parameters
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, Origin, stored_parameters
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.autopilot_program import AutopilotProgram
+from flight.simulation.setup import AutopilotProgram
 from world.errors import LogError, ParameterError
 from world.geometry import leg_runs
 

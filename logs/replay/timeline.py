@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from flight.mission.route import Route
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog
-from logs.verdict.measures.along_track import Passage, passages, segment_clearances
-from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
+from logs.verdict.measures.path_sweeps import Passage, passages, segment_clearances
+from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from world.frames import to_geo
 from world.geometry import leg_courses, leg_runs, leg_slopes, signed_turns
 

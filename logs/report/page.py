@@ -5,28 +5,234 @@ hash; it asks no network for anything.  Without the scripts and on paper, still 
 charts.
 """
 
+import base64
+import gzip
+import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.elements.failures import failures
-from logs.figures.elements.scene_data import scene_data, script_json
+from logs.figures.failures import failures
+from logs.figures.scene import scene_data, script_json
 from logs.report import tables
-from logs.report.captions import report_pictures
-from logs.report.page_parts import CHART_SCRIPTS, VIEW_SCRIPTS, page_library, script_digest, script_text, style_text
 from logs.report.text import badge_of, count_sentence, finding_rows, level_rows, rule_rows
 from logs.verdict.findings import Verdict
-from logs.verdict.measures.airspace import with_fence_zones
-from logs.verdict.measures.leg_numbers import with_legs
-from world.atomic_files import write_whole
+from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.verdict.measures.track_alignment import with_legs
+from world.files import write_whole
 
 if TYPE_CHECKING:
     from logs.recording.reader import LogEvent
+
+
+# ----------------------------------------------------------------------
+# Captions of the report's pictures: heading, alternative text, and how to read each.
+
+# Bytes from which on a picture is kept with few colours.
+_LARGE = 200_000
+
+
+@dataclass(frozen=True, slots=True)
+class ReportPicture:
+    """One picture of the page.
+
+    identifier: of its section.
+    title: its heading.
+    alternative: its text for those who cannot see it.
+    caption: how to read it.
+    data: its address in the page.
+    """
+
+    identifier: str
+    title: str
+    alternative: str
+    caption: str
+    data: str
+
+
+@dataclass(frozen=True, slots=True)
+class _Caption:
+    title: str
+    alternative: str
+    caption: str
+
+
+def report_pictures(setup: FlightSetup, flown: bool, pictures: Mapping[str, bytes]) -> list[ReportPicture]:
+    """List the page's pictures in its order; what was not drawn is left out.
+
+    pictures: PNG bytes by file name.
+    """
+    return [
+        ReportPicture(
+            identifier=name,
+            title=caption.title,
+            alternative=caption.alternative,
+            caption=caption.caption,
+            data=picture_address(pictures[f"{name}.png"]),
+        )
+        for name, caption in _captions(setup, flown).items()
+        if f"{name}.png" in pictures
+    ]
+
+
+def picture_address(png: bytes) -> str:
+    """A picture as an address that holds it; one that is large with few colours, as it is seen on paper alone.
+
+    >>> picture_address(b"PNG")
+    'data:image/png;base64,UE5H'
+    """
+    # Imported here, as in `page`: matplotlib is not loaded before a drawing.
+    from logs.figures.style import few_colours
+
+    small = png if len(png) <= _LARGE else few_colours(png)
+    return "data:image/png;base64," + base64.b64encode(small).decode("ascii")
+
+
+def _captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
+    """Captions by the picture's name, in the page's order."""
+    return _route_captions(setup, flown) | _FLIGHT_CAPTIONS
+
+
+def _route_captions(setup: FlightSetup, flown: bool) -> dict[str, _Caption]:
+    """Captions of the pictures of route and terrain, which a plan has, too, that was not flown."""
+    legs, threats = setup.route.legs, len(setup.scenario.threats)
+    ground = "shaded terrain" if setup.scenario.terrain is not None else "no terrain"
+    track = " and the flown track" if flown else ""
+    heights = "planned and flown heights" if flown else "planned heights"
+    progress = "Flown heights stand at the flight's progress along the planned path. " if flown else ""
+    return {
+        "map": _Caption(
+            "Map",
+            f"Map, north up: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
+            "The broad line is the plan, the thin line on it the flight."
+            + (
+                " Where they part, at corners, the aircraft flies an arc inside the waypoint."
+                if setup.source is None
+                else ""
+            )
+            if flown
+            else "Nothing was flown: the line is the plan.",
+        ),
+        "profile": _Caption(
+            "Profile",
+            f"Heights along the path: terrain, required clearance, {heights}, the ceiling, and the missile and radar "
+            "spheres that stand over the path.",
+            f"{progress}A sphere is cut where the path runs through its column of air; the path is within reach only "
+            "where its line lies inside the cut.",
+        ),
+        "scene": _Caption(
+            "3-D view",
+            f"View from aside: {ground}, {threats} threats, the planned path of {legs} legs{track}.",
+            "Domes are the missiles' reach, dashed the radars'; thin poles stand from the ground to the waypoints. "
+            "What a ridge hides shows faintly.",
+        ),
+    }
+
+
+_FLIGHT_CAPTIONS = {
+    "turns": _Caption(
+        "Turn by turn, leg by leg",
+        "Bars, dots and dashes: planned, flown and limit of each turn, slope, height above ground, waypoint, and of "
+        "the distance from the legs.",
+        "Bar: planned. Dot: flown. Dash: the limit, the tighter of scenario's and aircraft's, and of a waypoint what "
+        "counts as reached. Ringed: fails.",
+    ),
+    "time": _Caption(
+        "Over time",
+        "Plots over time: airspeed, bank, load factor, cross-track error, height error, height above ground.",
+        "Cross-track and height error are what guidance saw, against the path with its corners rounded. Height "
+        "above ground is computed from track and terrain.",
+    ),
+    "exposure": _Caption(
+        "Exposure",
+        "Plots along the flown distance: strength and sum of the exposure to missiles and to radars.",
+        "Strength is the sum over all units of (scale/distance)⁴ inside their reach: 1 at one scale's distance "
+        "(Yang, Tang and Lozano 2014, eq. 9 and 10, as a density). So far: its sum over time.",
+    ),
+    "controls": _Caption(
+        "Controls",
+        "Plots over time: elevator, aileron, rudder and throttle, commanded and as they stood, with their limits.",
+        "Shaded: the command stands at the control's limit, and the aircraft can give no more.",
+    ),
+    "energy": _Caption(
+        "Energy",
+        "Plots over time: battery energy used, power, current, and the aircraft's energy as a height.",
+        "Energy as height: height and airspeed²/2g. Its slope is climb that the motor pays for.",
+    ),
+    "envelope": _Caption(
+        "Envelope",
+        "Path angle over airspeed with the steepest climbs and descents, and bank over airspeed with its limit.",
+        "Lines: the steepest steady climb and descent of the aircraft, from trims of its model. A dot may stand "
+        "outside for a moment, in a gust or a pull-up; a leg may not.",
+    ),
+}
+
+
+# ----------------------------------------------------------------------
+# What the pages carry beside their words: style, scripts and plotly.js, and the policy that lets in no others.
+
+# The scripts in the order in which they stand; the comparison has charts and no view.
+CHART_SCRIPTS = (
+    "page_data", "theme", "ground", "chart_library", "chart_layout", "chart_panels", "chart_map", "charts",
+)  # fmt: skip
+VIEW_SCRIPTS = (
+    "moments", "clock", "player", "view_gl", "view_shapes", "view_aircraft", "view_camera", "view_labels", "view_hands",
+    "view",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class PageLibrary:
+    """plotly.js as a page carries it.
+
+    packed: compressed (gzip) and in base64.
+    digest: of the script, as a policy names it.
+    version: its own.
+    """
+
+    packed: str
+    digest: str
+    version: str
+
+
+def script_text(names: tuple[str, ...]) -> str:
+    """Scripts as one, each from its own file of ``templates/scripts``; ``start`` comes last, whatever is asked for."""
+    files = resources.files("logs.report").joinpath("templates", "scripts")
+    parts = [files.joinpath(f"{name}.js").read_text(encoding="utf-8") for name in (*names, "start")]
+    return '\n(function () {\n"use strict";\n' + "\n".join(parts) + "})();\n"
+
+
+def style_text(*names: str) -> str:
+    """Style sheets of ``templates`` as one: "style" is what both pages share."""
+    files = resources.files("logs.report").joinpath("templates")
+    return "\n".join(files.joinpath(f"{name}.css").read_text(encoding="utf-8") for name in names)
+
+
+def script_digest(text: str) -> str:
+    """A script as a policy names it (Content Security Policy Level 3, "hash-source").
+
+    >>> script_digest("")
+    'sha256-47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU='
+    """
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode("utf-8")).digest()).decode("ascii")
+
+
+@cache
+def page_library() -> PageLibrary:
+    """plotly.js of the installed package, a third of its size; the same text gives the same bytes."""
+    from plotly.offline import get_plotlyjs, get_plotlyjs_version
+
+    text = get_plotlyjs()
+    packed = gzip.compress(text.encode("utf-8"), mtime=0, compresslevel=6)
+    return PageLibrary(base64.b64encode(packed).decode("ascii"), script_digest(text), get_plotlyjs_version())
 
 
 def write_report(
@@ -130,7 +336,7 @@ def _page(
 def _page_data(setup: FlightSetup, track: Track | None, verdict: Verdict) -> dict[str, Any]:
     """What the page's scripts read, made safe for where it stands, and the scripts themselves."""
     # Imported here: charts share the figures' lines and colours, and matplotlib is not loaded before a drawing.
-    from logs.report.charts.page_charts import report_charts, report_flight
+    from logs.report.page_charts import report_charts, report_flight
 
     failed = failures(verdict, len(setup.route.waypoints))
     drawn, script = with_fence_zones(setup), script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))

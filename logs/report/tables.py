@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.simulation.control_limits import control_limits, held_at_limit
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.airborne import control_limits, held_at_limit
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.report.text import NOTHING, number, quantity
-from logs.verdict.measures.along_track import passages
+from logs.verdict.measures.path_sweeps import passages
 from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
 from world.scenario import geographic
 

@@ -1,13 +1,80 @@
 """Numbers and findings as a reader meets them: sensible digits, units, real minus signs, failing rows on top."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from logs.report.would_pass import WouldPass, would_pass
+from flight.simulation.setup import MissionStretch
 from logs.verdict.findings import RULES, Finding, Verdict
-from logs.verdict.levels import DecidingParameter
+from logs.verdict.imported.model_comparison import Reflight
+from logs.verdict.places import DecidingParameter, Suggestion
 from logs.verdict.wording import place_text, suggestions_text
+
+# ----------------------------------------------------------------------
+# What would have passed where a finding fails: the number, the changes of the plan, the autopilot's parameter.
+
+# How far a margin may be from the difference that it is, in the finding's unit: both are rounded to 1e-6.
+_SAME = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class WouldPass:
+    """What would have passed one failed finding.
+
+    bound: how the number that passes bounds what was flown; None where the finding fails by other evidence.
+    value: that number, in the finding's unit.
+    misses: how far beyond it the flight, or the plan, was; tolerance not counted.
+    suggestions: the smallest changes of the plan, any of which would pass.
+    parameter: that of the autopilot which decides, where it fails this finding first.
+    """
+
+    bound: Literal["at most", "at least"] | None
+    value: float | None
+    misses: float | None
+    suggestions: tuple[Suggestion, ...]
+    parameter: DecidingParameter | None
+
+    def __bool__(self) -> bool:
+        """Something is known that would pass."""
+        return bool(self.bound or self.suggestions or self.parameter)
+
+
+def would_pass(finding: Finding, deciding: DecidingParameter | None) -> WouldPass:
+    """What would have passed a failed finding.
+
+    deciding: the verdict's.
+
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
+    >>> found = would_pass(low, None)
+    >>> found.bound, found.value, found.misses
+    ('at least', 60.0, 8.0)
+    """
+    bound = _bound(finding)
+    known = bound is not None and finding.margin is not None
+    same = deciding is not None and (deciding.rule, deciding.place) == (finding.rule, finding.place)
+    return WouldPass(
+        bound=bound,
+        value=finding.limit if known else None,
+        misses=-finding.margin if known and finding.margin is not None else None,
+        suggestions=finding.suggestions,
+        parameter=deciding if same else None,
+    )
+
+
+def _bound(finding: Finding) -> Literal["at most", "at least"] | None:
+    """Which side of its limit passes: that to which the margin counts; of a slope down, its steepness is bounded."""
+    if finding.limit is None or finding.margin is None:
+        return None
+    values = [value for value in (finding.flown, finding.planned) if value is not None]
+    if finding.rule == "slope" or not values:
+        return "at most"
+    if any(abs(value - finding.limit - finding.margin) < _SAME for value in values):
+        return "at least"
+    return "at most"
+
 
 NOTHING = "–"
 _UNITS = {"deg": "°", "none": "", "1": ""}
@@ -253,3 +320,88 @@ def _rule_row(rule: str, group: list[Finding]) -> RuleRow:
     row = _row(tightest)
     numbers = (row.planned, row.flown, row.limit, row.margin, row.unit)
     return RuleRow(state, sign, rule, ", ".join(parts), row.where, *numbers)
+
+
+# ----------------------------------------------------------------------
+# A flight of the field against the model's, in words: legs, turns, and how far the model can be trusted.
+
+_CALLED = {"cross_track": "cross-track", "height_error": "height", "ground_speed": "ground speed", "bank": "bank"}
+_HEAD = ("", "cross-track (m)", "height (m)", "ground speed (m/s)", "bank (deg)", "energy (Wh)")
+
+
+def refly_lines(again: Reflight) -> list[str]:
+    """Tables of legs and turns, each number as flown and as simulated, and how far the model can be trusted.
+
+    >>> from flight.simulation.setup import MissionStretch
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.imported.flown_legs import flown_legs
+    >>> from logs.verdict.imported.model_comparison import compare_with_model
+    >>> log = example_log()
+    >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+    >>> again = compare_with_model(log.setup, flown, log.track, "completed")
+    >>> refly_lines(again)[0]
+    'AUTO from 0.0 s to 36.5 s, legs 0 to 1: flown / simulated'
+    """
+    legs: list[tuple[str, ...]] = [_HEAD]
+    for one in again.legs:
+        numbers = (one.cross_track, one.height_error, one.ground_speed, one.bank, one.energy)
+        legs.append((f"leg {one.leg}", *map(_both, numbers)))
+    turns: list[tuple[str, ...]] = [("", "overshoot (m)", "bank (deg)", "nearest pass (m)")]
+    for turn in again.turns:
+        name = f"waypoint {turn.waypoint} ({turn.turn:+.1f}°)"
+        turns.append((name, *map(_both, (turn.overshoot, turn.bank, turn.passed))))
+    stretch = again.stretch
+    named = f"{stretch.mode or 'the flight'} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+    of = f", legs {again.first} to {again.first + len(again.legs) - 1}"
+    lines = [f"{named}{of}: flown / simulated", *_in_columns(legs)]
+    if again.turns:
+        lines += ["", *_in_columns(turns)]
+    return [*lines, "", trust_line(again)]
+
+
+def trust_line(again: Reflight) -> str:
+    """How far the model can be trusted on this aircraft, in a line."""
+    model = again.setup.aircraft
+    whose = f"{model}, which stands in for an aircraft that is not named," if again.stands_in else model
+    if not again.spreads:
+        return f"Model and flight have no place in common: nothing is known of how far {whose} can be trusted"
+    words = [
+        f"{_CALLED[one.name]} {number(one.median)} {one.unit} ({number(one.most)} {one.unit})" for one in again.spreads
+    ]
+    ended = "" if again.ended == "completed" else f"; the simulated flight ended early: {again.ended}"
+    wind = again.setup.scenario.wind
+    gusts = "no gusts" if wind.turbulence == "none" else f"{wind.turbulence} turbulence"
+    blown = f" in {wind.speed:.1f} m/s of wind, {gusts}"
+    return f"Model {whose}{blown}, against the flight, median (95 %): {', '.join(words)}{ended}"
+
+
+def left_lines(agains: Sequence[Reflight], stretches: Sequence[MissionStretch], flown_again: int) -> list[str]:
+    """Which stretches were not flown again, and why.
+
+    stretches: of the flight of the field.  flown_again: the most that are.
+
+    >>> left_lines((), (MissionStretch(50.0, 60.0, "AUTO", "log"),), 9)
+    ['Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order']
+    """
+    compared = {again.stretch.start for again in agains}
+    lines = []
+    for stretch in stretches:
+        if stretch.start not in compared:
+            why = "it passed no two waypoints in order"
+            if len(agains) >= flown_again:
+                why += f", or {flown_again} longer ones were"
+            name = stretch.mode or "the flight"
+            lines.append(f"Not flown again: {name} from {stretch.start:.1f} s to {stretch.end:.1f} s: {why}")
+    return lines
+
+
+def _both(pair: tuple[float, float]) -> str:
+    return " / ".join("-" if math.isnan(value) else f"{value:.1f}" for value in pair)
+
+
+def _in_columns(rows: Sequence[tuple[str, ...]]) -> list[str]:
+    wide = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    return [
+        "  ".join([row[0].ljust(wide[0]), *(cell.rjust(size) for cell, size in zip(row[1:], wide[1:], strict=True))])
+        for row in rows
+    ]

@@ -6,12 +6,12 @@ not read.
 
 from collections.abc import Mapping
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.field.judge_field_flight import judge_field_flight
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.flown_findings import flown_findings
+from logs.verdict.imported.judge_imported_flight import judge_field_flight
 from logs.verdict.judge_geometry import (
+    flown_findings,
     flown_level,
     geometric_findings,
     judge_geometry,
@@ -19,10 +19,9 @@ from logs.verdict.judge_geometry import (
     judge_unflown,
     unflyable_items,
 )
-from logs.verdict.levels import FlownBeside, LevelAnswer
-from logs.verdict.measures.route_demands import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import lay_track
-from logs.verdict.places import Disagreement, Place
+from logs.verdict.places import Disagreement, FlownBeside, LevelAnswer, Place
 from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 
@@ -50,8 +49,8 @@ def judge_flight(
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission, MissionItem
-    >>> from flight.mission.routing import make_route
-    >>> from flight.simulation.flight_setup import make_limits
+    >>> from flight.mission.route import make_route
+    >>> from flight.simulation.setup import make_limits
     >>> from flight.simulation.simulate import simulate
     >>> from world.scenario import load_scenario
     >>> scenario, aerosonde = load_scenario("tight"), find_aircraft("aerosonde")

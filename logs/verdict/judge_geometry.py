@@ -2,14 +2,16 @@
 
 import math
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
-from logs.verdict.levels import LevelAnswer, LevelName
-from logs.verdict.measures.route_demands import RouteDemands, route_demands
-from logs.verdict.places import FLIGHT, PLAN
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.track_alignment import AlignedTrack
+from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rules.bounds_rule import bounds_findings
 from logs.verdict.rules.clearance_rule import clearance_findings
+from logs.verdict.rules.completion_rule import completion_findings
 from logs.verdict.rules.corridor_rule import corridor_findings
+from logs.verdict.rules.departure_rule import departure_findings
 from logs.verdict.rules.energy_rule import energy_findings
 from logs.verdict.rules.fence_rule import fence_findings
 from logs.verdict.rules.height_rule import height_findings
@@ -53,8 +55,8 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
     >>> from flight.mission.items import Mission, MissionItem
-    >>> from flight.mission.routing import make_route
-    >>> from flight.simulation.flight_setup import make_limits
+    >>> from flight.mission.route import make_route
+    >>> from flight.simulation.setup import make_limits
     >>> from world.scenario import load_scenario
     >>> scenario, envelope = load_scenario("tight"), load_envelope(find_aircraft("aerosonde"))
     >>> way = [MissionItem(k, 16, 0, (0.0,) * 4, 46.0, 8.0 + 0.001 * k, 60.0 + 20.0 * k) for k in range(2)]
@@ -175,3 +177,32 @@ def _plan_lines(findings: list[Finding], plan: Plan) -> tuple[str, ...]:
     text = ", ".join(f"{item.rule} ({item.reason})" for item in failed)
     problems = (f"Problem: {problem}" for problem in plan.certificate.problems)
     return (f"not flyable: no feasible plan was found: {text}", "Nothing was flown", *problems)
+
+
+# ----------------------------------------------------------------------
+# All findings of a flown track, rule by rule, in the verdict's order.
+
+
+def flown_findings(
+    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
+) -> tuple[Finding, ...]:
+    """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
+    findings = (
+        *unflyable_items(demands.setup),
+        *turn_findings(demands, aligned),
+        *slope_findings(demands, aligned),
+        *clearance_findings(demands, aligned),
+        *height_findings(demands, aligned),
+        *fence_findings(demands, aligned),
+        *threat_findings(demands, aligned),
+        *bounds_findings(demands, aligned),
+        *waypoint_findings(demands, aligned),
+        *corridor_findings(demands, aligned),
+        *speed_findings(demands, aligned),
+        *(stall_findings(demands, aligned) if envelope else ()),
+        *takeoff_landing_findings(demands),
+        *energy_findings(demands, aligned),
+        *departure_findings(demands, aligned),
+        *completion_findings(demands, aligned, ended, whole),
+    )
+    return fold_loiters(demands, aligned, findings)

@@ -4,12 +4,12 @@ import math
 from collections.abc import Sequence
 from pathlib import Path
 
-from flight.ardupilot.parameters import NOT_FLOWN
-from flight.simulation.autopilot_program import AutopilotProgram
-from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import RULES, Finding
-from logs.verdict.levels import DecidingParameter, LevelAnswer
-from logs.verdict.wording import deciding_text, disagreement_text, place_text, shortened
+from flight.autopilots.arduplane.parameters import NOT_FLOWN
+from flight.simulation.setup import AutopilotProgram, FlightSetup
+from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.places import DecidingParameter, LevelAnswer
+from logs.verdict.wording import deciding_text, disagreement_text, place_text, shortened, suggestions_text
+from world.html_table import html_table
 
 # Failed findings that the first line names.
 _NAMED = 4
@@ -272,3 +272,33 @@ def _agreement(other: LevelAnswer) -> str:
         return "flight and geometry agree on every finding" if other.name == "geometry" else "both flights agree"
     more = f", +{len(differing) - _NAMED} more" if len(differing) > _NAMED else ""
     return "; ".join(map(disagreement_text, differing[:_NAMED])) + more
+
+
+# ----------------------------------------------------------------------
+# The verdict as a small table for a notebook.
+
+
+def verdict_html(verdict: Verdict) -> str:
+    """The headline, a row for each rule, and one for each finding that fails, with what would pass.
+
+    >>> verdict_html(Verdict((), flyable=True, complete=True, lines=("flyable",), level="flown"))
+    '<div><strong>flyable</strong><table>...<tbody></tbody></table></div>'
+    """
+    rows: list[tuple[str, ...]] = []
+    for rule, title in RULES.items():
+        mine = [finding for finding in verdict.findings if finding.rule == rule]
+        if mine:
+            rows.append((title, _count(mine), "", ""))
+            rows += [
+                ("", place_text(one.place), one.reason, suggestions_text(one.suggestions))
+                for one in mine
+                if one.ok is False
+            ]
+    return html_table(verdict.headline, rows, ("rule", "result", "reason", "would pass"))
+
+
+def _count(findings: list[Finding]) -> str:
+    judged = [finding for finding in findings if finding.ok is not None]
+    if not judged:
+        return "not judged"
+    return f"{sum(finding.ok is True for finding in judged)} of {len(judged)} ok"

@@ -20,7 +20,7 @@ RADIUS_TOLERANCE = 0.02
 ON_THE_SPOT = 0.5
 # rad.  A turn sharper than this has no useful tangent length; a U-turn's is infinite.  Between
 # legs that are too short guidance leaves out the arc of a turn beyond a smaller limit of its own, SHARPEST in
-# flight/guidance/fly_by_path.py, which the turn rule takes from there.
+# flight/guidance/path.py, which the turn rule takes from there.
 U_TURN = math.pi - 1e-6
 # Radii.  Largest fly-by offset that is taken of a turn, which is one of about 176 degrees.
 LARGEST_OFFSET = 30.0

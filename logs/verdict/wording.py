@@ -2,8 +2,7 @@
 
 import math
 
-from logs.verdict.levels import DecidingParameter
-from logs.verdict.places import Change, Disagreement, Place, Suggestion
+from logs.verdict.places import Change, DecidingParameter, Disagreement, Place, Suggestion
 from logs.verdict.tolerances import ON_THE_SPOT
 from world.threats import threat_label
 

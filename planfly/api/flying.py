@@ -1,27 +1,109 @@
 """Fly a mission, and judge one, or a flight."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from flight.real_autopilot.autopilot_process import check_binary
-from logs.recording.reader import FlightLog, read_log
+from flight.autopilots.arduplane_sitl.process import check_binary
+from flight.mission.items import Mission
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from planfly.api.changed_scenario import Wind, changed_scenario
-from planfly.api.results import FlownMission
-from planfly.first_start.announcing import announcing
-from planfly.flight_limits import MOST_HOURS, MOST_MEGABYTES, FlightLimits
+from planfly.api.planning import Wind, changed_scenario
+from planfly.crash_safe_log import MOST_HOURS, MOST_MEGABYTES, FlightLimits
+from planfly.first_start import announcing
 from planfly.kernel_units.unit_kernels import FLYING
-from planfly.named_fences import NamedFences, read_named_fences
-from planfly.open_mission import OpenedMission, ScenarioChange, is_log, open_mission, open_planned
+from planfly.open_mission import (
+    NamedFences,
+    OpenedMission,
+    ScenarioChange,
+    is_log,
+    open_mission,
+    open_planned,
+    read_named_fences,
+)
 from planfly.pipeline import fly_and_judge
-from planfly.terminal.stored_logs import judge_log
+from planfly.terminal.results import judge_log
 from planner.plan import Plan
 from world.errors import ScenarioError
-from world.scenario_types import Guidance, Navigation
-from world.scenario_variants import over_terrain
+from world.html_table import html_table
+from world.scenario import over_terrain
+from world.scenario_tables import Guidance, Navigation
+
+# ----------------------------------------------------------------------
+# What the verbs give: frozen data, short to print, a table in a notebook.
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class FlownMission:
+    """What `planfly.fly` returns.
+
+    setup: everything that decided the flight.
+    track: its rows; none of a flight that could not begin.
+    verdict: whether it flies, with a finding for every rule and place.
+    ended: how it ended, "completed" or the reason why not.
+    events: what the log holds beside the rows.
+    log: the file that it is recorded in; None where none was asked for, or nothing flown.
+    """
+
+    setup: FlightSetup
+    track: Track
+    verdict: Verdict
+    ended: str
+    events: tuple[LogEvent, ...] = ()
+    log: Path | None = None
+
+    @property
+    def mission(self) -> Mission:
+        """Its items, as read or made of a plan."""
+        return self.setup.mission
+
+    @property
+    def plan(self) -> Plan | None:
+        """The plan that it is of; None for a mission that a person brought."""
+        return self.setup.plan
+
+    @property
+    def flyable(self) -> bool:
+        """The verdict's answer."""
+        return self.verdict.flyable
+
+    def __repr__(self) -> str:
+        return f"<FlownMission {self.setup.scenario.name}: {self.ended}; {self.track!r}, {self.verdict!r}>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return self.verdict._repr_html_() + self.track._repr_html_()
+
+
+@dataclass(frozen=True, slots=True)
+class WrittenReport:
+    """What `planfly.report` and `planfly.compare` wrote.
+
+    page: the HTML page, which needs no other file.  files: it and the pictures beside it.
+    """
+
+    page: Path
+    files: tuple[Path, ...]
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return html_table(f"Report {self.page}", [(file.name,) for file in self.files])
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFiles:
+    """What `planfly.export` wrote.
+
+    files: in the order asked for.  notes: what of the source they do not hold, a line each.
+    """
+
+    files: tuple[Path, ...]
+    notes: tuple[str, ...] = ()
+
 
 FencePaths = str | Path | Sequence[str | Path]
 

@@ -6,19 +6,25 @@ import io
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.report.compare import Comparison, compare_logs
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
-from planfly.api.results import ExportedFiles, FlownMission, WrittenReport
+from planfly.api.flying import ExportedFiles, FlownMission, WrittenReport
 from planfly.open_mission import open_planned
-from planfly.terminal.stored_logs import judge_log
-from planfly.terminal.targets import COMPARE_FILES, LOG_FIGURES, prepare_folder, refuse_existing, refuse_folder
+from planfly.terminal.results import (
+    COMPARE_FILES,
+    LOG_FIGURES,
+    judge_log,
+    prepare_folder,
+    refuse_existing,
+    refuse_folder,
+)
 from planner.plan import Plan, plan_json
-from world.atomic_files import temporary_folder, write_whole
 from world.errors import PlanflyError
+from world.files import temporary_folder, write_whole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -101,7 +107,7 @@ def compare(first: FlightLog | str | Path, second: FlightLog | str | Path, out: 
     logs = [log if isinstance(log, FlightLog) else read_log(log) for log in (first, second)]
     found = compare_logs(*logs, names=(Path(logs[0].source).name, Path(logs[1].source).name))
     if out is not None:
-        from logs.report.compare_page import write_comparison
+        from logs.report.compare import write_comparison
 
         write_comparison(_prepared(out, COMPARE_FILES, overwrite), found, svg=svg)
     return found

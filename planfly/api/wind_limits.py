@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.own_process import in_own_process
+from planfly.campaigns.campaign_result import winds_line
+from planfly.campaigns.engine.workers import Workers, in_own_process
 from planfly.campaigns.find_winds import (
     ASKED,
-    USUAL_FLIGHTS,
+    USUAL_WIND_FLIGHTS,
     WindsFound,
     WindsGoal,
     asked_flights,
@@ -14,11 +14,9 @@ from planfly.campaigns.find_winds import (
     open_winds_store,
 )
 from planfly.campaigns.flights.campaign_base import open_campaign
-from planfly.campaigns.repeated_line import winds_line
-from planfly.campaigns.report.campaign_files import campaign_folder
-from planfly.campaigns.report.wind_files import write_winds
+from planfly.campaigns.report.files import campaign_folder, write_winds
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
-from planfly.campaigns.storage.winds_store import WINDS_DATABASE
+from planfly.campaigns.storage.stores import WINDS_DATABASE
 
 
 def winds(
@@ -56,7 +54,7 @@ def winds(
     """
     for name, value, low, high in (
         ("prove", prove, 0.5, 0.9999999), ("confidence", confidence, 0.5, 0.9999999), ("directions", directions, 4, 72),
-        ("most", most, 1.0, 40.0), ("flights", USUAL_FLIGHTS if flights is None else flights, 1, 10_000_000),
+        ("most", most, 1.0, 40.0), ("flights", USUAL_WIND_FLIGHTS if flights is None else flights, 1, 10_000_000),
     ):  # fmt: skip
         if not low <= value <= high:
             raise ValueError(f"{name}: {value:g}: {low:g} to {high:g} is expected")

@@ -5,19 +5,18 @@ import signal
 import sys
 from pathlib import Path
 
-from planfly.campaigns.campaign_result import make_goal
-from planfly.campaigns.engine.own_process import in_own_process
+from planfly.campaigns.campaign_result import OPTIONS, make_goal
+from planfly.campaigns.engine.workers import in_own_process
 from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
 from planfly.campaigns.fly_campaign import resumed_goal
-from planfly.campaigns.repeated_line import OPTIONS
-from planfly.campaigns.report.campaign_files import AskedFolder
+from planfly.campaigns.report.files import AskedFolder
 from planfly.campaigns.spread.spread_file import FlightSpread, default_spread, read_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.named_fences import read_named_fences
+from planfly.open_mission import read_named_fences
 from planfly.pipeline import Advance
-from planfly.terminal.progress import progress
-from planfly.terminal.scenario_options import scenario_change
-from planfly.terminal.targets import RESULTS
+from planfly.terminal.options import scenario_change
+from planfly.terminal.output import progress
+from planfly.terminal.results import RESULTS
 from world.errors import PlanflyError
 from world.interruption import Interrupted
 

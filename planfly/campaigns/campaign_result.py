@@ -1,5 +1,6 @@
 """Campaigns for Python: fly one, and read what came of it."""
 
+import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,20 +9,66 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.own_process import in_own_process
+from planfly.campaigns.engine.workers import Workers, in_own_process
+from planfly.campaigns.find_winds import USUAL_WIND_FLIGHTS, WindsGoal
 from planfly.campaigns.flights.campaign_base import open_campaign
 from planfly.campaigns.fly_campaign import fly_campaign, open_store, resumed_goal
-from planfly.campaigns.repeated_line import campaign_line
-from planfly.campaigns.report.campaign_files import campaign_folder
-from planfly.campaigns.report.finish_campaign import finish_campaign
+from planfly.campaigns.report.files import campaign_folder, finish_campaign
 from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, summarise
 from planfly.campaigns.spread.spread_file import default_spread, read_spread
-from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Answer, Goal
-from planfly.campaigns.statistics.proportions import Interval
-from planfly.campaigns.storage.read_table import read_shapes, read_table
-from planfly.campaigns.storage.store import DATABASE
-from world.notebooks.html_table import html_table
+from planfly.campaigns.statistics.decision import USUAL_CONFIDENCE, Answer, Goal, Interval
+from planfly.campaigns.storage.stores import DATABASE, read_shapes, read_table
+from world.html_table import html_table
+
+# ----------------------------------------------------------------------
+# The command line that repeats a campaign or a search for winds, for its page.
+
+# Options that decide what is flown, beside the goal's; of the command line's usual values nothing is said.
+OPTIONS = (
+    *("seed", "spread", "scenario", "terrain", "fence", "aircraft", "airspeed", "wind", "turbulence"),
+    *("params", "guidance", "nav"),
+)
+_USUAL = {"confidence": 0.95, "directions": 16, "most": 20.0}
+
+
+def campaign_line(target: str, goal: Goal, options: Mapping[str, object]) -> str:
+    """``planfly campaign`` with the goal and with options by name, of which those that are None or empty are not given.
+
+    >>> campaign_line("my plan.json", Goal(0.99, True, 5000), {"seed": 3, "wind": (8.0, 270.0), "fence": ["a", "b"]})
+    "planfly campaign 'my plan.json' --prove 0.99 --flights 5000 --seed 3 --wind 8,270 --fence a --fence b"
+    """
+    target_option = {"prove" if goal.stops else "at_least": goal.target}
+    return _line(
+        "campaign", target, {**target_option, "flights": goal.flights, "confidence": goal.confidence, **options}
+    )
+
+
+def winds_line(target: str, goal: WindsGoal, options: Mapping[str, object]) -> str:
+    """``planfly winds``, as `campaign_line`.
+
+    >>> winds_line("jacksboro", WindsGoal(0.9, 0.95, 8, 20.0, 5000), {"seed": 1})
+    'planfly winds jacksboro --prove 0.9 --directions 8 --seed 1'
+    """
+    flights = None if goal.flights == USUAL_WIND_FLIGHTS else goal.flights
+    asked = {"prove": goal.target, "directions": goal.directions, "most": goal.most, "flights": flights}
+    return _line("winds", target, {**asked, "confidence": goal.confidence, **options})
+
+
+def _line(command: str, target: str, options: Mapping[str, object]) -> str:
+    words = ["planfly", command, shlex.quote(target)]
+    for name, value in options.items():
+        if value is None or value == _USUAL.get(name):
+            continue
+        for one in value if isinstance(value, list) else [value]:
+            words += [f"--{name.replace('_', '-')}", shlex.quote(_text(one))]
+    return " ".join(words)
+
+
+def _text(value: object) -> str:
+    if isinstance(value, tuple):
+        return ",".join(_text(one) for one in value)
+    return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
+
 
 # Flights of a campaign that says no number, and the most of one that stops by itself.
 USUAL_FLIGHTS, MOST_FLIGHTS = 300, 5000

@@ -8,19 +8,15 @@ from functools import partial
 from pathlib import Path
 
 from logs.verdict.places import Place
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.fingerprint import code_hash
-from planfly.campaigns.engine.flight_loop import Order, Pilots, hired_pilots
-from planfly.campaigns.engine.flight_rate import FlightRate
-from planfly.campaigns.engine.flight_tasks import FlyOne
-from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.engine.flight_loop import FlightRate, FlyOne, Order, Pilots, code_hash, hired_pilots
+from planfly.campaigns.engine.workers import Workers
+from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
-from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.draws import standard_draws, standard_population
 from planfly.campaigns.statistics.flight_choice import next_flights
 from planfly.campaigns.statistics.wind_boundary import Direction, DrawnNumbers, WindBoundary, needs_more
-from planfly.campaigns.storage.held_table import StoreError, kept_settings
-from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, FlownFlight, WindsStore
+from planfly.campaigns.storage.stores import WINDS_DATABASE, AskedFlight, FlownFlight, WindsStore
+from planfly.campaigns.storage.table import StoreError, kept_settings
 
 # Half of the interval's width that is flown for, m/s, and the fewest flights of a direction: where none of so many
 # fails, one in fifty does at most (95 %); and with fewer a fit is surer of itself than it may be.
@@ -50,7 +46,7 @@ class WindsGoal:
 
 
 # Flights of a search that says no number.
-USUAL_FLIGHTS = 5000
+USUAL_WIND_FLIGHTS = 5000
 
 
 def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
@@ -59,7 +55,7 @@ def asked_flights(asked: int | None, folder: Path, *, resume: bool) -> int:
     Raises StoreError for a file that is none of ours or is held.
     """
     kept = kept_settings(folder / WINDS_DATABASE) if resume else {}
-    return int(kept.get("flights", USUAL_FLIGHTS)) if asked is None else asked
+    return int(kept.get("flights", USUAL_WIND_FLIGHTS)) if asked is None else asked
 
 
 @dataclass(frozen=True, repr=False)

@@ -4,17 +4,13 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.fingerprint import code_hash
-from planfly.campaigns.engine.flight_loop import Order, Pilots, hired_pilots
-from planfly.campaigns.engine.flight_rate import FlightRate
-from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.engine.flight_loop import FlightRate, FlyOne, Order, Pilots, code_hash, hired_pilots
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one
-from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
-from planfly.campaigns.statistics.proportions import Tally
-from planfly.campaigns.storage.held_table import StoreError, kept_settings
-from planfly.campaigns.storage.store import DATABASE, Store
+from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally
+from planfly.campaigns.storage.stores import DATABASE, Store
+from planfly.campaigns.storage.table import StoreError, kept_settings
 
 Advance = Callable[[float, float, str], None]
 

@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING
 
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.progress import progress
-from planfly.terminal.results import print_warnings
-from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
-from world.atomic_files import write_whole
+from planfly.terminal.output import progress
+from planfly.terminal.results import RESULTS, prepare_folder, print_warnings, refuse_folder
 from world.errors import PlanflyError
+from world.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     from aircraft.catalog import Aircraft
     from aircraft.envelope import Envelope
     from flight.dynamics.characteristics import Mode, TrimRow
-    from planfly.terminal.answers.aircraft_answer import AircraftNumbers
+    from planfly.terminal.answers.answer_data import AircraftNumbers
 
 _BANKS_DEG = (15.0, 20.0, 30.0, 40.0)
 _TURNS_DEG = (30.0, 45.0, 60.0, 90.0, 120.0)
@@ -70,7 +69,7 @@ def aircraft_answer(
 ) -> object:
     """Return what --json writes: of one aircraft with its numbers, or of several without."""
     # Imported here: schemas take pydantic.
-    from planfly.terminal.answers.aircraft_answer import AircraftAnswer, aircraft_detail, aircraft_entry
+    from planfly.terminal.answers.answer_data import AircraftAnswer, aircraft_detail, aircraft_entry
 
     detail = None if numbers is None else aircraft_detail(numbers, identity, lacking, files)
     return AircraftAnswer(exit_code=FLYABLE, aircraft=[aircraft_entry(one, detail) for one in chosen])
@@ -79,8 +78,8 @@ def aircraft_answer(
 def _find(name: str) -> "tuple[Aircraft, str]":
     """The aircraft of a name or in a folder, and the hash of its model.  Raises PlanflyError."""
     from aircraft.catalog import find_aircraft, model_hash
+    from world.files import whole_path
     from world.scenario_tables import names_folder
-    from world.text_files import whole_path
 
     if names_folder(name) and not Path(name).exists():
         message = f"{name}: no such folder; planfly aircraft --new {shlex.quote(name)} makes it"
@@ -90,7 +89,7 @@ def _find(name: str) -> "tuple[Aircraft, str]":
 
 
 def _make_folder(args: argparse.Namespace) -> int:
-    from aircraft.own_folder import make_own_folder
+    from aircraft.catalog import make_own_folder
 
     if args.name is not None:
         message = f"{args.name}: --new takes the folder alone; --from names the aircraft to begin with"
@@ -107,9 +106,9 @@ def _make_folder(args: argparse.Namespace) -> int:
 
 def _check_steering(chosen: "Aircraft") -> list[str]:
     """What lacks for a flight; raises PlanflyError for gains, parameters or servos that are there and broken."""
-    from flight.ardupilot.parameters import load_parameters
+    from flight.autopilots.arduplane.parameters import load_parameters
+    from flight.autopilots.arduplane_sitl.physics import SERVO_FILE, load_servo_map
     from flight.guidance.gains import GAINS_FILE, load_gains
-    from flight.real_autopilot.servo_map import SERVO_FILE, load_servo_map
 
     load_parameters(chosen)
     lacking = []
@@ -127,7 +126,7 @@ def _check_steering(chosen: "Aircraft") -> list[str]:
 def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":
     from flight.dynamics.characteristics import modes_at, step_responses, trim_table
     from flight.dynamics.envelope_tables import load_envelope
-    from planfly.terminal.answers.aircraft_answer import AircraftNumbers
+    from planfly.terminal.answers.answer_data import AircraftNumbers
 
     with progress(f"trimming {chosen.name}"):
         envelope = load_envelope(chosen, motor_braking=motor_braking)
@@ -139,7 +138,7 @@ def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":
 def _print_and_draw(chosen: "Aircraft", identity: str, numbers: "AircraftNumbers") -> dict[str, bytes]:
     from flight.dynamics.characteristics import TRIM_AMSL
     from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
-    from logs.figures.elements.style import png_bytes
+    from logs.figures.style import png_bytes
 
     envelope, trims, modes, cruise, steps = numbers
     print(f"{chosen.name}: {chosen.title}")

@@ -12,18 +12,17 @@ from planfly.campaigns.asked_campaign import (
     repeated_options,
     tell_interrupted,
 )
-from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.campaign_result import campaign_line
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
-from planfly.campaigns.repeated_line import campaign_line
-from planfly.campaigns.report.campaign_files import fly_row_again
-from planfly.campaigns.report.finish_campaign import finish_campaign
+from planfly.campaigns.report.files import finish_campaign, fly_row_again
 from planfly.campaigns.report.summary import campaign_lines
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.store import DATABASE
+from planfly.campaigns.storage.stores import DATABASE
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.progress import progress
+from planfly.terminal.output import progress
 from world.errors import PlanflyError
 
 _EXITS = {"reached": FLYABLE, "missed": NOT_FLYABLE, "undecided": LOSS, "none asked": FLYABLE}

@@ -4,19 +4,17 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
-from logs.field_logs.readers.open_log import is_field_log
+from logs.importers.open_log import is_field_log
 from logs.recording.reader import FlightLog, read_log
 from logs.verdict.findings import verdict_json
 from logs.verdict.judge_flight import judge_geometry
-from planfly.named_fences import NamedFences, read_named_fences
-from planfly.open_mission import is_log, open_mission
+from planfly.open_mission import NamedFences, is_log, open_mission, read_named_fences
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.results import print_verdict, print_warnings
-from planfly.terminal.scenario_options import scenario_change
-from planfly.terminal.stored_logs import judge_log, warn_of_loss
+from planfly.terminal.options import scenario_change
+from planfly.terminal.results import judge_log, print_verdict, print_warnings, warn_of_loss
 from world.errors import ScenarioError
-from world.scenario_variants import over_terrain
+from world.scenario import over_terrain
 
 
 def check(args: argparse.Namespace) -> int:
@@ -44,8 +42,8 @@ def check(args: argparse.Namespace) -> int:
 
 def _check_field_log(source: Path, args: argparse.Namespace) -> int:
     # Imported here: no other check needs the libraries that read logs of the field.
-    from planfly.commands.field_logs.field_options import field_options
-    from planfly.field.field_flights import import_flight
+    from planfly.commands.imported_logs import field_options
+    from planfly.imported_flights import import_flight
 
     flight = import_flight(source, field_options(args), scenario_change(args))
     give_answer(args, lambda: verdict_json(flight.verdict))

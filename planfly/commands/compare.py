@@ -8,9 +8,8 @@ from logs.recording.reader import read_log
 from logs.report.compare import Comparison, compare_logs, difference_lines
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.progress import progress
-from planfly.terminal.stored_logs import warn_of_loss
-from planfly.terminal.targets import COMPARE_FILES, prepare_folder, refuse_folder
+from planfly.terminal.output import progress
+from planfly.terminal.results import COMPARE_FILES, prepare_folder, refuse_folder, warn_of_loss
 
 
 def compare(args: argparse.Namespace) -> int:
@@ -51,7 +50,7 @@ def _answer(comparison: Comparison, files: list[Path], code: int) -> object:
 
 def _draw(comparison: Comparison, folder: Path, args: argparse.Namespace) -> list[Path]:
     # matplotlib loads for pictures alone.
-    from logs.report.compare_page import write_comparison
+    from logs.report.compare import write_comparison
 
     refuse_folder(folder, args.overwrite)
     prepare_folder(folder, COMPARE_FILES)

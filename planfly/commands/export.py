@@ -4,22 +4,17 @@ import argparse
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from flight.mission.fences import numbered
+from flight.mission.fences import numbered, zone_fences
 from flight.mission.items import Mission
-from flight.mission.zone_fences import zone_fences
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
+from logs.exports.map_files import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
 from logs.recording.reader import FlightLog, read_log
-from logs.replay.kml_gpx import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
-from planfly.fence_of_plan import fence_of_plan
-from planfly.named_fences import NamedFences, read_named_fences
-from planfly.open_mission import is_log, open_mission
+from planfly.open_mission import NamedFences, fence_of_plan, is_log, open_mission, read_named_fences
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.results import print_warnings
-from planfly.terminal.stored_logs import warn_of_loss
-from planfly.terminal.targets import refuse_existing
-from world.atomic_files import write_whole
+from planfly.terminal.results import print_warnings, refuse_existing, warn_of_loss
 from world.errors import MissionError
+from world.files import write_whole
 from world.scenario import Scenario
 
 MAPS = {".kml": kml_text, ".gpx": gpx_text}
@@ -111,14 +106,14 @@ def _flown(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
-        from logs.exports.telemetry_file import telemetry_bytes
+        from logs.exports.log_files import telemetry_bytes
 
         return telemetry_bytes(log), content
     if suffix == ".ulg":
-        from logs.exports.px4_file import px4_log_bytes
+        from logs.exports.log_files import px4_log_bytes
 
         return px4_log_bytes(log), content
-    from logs.exports.flight_table import csv_text, parquet_bytes
+    from logs.exports.log_files import csv_text, parquet_bytes
 
     return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), content
 

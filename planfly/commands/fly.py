@@ -4,18 +4,15 @@ import argparse
 import shlex
 from pathlib import Path
 
-from planfly.flight_limits import flight_text
-from planfly.named_fences import read_named_fences
-from planfly.open_mission import OpenedMission, open_mission
+from planfly.crash_safe_log import flight_text
+from planfly.open_mission import OpenedMission, open_mission, read_named_fences
 from planfly.pipeline import JudgedFlight, autopilot_log, fly_and_judge
 from planfly.terminal.answers.giving import give_answer
-from planfly.terminal.autopilot_option import autopilot_program
-from planfly.terminal.colour import coloured
+from planfly.terminal.command_parser import coloured
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.progress import progress
-from planfly.terminal.results import print_verdict, print_warnings
-from planfly.terminal.scenario_options import flight_limits, scenario_change
-from planfly.terminal.targets import default_folder, named_or_default, refuse_existing
+from planfly.terminal.options import autopilot_program, flight_limits, scenario_change
+from planfly.terminal.output import progress
+from planfly.terminal.results import default_folder, named_or_default, print_verdict, print_warnings, refuse_existing
 
 
 def fly(args: argparse.Namespace) -> int:
@@ -56,8 +53,7 @@ def fly(args: argparse.Namespace) -> int:
 def _answer(
     args: argparse.Namespace, opened: OpenedMission, flown: JudgedFlight, log: Path, own: Path | None, code: int
 ) -> object:
-    from planfly.terminal.answers.answer_data import FlyAnswer
-    from planfly.terminal.answers.verdict_document import verdict_document
+    from planfly.terminal.answers.answer_data import FlyAnswer, verdict_document
 
     return FlyAnswer(
         exit_code=code,

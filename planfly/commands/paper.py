@@ -4,13 +4,12 @@ import argparse
 from dataclasses import asdict
 from pathlib import Path
 
-from planfly.paper.files import file_names, table_text, write_figures, write_tables
-from planfly.paper.seeded_plans import PROBLEMS, plan_section, table
+from planfly.paper import PROBLEMS, file_names, plan_section, table, table_text, write_figures, write_tables
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.progress import progress
-from planfly.terminal.targets import RESULTS, prepare_folder, refuse_folder
-from world.atomic_files import hold
+from planfly.terminal.output import progress
+from planfly.terminal.results import RESULTS, prepare_folder, refuse_folder
+from world.files import hold
 
 
 def paper(args: argparse.Namespace) -> int:

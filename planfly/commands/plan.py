@@ -13,19 +13,18 @@ from aircraft.path_limits import Limits
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.progress import progress
-from planfly.terminal.scenario_options import scenario_change
-from planfly.terminal.targets import default_folder, named_or_default
+from planfly.terminal.options import scenario_change
+from planfly.terminal.output import progress
+from planfly.terminal.results import default_folder, named_or_default
 from planner.plan import Objective, Plan, plan_json, read_plan
 from planner.search.explain_failure import what_blocks
 from planner.search.plan_path import plan_path
 from planner.search.replan import replan, same_mission
 from planner.search.search_state import SearchProgress, StopCondition
-from world.atomic_files import write_whole
 from world.errors import ScenarioError
+from world.files import write_whole
 from world.interruption import interrupt
-from world.scenario import Scenario, load_scenario
-from world.scenario_variants import with_planner, with_threats
+from world.scenario import Scenario, load_scenario, with_planner, with_threats
 
 
 def plan(args: argparse.Namespace) -> int:

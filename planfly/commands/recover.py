@@ -7,10 +7,9 @@ from logs.recording.reader import FlightLog
 from logs.recording.recover import recover_log
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.stored_logs import warn_of_loss
-from planfly.terminal.targets import refuse_existing
-from world.atomic_files import write_whole
+from planfly.terminal.results import refuse_existing, warn_of_loss
 from world.errors import PlanflyError
+from world.files import write_whole
 
 
 def recover(args: argparse.Namespace) -> int:

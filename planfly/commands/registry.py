@@ -27,12 +27,13 @@ COMMAND_NAMES = (
     "help",
     "completion",
 )
-# Commands in rooms of their own, or whose name is a word of Python's: their modules, and functions of their last name.
-_MODULES = {
-    "import": "field_logs.import_log",
-    "refly": "field_logs.refly",
-    "help": "shell.show_help",
-    "completion": "shell.completion",
+# Commands that share a module, or whose name is a keyword of Python: the module in this package, and the function.
+_FUNCTIONS = {
+    "import": ("imported_logs", "import_log"),
+    "refly": ("imported_logs", "refly"),
+    "help": ("shell", "show_help"),
+    "completion": ("shell", "completion"),
+    "scenarios": ("shell", "scenarios"),
 }
 
 
@@ -43,10 +44,10 @@ def find_command(name: str) -> CommandFunction:
     one of `COMMAND_NAMES`.
 
     >>> find_command("scenarios").__module__
-    'planfly.commands.scenarios'
+    'planfly.commands.shell'
     """
     if name not in COMMAND_NAMES:
         raise KeyError(name)
-    module = _MODULES.get(name, name)
-    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), module.rpartition(".")[2])
+    module, function = _FUNCTIONS.get(name, (name, name))
+    command: CommandFunction = getattr(import_module(f"planfly.commands.{module}"), function)
     return command

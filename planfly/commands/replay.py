@@ -10,7 +10,7 @@ from pathlib import Path
 from logs.recording.reader import FlightLog, read_log
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
-from planfly.terminal.stored_logs import warn_of_loss
+from planfly.terminal.results import warn_of_loss
 from world.errors import LogError, PlanflyError
 
 # Numbers that may be meant as ports that ground stations listen at.
@@ -29,18 +29,18 @@ def replay(args: argparse.Namespace) -> int:
     log = read_log(Path(args.log))
     # Each target loads what it alone needs.
     if isinstance(args.to, str):
-        from planfly.commands.replay_to.ground_stations import play
+        from planfly.replays.live import play
 
         play(log, args)
     else:
         start, end = _part(log, args)
         if args.movie:
-            from planfly.commands.replay_to.movie import write_movie
+            from planfly.replays.movie import write_movie
 
             for file in write_movie(log, args, start, end)[:3]:
                 print(f"movie     {file}")
         elif args.foxglove:
-            from planfly.commands.replay_to.foxglove_server import serve_log
+            from planfly.replays.live import serve_log
 
             serve_log(args, start, end)
         elif sys.stdout.isatty() and not (args.at_once or args.quiet or args.json):
@@ -83,7 +83,7 @@ def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
 
 def _print_timeline(log: FlightLog, start: float, end: float, speed: float | None) -> None:
     """Print the timeline, at ``speed`` times real time or at once."""
-    from flight.live.running_clock import RunningClock
+    from flight.live.link import RunningClock
     from logs.replay.timeline import entry_lines, timeline
 
     played = RunningClock()
@@ -96,7 +96,7 @@ def _print_timeline(log: FlightLog, start: float, end: float, speed: float | Non
 
 def _show_instruments(log: FlightLog, start: float, end: float, speed: float) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
-    from flight.live.running_clock import RunningClock
+    from flight.live.link import RunningClock
     from logs.replay.instruments import make_instruments
 
     instruments = make_instruments(log)

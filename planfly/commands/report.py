@@ -4,17 +4,23 @@ import argparse
 import sys
 from pathlib import Path
 
-from logs.recording.foxglove_layout import layout_text
+from logs.recording.foxglove_scene import layout_text
 from logs.recording.reader import read_log
 from logs.verdict.findings import Verdict
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import BAD_INPUT, FLYABLE, LOSS, NOT_FLYABLE
-from planfly.terminal.progress import progress
-from planfly.terminal.results import write_pictures
-from planfly.terminal.stored_logs import judge_log, warn_of_loss
-from planfly.terminal.targets import LOG_FIGURES, prepare_folder, refuse_existing, refuse_folder
-from world.atomic_files import write_whole
+from planfly.terminal.output import progress
+from planfly.terminal.results import (
+    LOG_FIGURES,
+    judge_log,
+    prepare_folder,
+    refuse_existing,
+    refuse_folder,
+    warn_of_loss,
+    write_pictures,
+)
 from world.errors import PlanflyError
+from world.files import write_whole
 
 
 def report(args: argparse.Namespace) -> int:
@@ -47,8 +53,7 @@ def report(args: argparse.Namespace) -> int:
 
 
 def _answer(files: list[Path], verdict: Verdict | None, code: int) -> object:
-    from planfly.terminal.answers.answer_data import ReportAnswer
-    from planfly.terminal.answers.verdict_document import verdict_document
+    from planfly.terminal.answers.answer_data import ReportAnswer, verdict_document
 
     document = None if verdict is None else verdict_document(verdict)
     return ReportAnswer(exit_code=code, files=[str(file) for file in files], verdict=document)

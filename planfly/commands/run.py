@@ -12,18 +12,25 @@ from flight.mission.from_plan import plan_mission
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_plan_only
 from planfly.airframe import Airframe, choose_seed, load_airframe, tightened_airframe
-from planfly.flight_limits import FlightLimits, flight_text
+from planfly.crash_safe_log import FlightLimits, flight_text
 from planfly.pipeline import fly_and_judge, make_plan, make_setup
 from planfly.refine import refine
 from planfly.terminal.answers.giving import give_answer
-from planfly.terminal.autopilot_option import autopilot_program
 from planfly.terminal.exit_codes import FLYABLE, NOT_FLYABLE
-from planfly.terminal.progress import progress
-from planfly.terminal.results import print_verdict, write_missions, write_pictures, write_verdict
-from planfly.terminal.scenario_options import flight_limits, scenario_change
-from planfly.terminal.targets import RUN_FILES, default_folder, prepare_folder, refuse_folder
+from planfly.terminal.options import autopilot_program, flight_limits, scenario_change
+from planfly.terminal.output import progress
+from planfly.terminal.results import (
+    RUN_FILES,
+    default_folder,
+    prepare_folder,
+    print_verdict,
+    refuse_folder,
+    write_missions,
+    write_pictures,
+    write_verdict,
+)
 from planner.plan import Plan, plan_json
-from world.atomic_files import hold, write_whole
+from world.files import hold, write_whole
 from world.scenario import Scenario, load_scenario
 
 # Options that decide what is planned and flown, as the line that repeats it has them.
@@ -97,8 +104,7 @@ def _rounds(args: argparse.Namespace, task: _Task, held: contextlib.ExitStack) -
 
 
 def _answer(task: _Task, verdict: Verdict, rounds: list[dict[str, Any]], code: int) -> object:
-    from planfly.terminal.answers.answer_data import RoundAnswer, RunAnswer
-    from planfly.terminal.answers.verdict_document import verdict_document
+    from planfly.terminal.answers.answer_data import RoundAnswer, RunAnswer, verdict_document
 
     told = [RoundAnswer(round=one["round"], changes=one["changes"], summary=one["summary"]) for one in rounds]
     return RunAnswer(

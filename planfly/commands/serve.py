@@ -10,14 +10,13 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from flight.live.link import SYSTEM, Link
-from flight.live.parameters import vehicle_parameters
-from flight.live.snapshot import Snapshot
+from flight.live.station_requests import vehicle_parameters
+from flight.live.telemetry import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
-from planfly.named_fences import read_named_fences
+from planfly.open_mission import read_named_fences
 from planfly.served_flights import ServeOptions, fly_process, open_served
-from planfly.terminal.link_options import link_access, stop_signals
-from planfly.terminal.scenario_options import flight_entries
+from planfly.terminal.options import flight_entries, link_access, stop_signals
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import deaf_children, end_children

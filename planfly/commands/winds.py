@@ -10,14 +10,14 @@ from planfly.campaigns.asked_campaign import (
     repeated_options,
     tell_interrupted,
 )
-from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.campaign_result import winds_line
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import ASKED, WindsGoal, asked_flights, find_winds, open_winds_store
-from planfly.campaigns.repeated_line import winds_line
-from planfly.campaigns.report.wind_files import wind_lines, write_winds
-from planfly.campaigns.storage.winds_store import WINDS_DATABASE
+from planfly.campaigns.report.files import wind_lines, write_winds
+from planfly.campaigns.storage.stores import WINDS_DATABASE
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE
-from planfly.terminal.progress import progress
+from planfly.terminal.output import progress
 
 
 def winds(args: argparse.Namespace) -> int:

@@ -1,11 +1,86 @@
 """A unit done, and told meanwhile which of its kernels are ready."""
 
+import functools
+import os
+import tomllib
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 
+from flight.mission_files.formats import parse_mission
+from logs.recording.recorder import Recorder
+from planfly.airframe import Airframe, load_airframe
 from planfly.kernel_units.unit_kernels import UNIT_KERNELS
-from planfly.kernel_units.units import UNITS
-from world.compilation.announcement import tell_before_compiling
+from planfly.pipeline import fly_and_judge, make_setup
+from planner.search.kernel_calls import PARTS, call_kernels
+from world.compile_events import tell_before_compiling
+from world.scenario import Scenario, from_spec
+
+# ----------------------------------------------------------------------
+# Units of small work: each calls kernels that the others do not call, with the types that all commands use.
+
+FIELD = """
+name = "field"
+[terrain]
+kind = "flat"
+amsl_m = 0
+[area]
+east_m = [-3000, 3000]
+north_m = [-3000, 3000]
+ceiling_amsl_m = 600
+[start]
+east_m = -1500
+north_m = 0
+height_m = 100
+[destination]
+east_m = 1500
+north_m = 0
+height_m = 100
+[[threats]]
+name = "post"
+east_m = 0
+north_m = 0
+amsl_m = 50
+kill_radius_m = 100
+kill_scale_m = 50
+[wind]
+speed_mps = 3
+from_deg = 250
+turbulence = "light"
+[limits]
+min_clearance_m = 50
+"""
+MISSION = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t46.0\t8.0\t0.0\t1
+1\t0\t3\t16\t0\t0\t0\t0\t46.0\t8.0\t100.0\t1
+2\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.0\t110.0\t1
+3\t0\t3\t16\t0\t0\t0\t0\t46.004\t8.006\t110.0\t1
+"""
+
+
+def _world() -> tuple[Scenario, Airframe]:
+    scenario = from_spec(tomllib.loads(FIELD), "field")
+    return scenario, load_airframe(scenario)
+
+
+def _plan(part: str) -> None:
+    scenario, airframe = _world()
+    call_kernels(part, scenario, airframe.limits)
+
+
+def _fly() -> None:
+    scenario, airframe = _world()
+    setup = make_setup(scenario, airframe, parse_mission(MISSION, "field.waypoints"), 1)
+    flown = fly_and_judge(setup, airframe, None)
+    with Recorder(Path(os.devnull), setup) as recorder:
+        recorder.write(flown.track)
+        recorder.finish(flown.ended, flown.verdict)
+
+
+UNITS: dict[str, Callable[[], None]] = {
+    **{part: functools.partial(_plan, part) for part in PARTS},
+    "flight": _fly,
+}
 
 
 def do_unit(unit: str, tell: Callable[[str], None]) -> None:

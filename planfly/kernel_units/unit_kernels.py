@@ -7,18 +7,18 @@ _WORLD = (
     "world.frames._least_squares",
     "world.frames._polymap_many",
     "world.terrain._heights_many",
-    "flight.ardupilot.tracking_error._fill",
+    "flight.autopilots.arduplane.tracking_error._fill",
 )
 _PROBLEM = (
     *_WORLD,
     "world.terrain.steepest_slopes",
-    "planner.airspace.kept_zones._give_way",
-    "planner.evaluation.threat_grid._fill_cells",
-    "planner.evaluation.threat_grid._lists",
+    "planner.airspace.zone_limits._give_way",
+    "planner.evaluation.threat_index._fill_cells",
+    "planner.evaluation.threat_index._lists",
 )
 _CERTIFY = "planner.evaluation.certify_kernels."
-_SIDES = "planner.seeding.side_kernels."
-_LAYOUT = "logs.recording.chunk_layout."
+_SIDES = "planner.seeding.side_routes."
+_LAYOUT = "logs.recording.mcap_writer."
 
 UNIT_KERNELS: dict[str, tuple[str, ...]] = {
     "scores": (
@@ -36,20 +36,20 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         _CERTIFY + "missile_distance",
         _CERTIFY + "turn_and_roll_lengths",
         _CERTIFY + "with_courses",
-        "planner.evaluation.fly_by_corners.fly_by_radii",
-        "planner.evaluation.leg_geometry.settling_length",
+        "planner.evaluation.corners.fly_by_radii",
+        "planner.evaluation.corners.settling_length",
     ),
     "shortening": (
         *_PROBLEM,
-        "planner.seeding.shortening_kernels.begin_shortening",
-        "planner.seeding.shortening_kernels.shorten_on",
+        "planner.seeding.shortening.begin_shortening",
+        "planner.seeding.shortening.shorten_on",
     ),
     "routes": (
         *_PROBLEM,
         "planner.evaluation.leg_constraints.slope_limits",
-        "planner.seeding.grid_kernels.cheapest_route",
+        "planner.seeding.grids.cheapest_route",
         "planner.seeding.waypoint_fitting._choose",
-        "planner.seeding.grid_prices.find_obstacles",
+        "planner.seeding.grids.find_obstacles",
         _SIDES + "cheapest_passings",
         _SIDES + "grid_costs",
         _SIDES + "route_through",
@@ -62,9 +62,9 @@ UNIT_KERNELS: dict[str, tuple[str, ...]] = {
         "aircraft.path_limits.arc_slope",
         "aircraft.path_limits.ground_speed_on",
         "aircraft.path_limits.turn_radius_between",
-        "flight.ardupilot.lateral_law.turn_distance",
-        "flight.ardupilot.pilot.true_by_equivalent",
-        "flight.guidance.path_kernels.profile",
+        "flight.autopilots.arduplane.law.turn_distance",
+        "flight.autopilots.arduplane.law.true_by_equivalent",
+        "flight.guidance.path.profile",
         "flight.simulation.tick.tick_in_block",
         "flight.simulation.track._round_to_steps",
         _LAYOUT + "_fill",

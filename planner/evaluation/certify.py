@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aircraft.path_limits import arc_slope, turn_tangents
-from planner.airspace.airspace_arrays import is_limited
-from planner.evaluation.airspace_room import airspace_pieces
+from planner.airspace.zone_limits import is_limited
+from planner.evaluation.airspace_scores import airspace_pieces
 from planner.evaluation.certify_kernels import (
     heights_above_ground,
     leg_slope_limits,
@@ -15,11 +15,9 @@ from planner.evaluation.certify_kernels import (
     turn_and_roll_lengths,
     with_courses,
 )
-from planner.evaluation.fly_by_corners import fly_by_radii
+from planner.evaluation.corners import fly_by_radii, settling_length
 from planner.evaluation.leg_constraints import CERTIFIED_LEG, slope_limits
-from planner.evaluation.leg_geometry import settling_length
-from planner.evaluation.problem import ANGLE_MARGIN, Problem
-from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.problem import ANGLE_MARGIN, Problem, ProblemArrays
 from planner.plan import Certificate
 from world.geometry import leg_runs, leg_slopes, turning_angles
 

@@ -12,21 +12,29 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import PerformanceTable
 from planner.evaluation.airspace_scores import add_airspace_violations
-from planner.evaluation.clearance_buffer import RequiredClearance
-from planner.evaluation.fly_by_corners import ARC_STEP, fly_by_vertices, half_blend_length, legs_about
-from planner.evaluation.height_lags import HEIGHT_LAG, below_at, measure_lags
-from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
-from planner.evaluation.leg_geometry import CORNER, LEG, measure_corners, measure_legs
-from planner.evaluation.missile_index import MissileIndex, kill_density
-from planner.evaluation.paper_scores import POINTS
-from planner.evaluation.problem_arrays import (
-    OBJECTIVES,
-    VIOLATIONS,
-    ProblemArrays,
-    SlopeBounds,
-    as_columns,
+from planner.evaluation.corners import (
+    ARC_STEP,
+    CORNER,
+    LEG,
+    fly_by_vertices,
+    half_blend_length,
+    legs_about,
+    measure_corners,
+    measure_legs,
 )
-from planner.evaluation.terrain_clearance import TERRAIN_LEG, sample_terrain, segment_pixels, terrain_excess
+from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
+from planner.evaluation.paper_scores import POINTS
+from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays, RequiredClearance, SlopeBounds, as_columns
+from planner.evaluation.terrain_clearance import (
+    HEIGHT_LAG,
+    TERRAIN_LEG,
+    below_at,
+    measure_lags,
+    sample_terrain,
+    segment_pixels,
+    terrain_excess,
+)
+from planner.evaluation.threat_index import MissileIndex, kill_density
 from world.frames import PolyMapRecord
 from world.kernels import Record, Records, compiled, inlined
 
@@ -179,7 +187,7 @@ def _score_paths(
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:  # pragma: no cover - compiled
     """Radius of the arc at waypoint i: 0 where a number alone limits turns and a leg there is too short for its two.
 
-    The ends have no arc.  `planner.evaluation.fly_by_corners.fly_by_radii` gives the radii of a whole path.
+    The ends have no arc.  `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):

@@ -15,25 +15,28 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.clearance_buffer import RequiredClearance, clearance_at
-from planner.evaluation.leg_constraints import PrecomputedLimits, add_leg_violations, precompute_limits
-from planner.evaluation.leg_geometry import CORNER, LEG, measure_corners, measure_legs
-from planner.evaluation.path_blocks import (
+from planner.evaluation.corners import CORNER, LEG, measure_corners, measure_legs
+from planner.evaluation.leg_constraints import (
     BLOCK,
     BLOCK_SCRATCH,
+    PrecomputedLimits,
+    add_leg_violations,
     clear_sums,
     copy_place,
     divide_legs,
     load_waypoints,
+    precompute_limits,
     subtract_places,
 )
-from planner.evaluation.problem_arrays import (
+from planner.evaluation.problem import (
     OBJECTIVES,
     VIOLATIONS,
     ProblemArrays,
+    RequiredClearance,
     as_columns,
+    clearance_at,
 )
-from planner.evaluation.threat_grid import Short, ThreatCells
+from planner.evaluation.threat_index import Short, ThreatCells
 from world.geometry import CLOSEST
 from world.kernels import Record, Records, compiled, inlined
 from world.terrain import EDGE

@@ -1,10 +1,11 @@
 """The algorithms that a scenario or a command may name."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+from aircraft.path_limits import Limits
 from world.errors import ScenarioError
-from world.text_files import did_you_mean
+from world.files import did_you_mean
 
 Optimiser = Literal["umda", "emna", "chain", "differential", "waypoints"]
 
@@ -19,7 +20,7 @@ class Algorithm:
     smooth: first samples, and the marginals of UMDA, along the eigenvectors of the Brownian-bridge kernel.
     seeded: starts from grid routes, improved by a pattern search.
     tightened: ends with moves of all waypoints of its best path at once.
-    optimiser: which of `planner.optimisers` it uses; "waypoints" is `planner.search.waypoint_generations`.
+    optimiser: which of `planner.optimisers` it uses; "waypoints" is `planner.search.generations`.
     """
 
     name: str
@@ -151,3 +152,12 @@ def find_algorithm(name: str | None, source: str) -> Algorithm:
         allowed = f"not known; allowed: {', '.join(ALGORITHMS)}{did_you_mean(str(name), ALGORITHMS)}"
         raise ScenarioError.at(source, "planner.algorithm", name, allowed, shown=f"{name!r}")
     return found
+
+
+# ----------------------------------------------------------------------
+# The limits that an algorithm plans within.
+
+
+def limits_for(algorithm: Algorithm, limits: Limits) -> Limits:
+    """Limits that an algorithm plans within: those that count violations are the paper's, and know no autopilot."""
+    return limits if algorithm.graded else replace(limits, tracking=None)

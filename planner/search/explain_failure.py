@@ -3,20 +3,177 @@
 import itertools
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from planner.evaluation.clearance_buffer import BUFFER_GROWTH
 from planner.evaluation.encoding import rotated_frame
-from planner.evaluation.problem import Problem, make_problem
+from planner.evaluation.problem import BUFFER_GROWTH, Problem, make_problem
 from planner.plan import Plan, Violation
-from planner.search.algorithms import ALGORITHMS
-from planner.search.closing_zones import closing_zones
-from planner.search.limits_for import limits_for
-from planner.search.narrow_bands import highest_allowed, narrow_bands
-from world.airspace.zone_kernels import edge_distance, outside_band, zone_records
+from planner.search.algorithms import ALGORITHMS, limits_for
+from world.airspace.zone_kernels import ZoneRecords, edge_distance, outside_band, zone_records
+from world.kernels import compiled
 from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+# ----------------------------------------------------------------------
+# Which zones close the way from start to destination: cells of a coarse grid that hang together, and their bounds.
+
+
+# Cells along the map's longer side, and heights from the lowest to the highest that a path may be at.
+CELLS, HEIGHTS = 150, 5
+# What a cell is closed by, if not by the zone of a number.
+_OPEN, _GROUND = -1, -2
+
+
+class Closed(NamedTuple):
+    """What closes the way.
+
+    zones: names of the zones that bound both what can be reached from the start and from the destination.
+    pitch: of the cells, m.
+    """
+
+    zones: tuple[str, ...]
+    pitch: float
+
+
+def closing_zones(scenario: Scenario) -> Closed | None:
+    """What of a scenario's zones closes the way; None where none does, or the ground does it without them.
+
+    A gap narrower than a cell counts as closed.  Missiles and what an aircraft can climb are not looked at.
+
+    >>> from world.scenario import load_scenario
+    >>> closing_zones(load_scenario("tight")) is None
+    True
+    """
+    terrain = scenario.terrain
+    if terrain is None or not scenario.zones:
+        return None
+    pitch = float(np.ptp(scenario.bounds, axis=1).max()) / CELLS
+    east, north = (np.arange(low + 0.5 * pitch, high, pitch) for low, high in scenario.bounds)
+    ground = terrain.height(east[None, :], north[:, None])
+    low = np.maximum(ground + scenario.limits.min_clearance_m, scenario.floor)
+    top = np.full(ground.shape, scenario.ceiling)
+    if scenario.limits.max_height_m is not None:
+        top = np.minimum(top, ground + scenario.limits.max_height_m)
+    cells = np.full((HEIGHTS, *ground.shape), _OPEN, dtype=np.int64)
+    cells[:, ~(low <= top)] = _GROUND
+    ends = [_cell_of(scenario, end, pitch, low, top) for end in (scenario.start, scenario.destination)]
+    if not _reached(cells, ends):
+        return None
+    _close(zone_records(scenario.zones), east, north, ground, low, top, cells)
+    for end in ends:
+        cells[end] = _OPEN
+    if _reached(cells, ends):
+        return None
+    # Imported here, as below: only the explanation of a failure needs it.
+    from scipy import ndimage
+
+    regions, _ = ndimage.label(cells == _OPEN)
+    beside = [ndimage.binary_dilation(regions == regions[end]) for end in ends]
+    both = [set(cells[edge].tolist()) for edge in beside]
+    found = (both[0] & both[1]) or (both[0] | both[1])
+    return Closed(tuple(scenario.zones[z].name for z in sorted(found) if z >= 0), pitch)
+
+
+def _cell_of(scenario: Scenario, end: Floats, pitch: float, low: Floats, top: Floats) -> tuple[int, int, int]:
+    """Height, row and column of the cell of a fixed end."""
+    place = ((end[:2] - scenario.bounds[:, 0]) / pitch).astype(np.int64)
+    column, row = (int(np.clip(at, 0, size - 1)) for at, size in zip(place, (low.shape[1], low.shape[0]), strict=True))
+    share = (end[2] - low[row, column]) / max(float(top[row, column] - low[row, column]), 1e-6)
+    return int(np.clip(round(share * (HEIGHTS - 1)), 0, HEIGHTS - 1)), row, column
+
+
+def _reached(cells: Ints, ends: list[tuple[int, int, int]]) -> bool:
+    """Whether open cells lead from the one end to the other."""
+    from scipy import ndimage
+
+    regions, _ = ndimage.label(cells == _OPEN)
+    return bool(regions[ends[0]] == regions[ends[1]] != 0)
+
+
+@compiled
+def _close(
+    records: ZoneRecords, east: Floats, north: Floats, ground: Floats, low: Floats, top: Floats, cells: Ints
+) -> None:  # pragma: no cover - compiled
+    """Note in open cells (heights, rows, columns) the first zone that closes them."""
+    for z in range(records.zones.shape[0]):
+        zone = records.zones[z]
+        for i in range(north.size):
+            for j in range(east.size):
+                near = zone.south <= north[i] <= zone.north and zone.west <= east[j] <= zone.east
+                inside = near and edge_distance(records, z, east[j], north[i]) <= 0.0
+                if zone.exclusion and not inside:
+                    continue
+                for k in range(cells.shape[0]):
+                    up = low[i, j] + (top[i, j] - low[i, j]) * k / (cells.shape[0] - 1)
+                    within = inside and not outside_band(zone, up, ground[i, j]) > 0.0
+                    if cells[k, i, j] == _OPEN and within == zone.exclusion:
+                        cells[k, i, j] = z
+
+
+# ----------------------------------------------------------------------
+# Bands of heights that leave a path no room: between what is kept from their lower and from their upper edge.
+
+
+def narrow_bands(problem: Problem) -> list[str]:
+    """Lines that name each band, of the limits or of an inclusion, in which a plan's reserves leave no height at all.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.evaluation.problem import make_problem
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> narrow_bands(make_problem(scenario, load_airframe(scenario).limits))
+    []
+    """
+    data, lines = problem.certified, []
+    space, lowest = data.airspace, data.clearance + data.buffer
+    if lowest > space.max_height - space.buffer:
+        lines.append(
+            f"the band above ground is too narrow: from limits.min_clearance_m {data.clearance:g} m to"
+            f" limits.max_height_m {space.max_height:g} m a plan keeps {data.buffer:.1f} m from the lower edge and"
+            f" {space.buffer:.1f} m from the upper, {lowest + space.buffer - space.max_height:.1f} m more than there is"
+        )
+    for keeps in space.zones.kept:
+        zone = problem.scenario.zones[int(keeps["number"])]
+        ceiling, floor, beyond = zone.ceiling, zone.floor, float(keeps["beyond"])
+        if zone.kind != "inclusion" or ceiling is None:
+            continue
+        bottoms = {f"the clearance of {data.clearance:g} m": lowest} if ceiling.datum == "ground" else {}
+        if floor is not None and floor.datum == ceiling.datum:
+            bottoms[f"its floor at {floor.height:g} m"] = floor.height + beyond
+        name, bottom = max(bottoms.items(), key=lambda item: item[1], default=("", -math.inf))
+        if bottom > ceiling.height - beyond:
+            lines.append(
+                f"{zone.name} is too narrow a band: above {name} and below its ceiling at {ceiling.height:g} m a plan's"
+                f" reserves take {bottom + beyond - ceiling.height:.1f} m more than there is"
+            )
+    return lines
+
+
+def highest_allowed(problem: Problem) -> tuple[float, str]:
+    """The highest that a plan may be anywhere, m AMSL, and what says so: the ceiling, or an inclusion's.
+
+    >>> from planfly.airframe import load_airframe
+    >>> from planner.evaluation.problem import make_problem
+    >>> from world.scenario import load_scenario
+    >>> scenario = load_scenario("tight")
+    >>> highest_allowed(make_problem(scenario, load_airframe(scenario).limits))[1]
+    'the ceiling'
+    """
+    scenario: Scenario = problem.scenario
+    tops = [(float(problem.certified.ceiling), "the ceiling")]
+    for keeps in problem.certified.airspace.zones.kept:
+        zone = scenario.zones[int(keeps["number"])]
+        if zone.kind == "inclusion" and zone.ceiling is not None and zone.ceiling.datum == "amsl":
+            tops.append((zone.ceiling.height - float(keeps["beyond"]), f"the ceiling of {zone.name}"))
+    return min(tops)
+
 
 # Places looked at along and across the way.
 ALONG, ACROSS = 200, 400
@@ -31,7 +188,7 @@ def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
 
     >>> from planner.plan import Certificate
     >>> from world.scenario import load_scenario
-    >>> from world.scenario_variants import with_threats
+    >>> from world.scenario import with_threats
     >>> guarded = with_threats(load_scenario("hard-07"), [(5000.0, 5000.0, 8000.0, 0.0)], "--add-threat")
     >>> path = np.stack([guarded.start, guarded.destination])
     >>> certificate = Certificate(0.1, np.inf, 0.1, 9.0, -50.0, -50.0, ())

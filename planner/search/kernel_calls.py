@@ -11,10 +11,10 @@ from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rota
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import Problem, make_problem
-from planner.search.score_table import best_first, score_table
-from planner.seeding.grid_routes import GridRoute, grid_route, make_grid
-from planner.seeding.path_shortening import evenly, shorten_path
+from planner.search.search_state import best_first, score_table
+from planner.seeding.grids import GridRoute, grid_route, make_grid
 from planner.seeding.pattern_search import search_patterns
+from planner.seeding.shortening import evenly, shorten_path
 from planner.seeding.side_routes import optimistic_grid, side_routes
 from planner.seeding.waypoint_fitting import fit_waypoints
 from world.scenario import Scenario

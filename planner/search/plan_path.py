@@ -9,15 +9,17 @@ from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, make_problem
 from planner.plan import Certificate, Plan
-from planner.search.algorithms import find_algorithm
-from planner.search.limits_for import limits_for
-from planner.search.other_sides import search_other_sides, shorten_best
-from planner.search.path_generations import path_generations
-from planner.search.score_table import no_scores
-from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition
-from planner.search.seeds import starting_vectors, straight_line
-from planner.search.turning_back import may_turn_back, search_turning_back
-from planner.search.waypoint_generations import waypoint_generations
+from planner.search.algorithms import find_algorithm, limits_for
+from planner.search.generations import path_generations, waypoint_generations
+from planner.search.search_state import Archive, Improved, Search, SearchEnded, SearchProgress, StopCondition, no_scores
+from planner.search.seeds import (
+    may_turn_back,
+    search_other_sides,
+    search_turning_back,
+    shorten_best,
+    starting_vectors,
+    straight_line,
+)
 from world.errors import ScenarioError
 from world.random_streams import PLANNER, stream
 from world.scenario import Scenario

@@ -10,9 +10,8 @@ from aircraft.path_limits import Limits
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import make_problem
 from planner.plan import Plan
-from planner.search.algorithms import find_algorithm
+from planner.search.algorithms import find_algorithm, limits_for
 from planner.search.explain_failure import zones_entered
-from planner.search.limits_for import limits_for
 from planner.search.plan_path import plan_path
 from planner.search.search_state import SearchProgress, StopCondition
 from world.errors import MissionError
@@ -38,13 +37,13 @@ def replan(
 ) -> Plan:
     """Plan anew from the waypoint at which leg `leg` of an old plan begins; legs before it are flown and stay.
 
-    scenario: with the threats known now (`world.scenario_variants.with_threats`).  The turn at that waypoint counts
+    scenario: with the threats known now (`world.scenario.with_threats`).  The turn at that waypoint counts
     from the course of the leg flown last.  The search starts around the rest of the old plan, beside its grid routes.
     The certificate is of the way ahead; violations and objectives are of the whole path in this scenario.
 
     >>> from planfly.airframe import load_airframe
     >>> from world.scenario import load_scenario
-    >>> from world.scenario_variants import with_threats
+    >>> from world.scenario import with_threats
     >>> scenario = load_scenario("hard-07")
     >>> limits = load_airframe(scenario).limits
     >>> old = plan_path(scenario, limits, seed=1)

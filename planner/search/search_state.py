@@ -7,23 +7,63 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.airspace.airspace_arrays import is_limited
+from planner.airspace.zone_limits import is_limited
 from planner.evaluation.airspace_scores import airspace_counts
 from planner.evaluation.certify import certify
 from planner.evaluation.encoding import Encoding
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
 from planner.evaluation.problem import CERTIFIED_KILL_MARGIN, Problem
-from planner.plan import Certificate, Violation
+from planner.optimisers.preference import NO_GOAL, Level, ranks
+from planner.plan import Certificate, Objective, Violation
 from planner.search.algorithms import Algorithm
-from planner.search.score_table import KILL, LENGTH, best_first, no_scores, safe, score_table, violated
-from planner.seeding.path_shortening import MOST_MODELS, shorten_path
 from planner.seeding.pattern_search import search_patterns
+from planner.seeding.shortening import MOST_MODELS, shorten_path
 from planner.seeding.waypoint_fitting import tighten
 from world.errors import ScenarioError
 from world.geometry import path_length
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+# ----------------------------------------------------------------------
+# The table of scores that a search ranks: a row a path, its violations and then its objectives, and their order.
+
+
+SCORE_COLUMNS = len(Violation) + len(Objective)
+LENGTH, KILL, DETECTION, HEIGHT = (len(Violation) + item for item in Objective)
+CONSTRAINTS = Level(tuple(Violation), (0.0,) * len(Violation))
+# The order of an archive: what meets the constraints, then least kill exposure, then the shortest.
+ARCHIVE_LEVELS = (CONSTRAINTS, Level((KILL,), (NO_GOAL,)), Level((LENGTH,), (NO_GOAL,)))
+
+
+def score_table(violations: NDArray[np.generic], objectives: Floats) -> Floats:
+    """Scores (n, 8) of violations (n, 4) and objectives (n, 4)."""
+    return np.concatenate([violations.astype(np.float64), objectives], axis=1)
+
+
+def no_scores() -> Floats:
+    """A table without rows."""
+    return np.empty((0, SCORE_COLUMNS))
+
+
+def violated(scores: Floats) -> Flags:
+    """Whether paths with these scores (..., 8) violate a constraint, (...,)."""
+    return np.asarray(scores[..., : len(Violation)].any(axis=-1))
+
+
+def safe(scores: Floats) -> Flags:
+    """Whether paths with these scores (..., 8) violate nothing and are exposed to no missile, (...,)."""
+    return np.asarray(~violated(scores) & ~(scores[..., KILL] > 0.0))
+
+
+def best_first(scores: Floats) -> Ints:
+    """Rows of scores (n, 8) in the archive's order; equal ranks keep their order."""
+    return np.argsort(ranks(scores, ARCHIVE_LEVELS), kind="stable")
+
+
 SearchProgress = Callable[[int, int, str], None]
 StopCondition = Callable[[], str]
 Improved = Callable[[Floats], None]

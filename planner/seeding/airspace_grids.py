@@ -1,30 +1,38 @@
 """Cheapest routes over grids among zones and within a band of heights above ground, in the rotated frame.
 
-A dynamic programme over forward steps, as `planner.seeding.grid_kernels` is, but its layers follow the ground where a
+A dynamic programme over forward steps, as `planner.seeding.grids` is, but its layers follow the ground where a
 greatest height above it is to be kept, and each step is asked by itself whether it passes a zone: what lies between two
 cells may be narrower than they are apart.
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.airspace.kept_zones import KeptZones, first_near
-from planner.airspace.zone_depths import inside_depth
-from planner.airspace.zone_reach import MapSegment, line_between, reach_of
-from planner.evaluation.clearance_buffer import clearance_at, required_below, required_clearance
+from planner.airspace.zone_distances import inside_depth
+from planner.airspace.zone_limits import KeptZones, MapSegment, first_near, line_between, reach_of
 from planner.evaluation.encoding import RotatedFrame
 from planner.evaluation.leg_constraints import slope_limits
-from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.grid_kernels import SIDEWAYS
-from planner.seeding.grid_prices import KILL_COST, find_obstacles, position_of
+from planner.evaluation.problem import ProblemArrays, clearance_at, required_below, required_clearance
+from planner.seeding.grids import (
+    EXPECTED,
+    KILL_COST,
+    LAYERS_A_STEP,
+    SIDEWAYS,
+    GridRoute,
+    beside_used,
+    find_obstacles,
+    position_of,
+)
 from world.kernels import Record, Records, compiled
 from world.terrain import ground_height
 
 Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
+
 
 # A m of way at the edge of the band costs this share more than in its middle: legs are longer than a grid's steps.
 EDGE_COST = 0.3
@@ -274,3 +282,84 @@ def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: n
     first = column.lowest if grid.follows else grid.floor
     layer: int = min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
     return layer
+
+
+# ----------------------------------------------------------------------
+# Routes over grids that know zones and the greatest height above ground, where a scenario has them.
+
+# Stages, to those of a grid that knows no zones: steps are to be short against hills and gaps.
+FINER = 2
+# Layers of a band of heights above ground, at least and at most.
+FEWEST_LAYERS, MOST_LAYERS = 8, 24
+# Pitch of layers that do not follow the ground, as a share of the pitch along, at least.
+LEAST_PITCH = 0.05
+# Cells of one grid, at most: stages x across x layers.
+MOST_CELLS = 1_200_000
+
+
+def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
+    """A grid of this many stages, or of fewer where it would get too large.
+
+    span: lowest and highest place across, m.
+    """
+    level = np.array([*data.destination[:2], data.start[2]])
+    gentlest = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
+    space = data.airspace
+    band = space.max_height - space.buffer - data.clearance - data.buffer
+    low = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
+    follows = math.isfinite(band)
+    while True:
+        step = frame.length / stages
+        across = np.arange(-math.floor(-span[0] / step), math.floor(span[1] / step) + 1) * step
+        pitch = max(1.0, gentlest * step / LAYERS_A_STEP)
+        if follows:
+            layers = min(MOST_LAYERS, max(FEWEST_LAYERS, math.ceil(band / pitch) + 1))
+            # Near an end that leaves less of the buffers the band is wider.
+            widest = space.max_height - data.clearance
+            pitch = max(1.0, band) / (layers - 1)
+            layers = max(layers, min(2 * MOST_LAYERS, math.ceil(widest / pitch) + 1))
+        else:
+            pitch = max(pitch, LEAST_PITCH * step)
+            layers = max(1, math.floor((data.ceiling - low) / pitch) + 1)
+        if stages <= 8 or (stages + 1) * across.size * layers <= MOST_CELLS:
+            return AirspaceGrid(stages, np.asarray(across, np.float64), layers, pitch, follows, low, gentle=True)
+        stages = max(8, int(stages / 1.2))
+
+
+def airspace_routes(
+    data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
+) -> Iterator[GridRoute]:
+    """Routes as found: of each grid's number of stages, `FINER` times as many, up to so many different ones.
+
+    Those of gentle grids are flown more easily; the first route of all is also looked for where the grid is not gentle,
+    as gaps are passed that way only.
+    """
+    expected = EXPECTED * math.dist(data.start, data.destination)
+    for number, (stages, each) in enumerate(grids):
+        grid = airspace_grid(data, frame, span, FINER * stages)
+        if number == 0:
+            route = _route(data, frame, grid._replace(gentle=False), (), expected)
+            if route is not None:
+                yield route
+        used: tuple[GridRoute, ...] = ()
+        for _ in range(each):
+            route = _route(data, frame, grid, used, math.inf if used else expected)
+            if route is None:
+                break
+            expected = expected if used else route.cost
+            used = (*used, route)
+            yield route
+
+
+def _route(
+    data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, used: tuple[GridRoute, ...], expected: float
+) -> GridRoute | None:
+    """Cheapest way over a grid beside those used; None where there is none.  expected: a cost that may be enough."""
+    extra = beside_used(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
+    for bound in (expected, math.inf):
+        points, cost = cheapest_airspace_route(data, frame, grid, extra, bound)
+        if len(points):
+            return GridRoute(points, float(cost))
+        if bound == math.inf:
+            break
+    return None

@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.encoding import Encoding, frames_of
+from planner.evaluation.encoding import Encoding, WaypointFrames, frames_of
 from planner.evaluation.graded_scores import PathScratch, make_scratch, score_path
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
-from planner.evaluation.problem_arrays import OBJECTIVES, VIOLATIONS, ProblemArrays
-from planner.frames.waypoint_frames import WaypointFrames
+from planner.evaluation.problem import OBJECTIVES, VIOLATIONS, ProblemArrays
 from planner.plan import Objective
 from world.kernels import Record, Records, compiled
 

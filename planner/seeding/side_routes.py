@@ -1,19 +1,197 @@
 """Routes that pass obstacles on other sides than the cheapest does: one of each choice of sides, cheapest first."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.encoding import RotatedFrame
-from planner.evaluation.problem_arrays import ProblemArrays
-from planner.seeding.grid_prices import Grid, find_obstacles
-from planner.seeding.grid_routes import GridRoute, make_grid
-from planner.seeding.side_kernels import LEFT, OVER, RIGHT, UNDER, cheapest_passings, grid_costs, route_through
-from world.kernels import Records
+from planner.evaluation.problem import ProblemArrays, required_clearance
+from planner.seeding.grids import (
+    ROUTE_CELL,
+    SIDEWAYS,
+    SPAN,
+    Grid,
+    GridRoute,
+    find_obstacles,
+    layers_a_step,
+    make_grid,
+    prune,
+    relax,
+    set_prices,
+    step_on,
+    trace_back,
+    way_ahead,
+)
+from world.kernels import Records, compiled, inlined
 
 Floats = NDArray[np.float64]
+Codes = NDArray[np.int32]
 Ints = NDArray[np.int64]
+
+
+# ----------------------------------------------------------------------
+# What routes over a grid cost that pass each obstacle on each of its sides: the compiled part of side routes.
+#
+# Two dynamic programmes over the same grid, from the start and from the destination, meet in every cell: their sum is
+# the
+# cost of the cheapest route through it.  The least sum to the left of an obstacle belongs to the cheapest of all routes
+# that pass it on the left, and so for every obstacle and side, of the same two programmes.
+
+
+# Sides on which a route passes an obstacle, by the quarter of directions about its middle.
+LEFT, RIGHT, OVER, UNDER = range(4)
+# The cheapest way past an obstacle on one side: its cost (inf for none), and the cell through which it leads.
+PASSING = np.dtype(
+    [("cost", np.float64), ("stage", np.int64), ("layer", np.int64), ("across", np.int64)],
+    align=True,
+)
+
+
+class GridCosts(NamedTuple):
+    """Costs of the cheapest ways over a grid, (stages + 1, layers, across), inf where none is within the bound.
+
+    reached: from the start, and came: the cell before, as layer x places across + across.
+    left: to the destination, and went: the cell after.
+    """
+
+    reached: Floats
+    came: Codes
+    left: Floats
+    went: Codes
+
+
+@compiled
+def _step_back(
+    left: Floats,
+    price: Floats,
+    before: Floats,
+    went: Codes,
+    spans: Records,
+    step_layers: Records,
+    step: float,
+    pitch: float,
+    ratio: float,
+) -> None:  # pragma: no cover - compiled
+    """Relax one stage backwards: costs (layers, across) to the destination after and before it.
+
+    spans: `SPAN` records (layers,) of the cells before it that are within the bound.
+    """
+    high, wide = left.shape
+    flat, flat_before, flat_went, flat_price = left.ravel(), before.ravel(), went.ravel(), price.ravel()
+    for z in range(high):
+        first, last = spans[z].first, spans[z].last
+        if first > last:
+            continue
+        for side in range(-SIDEWAYS, SIDEWAYS + 1):
+            a, b = max(first, -side), min(last, wide - 1 - side) + 1
+            if a >= b:
+                continue
+            most = step_layers[side + SIDEWAYS, z]
+            bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
+            for z2 in range(bottom, top + 1):
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
+                here, after = z * wide + a, z2 * wide + a + side
+                relax(flat, flat_price, flat_before, flat_went, after, here, after, b - a, length)
+
+
+@compiled
+def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:  # pragma: no cover - compiled
+    """Drop cells (layers, across) of one stage through which no way is within the bound."""
+    for z in range(reached.shape[0]):
+        for y in range(spans[z].first, spans[z].last + 1):
+            if not reached[z, y] + left[z, y] <= bound:
+                left[z, y] = math.inf
+
+
+@compiled
+def grid_costs(
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float
+) -> GridCosts:  # pragma: no cover - compiled
+    """Costs of the cheapest ways over a grid, from its start and to its destination, up to a bound."""
+    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    step = frame.length / stages
+    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
+    step_layers, required = layers_a_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
+    obstacles = find_obstacles(data, frame, step, grid.shrink)
+    shape = (stages + 1, high, wide)
+    reached, left = np.full(shape, np.inf), np.full(shape, np.inf)
+    price, extra = np.full(shape, np.inf), np.zeros((stages + 1, wide))
+    came, went = np.zeros(shape, dtype=np.int32), np.zeros(shape, dtype=np.int32)
+    home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
+    goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
+    rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
+    spans = np.zeros((stages + 1, high), dtype=SPAN)
+    for z in range(high):
+        spans[0, z].first, spans[0, z].last = (home, home) if z == start else (wide, -1)
+    reached[0, start, home] = 0.0
+    for stage in range(1, stages + 1):
+        low, last = wide, -1
+        for z in range(high):
+            low, last = min(low, spans[stage - 1, z].first), max(last, spans[stage - 1, z].last)
+        low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
+        if low > last:
+            return GridCosts(reached, came, left, went)
+        set_prices(data, required, frame, stage, obstacles, grid, extra, low, last, price[stage])
+        before, here = reached[stage - 1], reached[stage]
+        step_on(before, here, came[stage], spans[stage - 1], step_layers, price[stage], step, pitch, grid.ratio)
+        way_ahead(wide, home, stages - stage, step, grid.ratio, ahead)
+        prune(reached[stage], spans[stage], ahead, rises, bound, low, last)
+    left[stages, goal, home] = 0.0
+    for stage in range(stages - 1, -1, -1):
+        after, here = left[stage + 1], left[stage]
+        _step_back(after, price[stage + 1], here, went[stage], spans[stage], step_layers, step, pitch, grid.ratio)
+        _bounded(reached[stage], left[stage], spans[stage], bound)
+    return GridCosts(reached, came, left, went)
+
+
+@inlined
+def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
+    """Side on which a place is that is so far to the left of an obstacle's middle and above it."""
+    if abs(aside) >= abs(above):
+        return LEFT if aside >= 0.0 else RIGHT
+    return OVER if above > 0.0 else UNDER
+
+
+@compiled
+def cheapest_passings(
+    costs: GridCosts, grid: Grid, obstacles: Records, step: float
+) -> Records:  # pragma: no cover - compiled
+    """`PASSING` records (obstacles, 4) of the cheapest way past each `OBSTACLE` on each side, by `side_of`.
+
+    A route passes an obstacle at the stage nearest to its middle; there is none of one beyond the ends.
+    """
+    out = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
+    for k in range(obstacles.shape[0]):
+        obstacle, stage = obstacles[k], round(obstacles[k].along / step)
+        for side in range(4):
+            out[k, side].cost = math.inf
+        if not 0 < stage < grid.stages:
+            continue
+        for z in range(grid.layers.size):
+            for y in range(grid.across.size):
+                cost = costs.reached[stage, z, y] + costs.left[stage, z, y]
+                if cost == math.inf:
+                    continue
+                best = out[k, side_of(grid.across[y] - obstacle.across, grid.layers[z] - obstacle.up)]
+                if cost < best.cost:
+                    best.cost, best.stage, best.layer, best.across = cost, stage, z, y
+    return out
+
+
+@compiled
+def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Records:  # pragma: no cover - compiled
+    """`ROUTE_CELL` records (stages + 1,) of the cheapest route through a cell."""
+    last, wide = costs.went.shape[0] - 1, costs.went.shape[2]
+    cells = np.zeros(last + 1, dtype=ROUTE_CELL)
+    cells[: stage + 1] = trace_back(costs.came[: stage + 1], layer, across)
+    for here in range(stage, last):
+        after = costs.went[here, layer, across]
+        layer, across = after // wide, after % wide
+        cells[here + 1].layer, cells[here + 1].across = layer, across
+    return cells
+
 
 # Routes that are nearer to each other than this on average, across, are one way: m.
 SAME_WAY = 100.0

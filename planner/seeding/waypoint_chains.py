@@ -13,11 +13,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from planner.evaluation.clearance_buffer import clearance_at, required_clearance
+from planner.evaluation.corners import CORNER, measure_corner
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits
-from planner.evaluation.leg_geometry import CORNER, measure_corner
-from planner.evaluation.missile_index import kill_density
-from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.problem import ProblemArrays, clearance_at, required_clearance
+from planner.evaluation.threat_index import kill_density
 from planner.seeding.waypoint_fitting import leg_cost
 from world.frames import polymap
 from world.kernels import Records, compiled, inlined

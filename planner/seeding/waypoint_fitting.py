@@ -8,14 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from planner.evaluation.airspace_scores import airspace_excess
-from planner.evaluation.encoding import Encoding, RotatedFrame, frames_of
-from planner.evaluation.height_lags import lag_length
+from planner.evaluation.encoding import Encoding, RotatedFrame, WaypointFrames, frames_of, straight_frames
 from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_excess
-from planner.evaluation.missile_index import kill_density
-from planner.evaluation.problem_arrays import ProblemArrays
-from planner.evaluation.terrain_clearance import segment_pixels, terrain_excess
-from planner.frames.waypoint_frames import WaypointFrames, straight_frames
-from planner.seeding.grid_prices import KILL_COST
+from planner.evaluation.problem import ProblemArrays
+from planner.evaluation.terrain_clearance import lag_length, segment_pixels, terrain_excess
+from planner.evaluation.threat_index import kill_density
+from planner.seeding.grids import KILL_COST
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]

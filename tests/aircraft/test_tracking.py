@@ -11,6 +11,7 @@ from aircraft.tracking import (
     TrackingError,
     air_density_factor,
     corner_room,
+    corridor_half_width,
     faster_by,
     no_tracking,
 )
@@ -52,3 +53,22 @@ def test_true_airspeed_grows_with_height(amsl: float, factor: float) -> None:
     """The standard atmosphere's density ratios at 1, 2 and 4 km are 0.9075, 0.8217 and 0.6689 (ICAO Doc 7488)."""
     assert air_density_factor(amsl) == pytest.approx(factor, rel=0.006)
     assert faster_by(error_of().record, amsl) == pytest.approx(25.0 * (factor - 1.0), abs=0.15)
+
+
+# ----------------------------------------------------------------------
+# The corridor: what a scenario states, or what whoever flies needs.
+
+
+@pytest.mark.parametrize(
+    ("stated", "radius", "wanted"),
+    [
+        (None, None, 30.0),
+        (None, 14.9, 30.0),
+        (None, 15.1, 30.2),
+        (None, 90.0, 180.0),
+        (5.0, 90.0, 5.0),
+        (5.0, None, 5.0),
+    ],
+)
+def test_half_width(stated: float | None, radius: float | None, wanted: float) -> None:
+    assert corridor_half_width(stated, radius) == pytest.approx(wanted)

@@ -3,7 +3,7 @@
 ``python -m tests.authorities.make_best_known [NN ...] [planfly] [cmaes] [ompl] [slsqp]`` runs, for each problem: our
 default planner with 20 times the paper's population, seeds 1 and 2; CMA-ES in the smooth basis from our coarse seeds,
 4 seeds, 5 times the paper's budget; OMPL's Informed RRT* for 60 s of CPU; SciPy's SLSQP from 40 ways over a lattice and
-4 plans that know no grids, 100 times the default's CPU time or more (`tests.bench.planning.smooth_search`).  A path
+4 plans that know no grids, 100 times the default's CPU time or more (`benchmarks.planning.smooth_search`).  A path
 that is already in the file stays unless a certified one is shorter.
 """
 
@@ -14,11 +14,11 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.peers import Found, solve_with_cmaes, solve_with_ompl
+from benchmarks.planning.smooth_search import smooth_search
+from benchmarks.task import PROBLEMS, Task, is_safe, make_task, with_planner
 from planfly.pipeline import make_plan
 from planner.plan import Objective
-from tests.bench.peers import Found, solve_with_cmaes, solve_with_ompl
-from tests.bench.planning.smooth_search import smooth_search
-from tests.bench.task import PROBLEMS, Task, is_safe, make_task, with_planner
 
 FILE = Path(__file__).with_name("best_known.json")
 MORE, OURS, SEEDS, RRT_SECONDS = 20, (1, 2), (1, 2, 3, 4), 60.0

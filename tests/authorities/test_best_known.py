@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from benchmarks.task import make_task
 from planner.search.plan_path import plan_path
-from tests.bench.task import make_task
 from tests.instances import CEILING, CLIMB_DEG, DIVE_DEG, MAP, ground
 from tests.soak import note, scaled
 from world.scenario import Scenario, load_scenario

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from benchmarks.campaigns.even_draws import EVEN_FLIGHTS, even_draw
+from benchmarks.campaigns.winds_reference import agreement, is_within, reference_interval
 from planfly.campaigns.spread.spread_file import default_spread
-from tests.bench.campaigns.even_draws import EVEN_FLIGHTS, even_draw
-from tests.bench.campaigns.winds_reference import agreement, is_within, reference_interval
 
 
 def point(speed: float, flights: int, flyable: int) -> dict[str, Any]:

@@ -13,9 +13,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from planfly.first_start.sharing import compile_units
+from planfly.first_start import compile_units
+from planfly.kernel_units.ready_kernels import MISSION
 from planfly.kernel_units.unit_kernels import BOTH
-from planfly.kernel_units.units import MISSION
 from world.kernels import cache_folder
 
 # Over which the climb and the corner of MISSION lead.
@@ -81,7 +81,7 @@ PROCESSES = (
 # Tests that compile for more than a second.
 TESTS = (
     "planner/search/test_embedded_scenarios.py::test_tight_has_corners_that_the_aircraft_cannot_turn",
-    "planner/seeding/test_grid_kernels.py",
+    "planner/seeding/test_grids.py",
     "planner/search/test_replan.py::test_a_zone_that_comes_up_is_kept_out_of_and_a_leg_that_begins_in_it_is_refused",
     "planner/optimisers/test_markov_chain.py::test_finds_the_bottom_of_a_turned_valley",
     "flight/simulation/test_same_bytes_in_any_process.py",
@@ -90,11 +90,11 @@ TESTS = (
     "planner/evaluation/test_terrain_clearance.py::test_steps_over_the_ground_leave_nothing_out",
     "logs/verdict/rules/test_height_rule.py::test_the_height_over_a_valley_across_the_map",
     "flight/guidance/test_lateral.py::test_on_the_path_nothing_is_asked",
-    "logs/verdict/measures/test_path_blocks.py::test_a_block_holds_its_moves",
+    "logs/verdict/measures/test_path_moves.py::test_a_block_holds_its_moves",
     "planner/airspace/test_zone_distances.py::test_beside_an_exclusion_and_into_it",
     "planner/evaluation/test_airspace_scores.py::test_pieces_that_touch_a_zone_are_counted",
-    "logs/field_logs/readers/test_dataflash_frames.py",
-    "logs/verdict/measures/limits/test_along_track_limits.py::test_stays_a_microsecond_apart_are_one",
+    "logs/importers/test_dataflash_frames.py",
+    "logs/verdict/measures/limits/test_path_sweeps_limits.py::test_stays_a_microsecond_apart_are_one",
     "logs/report/test_compare.py::test_a_flight_does_not_differ_from_itself",
 )
 TESTS_FOLDER = Path(__file__).parents[1]

@@ -3,7 +3,7 @@
 import pytest
 
 from logs.figures import draw_all
-from logs.figures.elements.style import new_figure, png_bytes
+from logs.figures.style import new_figure, png_bytes
 
 NAMES = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy")
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.logs.made_flight import make_setup, make_track, record
 

@@ -8,7 +8,7 @@ import numpy as np
 from aircraft.envelope import Envelope
 from flight.mission.items import Home, Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import Track
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Finding, Verdict

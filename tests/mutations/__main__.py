@@ -23,7 +23,7 @@ from tests.mutations.covering import covering_tests, kernels_on, limits_at
 from tests.mutations.mutant import ROOT, Mutant
 from tests.mutations.workplace import Trial, Workplace
 from tests.soak import sources
-from world.atomic_files import write_whole
+from world.files import write_whole
 
 TARGET = Path("runs") / "mutations.json"
 # Share of the mutants that may survive: some change nothing that anyone could see.

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_geometry import judge_geometry
 from planfly.airframe import load_airframe

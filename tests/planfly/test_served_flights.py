@@ -8,12 +8,11 @@ import pytest
 
 from flight.live.arming import ACCEPTED, ArmingState
 from flight.live.flight_process import JudgeMission
-from flight.live.status_text import CRITICAL, INFO, WARNING
+from flight.live.telemetry import CRITICAL, INFO, WARNING
 from flight.mission.items import Command, Frame, Mission, MissionItem
 from logs.recording.reader import read_log
 from logs.verdict.findings import Finding, Verdict
-from logs.verdict.levels import DecidingParameter
-from logs.verdict.places import Place
+from logs.verdict.places import DecidingParameter, Place
 from planfly.served_flights import ServedFlights, ServeOptions, open_served, verdict_texts
 from tests.logs.made_flight import make_track
 from tests.planfly.conftest import FIELD

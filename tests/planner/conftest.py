@@ -6,7 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from aircraft.path_limits import Limits
-from flight.simulation.flight_setup import make_limits as limits_with
+from flight.simulation.setup import make_limits as limits_with
 from planner.evaluation.problem import Problem, make_problem
 from tests.setups import falling_envelope, small_scenario
 from world.scenario import Scenario

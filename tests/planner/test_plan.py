@@ -6,13 +6,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
-from planner.plan import Certificate, Objective, Plan, Violation, parse_plan, plan_json, read_plan
+from planner.plan import Certificate, Objective, Plan, Violation, parse_plan, plan_html, plan_json, read_plan
 from tests.setups import small_scenario
 from world.errors import MissionError, PlanflyError, ScenarioError
+from world.scenario import load_scenario
 
 CERTIFICATE = Certificate(0.1, 20.0, 0.2, 9.0, 10.0, 50.0, ())
 
@@ -154,3 +156,61 @@ def test_what_is_known_of_zones_and_height_comes_back_and_nothing_of_it_is_writt
     text = plan_json(made(certificate=certificate))
     assert json.loads(text)["certificate"]["zone_distance_m"] == -3.5
     assert parse_plan(text, "plan.json").certificate == certificate
+
+
+# ----------------------------------------------------------------------
+# A plan on a terminal's one line, and as a notebook shows it.
+
+CERTIFICATE_OF_PLAN_TABLE = Certificate(np.radians(5.0), np.inf, np.radians(1.25), 9.04, 10.0, 51.0, ())
+
+
+@pytest.fixture(scope="module")
+def plan() -> Plan:
+    scenario = load_scenario("tight")
+    path = np.stack([scenario.start, scenario.destination])
+    return Plan(
+        scenario,
+        path,
+        np.zeros(4),
+        np.array([1.25, 0, 0, 0]),
+        CERTIFICATE_OF_PLAN_TABLE,
+        7,
+        "umda",
+        60,
+        np.zeros((0, 3)),
+    )
+
+
+def test_a_plan_prints_in_a_line(plan: Plan) -> None:
+    assert repr(plan) == "<Plan tight: 2 waypoints, safe, 1.2500 times straight>"
+
+
+@pytest.mark.parametrize(
+    ("change", "state"),
+    [
+        ({}, "safe"),
+        ({"kill_distance": -1.0}, "feasible, but inside a missile's reach"),
+        ({"problems": ("slope: 9°",)}, "not feasible"),
+    ],
+)
+def test_its_state_is_said_in_words(plan: Plan, change: dict[str, object], state: str) -> None:
+    assert replace(plan, certificate=replace(CERTIFICATE_OF_PLAN_TABLE, **change)).state == state  # type: ignore[arg-type]
+
+
+def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
+    page = ElementTree.fromstring(plan._repr_html_())
+    rows = {row[0].text: row[1].text for row in page.find("table/tbody") or ()}
+    assert page.findtext("strong") == "Plan tight: safe"
+    assert rows["length / straight line"] == "1.2500"
+    assert rows["clearance to spare"] == "9.0 m"
+    assert rows["outside missiles' reach by"] == "51 m"
+    assert rows["turns and slopes to spare"] == "5.0°, 1.25°"
+    assert rows["algorithm, seed"] == "umda, 7"
+
+
+def test_problems_are_named_and_no_missile_is_told_so(plan: Plan) -> None:
+    text = plan_html(
+        replace(plan, certificate=replace(CERTIFICATE_OF_PLAN_TABLE, kill_distance=np.inf, problems=("slope: 9°",)))
+    )
+    assert "<td>fails</td><td>slope: 9°</td>" in text
+    assert "<td>none</td>" in text

@@ -70,7 +70,7 @@ def meet(kind: str, seed: int | None) -> dict[str, Any]:
     Path(name).write_bytes(data if seed is None else hostile(kind, data, seed))
     said, trace = io.StringIO(), ""
     begun = time.process_time()
-    forked = mock.patch("flight.dynamics.model_trial.subprocess.run", run_in_fork)
+    forked = mock.patch("flight.dynamics.model_check.subprocess.run", run_in_fork)
     with forked, contextlib.redirect_stderr(said), contextlib.redirect_stdout(io.StringIO()):
         try:
             code = main(argv)

@@ -8,7 +8,7 @@ import pytest
 
 import world.errors
 from planfly.cli import main
-from planfly.commands import scenarios
+from planfly.commands import shell as scenarios
 from world.errors import (
     FlightError,
     LogError,

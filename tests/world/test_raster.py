@@ -1,4 +1,4 @@
-"""Every format of elevation file reads the same heights at the same places."""
+"""An .npz file that is odd, damaged or too large is refused in one line."""
 
 import hashlib
 import math
@@ -8,6 +8,7 @@ import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +26,8 @@ from tests.world.made.elevation_files import (
     NORTH,
     PITCH,
     ROWS,
+    WEST,
+    assert_refused,
     from_origin,
     made_ground,
     made_tile,
@@ -40,6 +43,44 @@ from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import open_raster, read_terrain, tile_bounds
 
 Floats = NDArray[np.float64]
+
+
+@pytest.mark.parametrize(
+    ("changes", "match"),
+    [
+        ({"ymax": None}, "ymax: missing"),
+        ({"elevation": None}, "elevation: missing"),
+        ({"elevation": np.zeros(9)}, "2-D"),
+        ({"elevation": np.zeros((1, 9))}, "2-D"),
+        ({"elevation": np.array([["a", "b"], ["c", "d"]])}, "2-D"),
+        ({"elevation": np.zeros((3, 3), dtype=complex)}, "2-D"),
+        ({"elevation": np.array([[{}, {}], [{}, {}]])}, "not a readable"),  # a pickle
+        ({"xmin": np.nan}, "degrees"),
+        ({"xmin": WEST + 1.0, "xmax": WEST + 1.0}, "degrees"),
+        ({"ymax": 460.0}, "degrees"),
+        ({"xmin": np.zeros(4)}, "not a readable"),
+        ({"xmin": "west"}, "not a readable"),
+    ],
+)
+def test_odd_npz_files(changes: dict[str, Any], match: str, tmp_path: Path) -> None:
+    assert_refused(write_npz(tmp_path / "t.npz", **changes), match)
+
+
+def test_damaged_and_bloated_npz(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = write_npz(tmp_path / "t.npz")
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    (tmp_path / "bad.npz").write_bytes(data)
+    assert_refused(tmp_path / "bad.npz", "not a readable")
+    (tmp_path / "half.npz").write_bytes(data[: len(data) // 2])
+    assert_refused(tmp_path / "half.npz", "not a readable")
+    monkeypatch.setattr("world.raster.MOST_PIXELS", 1_000_000)
+    np.savez_compressed(tmp_path / "bomb.npz", elevation=np.zeros((1001, 1000)), xmin=0, xmax=1, ymin=0, ymax=1)
+    assert_refused(tmp_path / "bomb.npz", "unpacked: at most")
+
+
+# ----------------------------------------------------------------------
+# Every format of elevation file reads the same heights at the same places.
 
 
 WRITERS: dict[str, tuple[Callable[[Path], Path], float]] = {

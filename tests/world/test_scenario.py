@@ -1,17 +1,164 @@
-"""Scenarios: positions, terrain, defaults taken from the tile, and the way through JSON and back."""
+"""Positions of a scenario file: in metres or degrees, above the sea or above the ground, inside the area."""
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tests.world.made.made_scenario import made_spec, same_scenario
+from tests.world.made.made_scenario import THREAT, made_spec, refused, same_scenario, with_fault
 from world.errors import ScenarioError, TerrainError
 from world.frames import GeoOrigin, to_geo
-from world.scenario import embedded_names, embedded_scenarios, from_spec, load_scenario
+from world.scenario import (
+    Scenario,
+    check_inside,
+    embedded_names,
+    embedded_scenarios,
+    fixed_ends,
+    from_spec,
+    load_scenario,
+    make_threats,
+    map_position,
+    over_terrain,
+    with_flight,
+    with_planner,
+    with_threats,
+    with_wind,
+    with_zones,
+)
+from world.scenario_tables import PointTable, ThreatTable, ZoneTable
+from world.terrain import Terrain, gridded
+
+ORIGIN = GeoOrigin(46.0, 8.0)
+BOUNDS = np.array([[-1000.0, 1000.0], [-2000.0, 2000.0]])
+
+
+def ramp() -> Terrain:
+    """Ground that is 200 m high at east 0 and rises by 0.1 m a metre to the east."""
+    east, north = np.linspace(-3000.0, 3000.0, 7), np.linspace(-3000.0, 3000.0, 7)
+    heights = np.tile(200.0 + 0.1 * east, (7, 1))
+    return gridded(heights, east, north, source="ramp", sha256="", datum="mean sea level")
+
+
+def placed(ground: Terrain | None, **table: Any) -> list[float]:
+    return map_position(PointTable(**table), "start", "s.toml", ORIGIN, ground).tolist()
+
+
+def test_heights_count_from_the_sea_or_from_the_ground() -> None:
+    assert placed(ramp(), east_m=500.0, north_m=-40.0, amsl_m=90.0) == [500.0, -40.0, 90.0]
+    assert placed(ramp(), east_m=500.0, north_m=-40.0, height_m=90.0) == pytest.approx([500.0, -40.0, 340.0])
+    assert placed(ramp(), east_m=-500.0, north_m=-40.0) == pytest.approx([-500.0, -40.0, 150.0])
+
+
+def test_degrees_come_to_the_map() -> None:
+    assert placed(None, lat_deg=46.0, lon_deg=8.0, amsl_m=5.0) == pytest.approx([0.0, 0.0, 5.0], abs=1e-6)
+    # A degree of latitude at 46 degrees on WGS84 is 111.15 km, one of longitude 77.46 km.
+    east, north, _ = placed(None, lat_deg=46.01, lon_deg=8.01, amsl_m=5.0)
+    assert (east, north) == pytest.approx((774.6, 1111.5), abs=0.5)
+    # Degrees of zero are degrees too.
+    here = map_position(PointTable(lat_deg=0.0, lon_deg=0.0, amsl_m=1.0), "start", "s", GeoOrigin(0.0, 0.0), None)
+    assert here.tolist() == pytest.approx([0.0, 0.0, 1.0], abs=1e-6)
+
+
+@pytest.mark.parametrize(("ground", "east"), [(None, 0.0), (ramp(), 9000.0)])
+def test_a_height_needs_ground_to_count_from(ground: Terrain | None, east: float) -> None:
+    message = rf"^s\.toml: start: east {east:.0f} m, north 0 m: no terrain there .*; give amsl_m$"
+    with pytest.raises(ScenarioError, match=message):
+        placed(ground, east_m=east, north_m=0.0, height_m=50.0)
+    assert placed(ground, east_m=east, north_m=0.0, amsl_m=50.0) == [east, 0.0, 50.0]
+
+
+@pytest.mark.parametrize(
+    ("point", "message"),
+    [
+        ((1000.0, 2000.0, 301.0), ""),
+        ((-1000.0, -2000.0, 500.0), ""),
+        ((1000.1, 0.0, 400.0), "east 1000 m: outside the area -1000..1000"),
+        ((-1000.1, 0.0, 400.0), "east -1000 m: outside the area -1000..1000"),
+        ((0.0, 2000.1, 400.0), "north 2000 m: outside the area -2000..2000"),
+        ((0.0, math.nan, 400.0), "north nan m: outside the area"),
+        ((0.0, 0.0, 149.0), "149 m AMSL: outside floor..ceiling 150..500"),
+        ((0.0, 0.0, 501.0), "501 m AMSL: outside floor..ceiling 150..500"),
+        ((0.0, 0.0, math.nan), "nan m AMSL: outside floor..ceiling"),
+        ((500.0, 0.0, 249.9), "250 m AMSL: not above the terrain, which is at 250 m"),
+        ((500.0, 0.0, 250.1), ""),
+    ],
+)
+def test_ends_stand_in_the_area_between_floor_and_ceiling_above_the_ground(
+    point: tuple[float, float, float], message: str
+) -> None:
+    def check() -> None:
+        check_inside("start", np.array(point), "s.toml", BOUNDS, 150.0, 500.0, ramp())
+
+    if not message:
+        check()
+        return
+    with pytest.raises(ScenarioError) as caught:
+        check()
+    assert str(caught.value).startswith(f"s.toml: start: {message}")
+
+
+def test_threats_stand_on_the_ground_unless_they_give_a_height() -> None:
+    here = {"east_m": 1000.0, "north_m": 0.0}
+    missile, radar = (
+        {"kill_radius_m": 700.0, "kill_scale_m": 70.0},
+        {"detection_radius_m": 9.0, "detection_scale_m": 3.0},
+    )
+    tables = [
+        ThreatTable(**here, **missile),
+        ThreatTable(**here, **radar, name="tall", height_m=25.0),
+        ThreatTable(**here, **missile, **radar, amsl_m=12.0),
+    ]
+    threats = make_threats(tables, "s.toml", ORIGIN, ramp())
+    assert threats.names == ("threat 1", "tall", "threat 3")
+    assert threats.position.tolist() == [
+        pytest.approx([1000.0, 0.0, 300.0]),
+        pytest.approx([1000.0, 0.0, 325.0]),
+        [1000.0, 0.0, 12.0],
+    ]
+    assert threats.kill_radius.tolist() == [700.0, 0.0, 700.0]
+    assert threats.kill_scale.tolist() == [70.0, 0.0, 70.0]
+    assert threats.detection_radius.tolist() == [0.0, 9.0, 9.0]
+    assert threats.detection_scale.tolist() == [0.0, 3.0, 3.0]
+    with pytest.raises(ScenarioError, match=r"^s\.toml: threats\[1\]: .*no terrain there"):
+        make_threats([tables[2], tables[0]], "s.toml", ORIGIN, None)
+
+
+# What is replaced in the small file or appended to it, and what the line must say.
+CASES: dict[str, tuple[str, str, str]] = {
+    "ceiling under the start": (
+        "[start]",
+        "ceiling_amsl_m = 350\n[start]",
+        "start: 400 m AMSL: outside floor..ceiling",
+    ),
+    "floor above the start": (
+        "[start]",
+        "floor_amsl_m = 450\n[start]",
+        "start: 400 m AMSL: outside floor..ceiling 450..",
+    ),
+    "start outside the map": ("east_m = -4000", "east_m = -5001", "start: east -5001 m: outside the area -5000..5000"),
+    "destination outside": ("east_m = 4000", "east_m = 6000", "destination: east 6000 m: outside the area"),
+    "start under terrain": (
+        "amsl_m = 400",
+        "amsl_m = 150",
+        "start: 150 m AMSL: not above the terrain, which is at 200 m",
+    ),
+    "start on terrain": ("amsl_m = 400", "height_m = 0", "start: 200 m AMSL: not above the terrain"),
+    "a threat off the terrain": ("", THREAT.replace("900", "90000"), "threats[0]: east 0 m, north 90000 m: no terrain"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_one_fault_one_line(case: str, tmp_path: Path) -> None:
+    old, new, wanted = CASES[case]
+    assert wanted in refused(tmp_path, with_fault(old, new))
+
+
+# ----------------------------------------------------------------------
+# Scenarios: positions, terrain, defaults taken from the tile, and the way through JSON and back.
 
 
 def test_positions_and_heights() -> None:
@@ -164,3 +311,96 @@ def test_tiles_that_no_map_can_hold(tmp_path: Path) -> None:
         spec = {"name": name, "terrain": {"kind": "dem", "path": f"{name}.npz"}, **ends}
         with pytest.raises((ScenarioError, TerrainError), match=match):
             from_spec(spec, "x", base=tmp_path)
+
+
+# ----------------------------------------------------------------------
+# A changed scenario is one that a file may have, and goes through JSON and back.
+
+
+@pytest.fixture
+def scenario() -> Scenario:
+    return from_spec(made_spec(), "made")
+
+
+def test_another_wind_is_one_that_a_file_may_have(scenario: Scenario) -> None:
+    windy = with_wind(scenario, 11.0, math.radians(30.0), "moderate")
+    assert (windy.wind.speed, windy.wind.turbulence, windy.wind.gradient) == (11.0, "moderate", 0.01)
+    assert windy.wind.from_course == pytest.approx(math.radians(30.0))
+    assert same_scenario(from_spec(windy.to_json(), "again"), windy)
+    assert same_scenario(with_wind(scenario, None, None, None), scenario)
+    assert with_wind(scenario, None, None, "none").wind.speed == 6.0
+    # What a file may not say, an option may not either: the log could not be read back.
+    for speed, course, turbulence, match in (
+        (99.0, 0.0, None, "wind: speed_mps: 99.0: allowed 0..40"),
+        (math.nan, 0.0, None, "wind: speed_mps: nan: allowed 0..40"),
+        (5.0, 99.0, None, "wind: from_deg: .*: allowed -360..360"),
+        (None, None, "severe", 'wind: turbulence: "severe"'),
+    ):
+        with pytest.raises(ScenarioError, match=match):
+            with_wind(scenario, speed, course, turbulence)
+
+
+def test_other_entries_of_flight_and_planner(scenario: Scenario) -> None:
+    fast = with_flight(scenario, airspeed_mps=30.0, guidance=None)
+    assert fast.flight == scenario.flight.model_copy(update={"airspeed_mps": 30.0})
+    assert same_scenario(from_spec(fast.to_json(), "again"), fast)
+    seeded = with_planner(scenario, "--seed", seed=9)
+    assert seeded.planner == scenario.planner.model_copy(update={"seed": 9})
+    assert same_scenario(from_spec(seeded.to_json(), "again"), seeded)
+    with pytest.raises(ScenarioError, match=r"made: flight: airspeed_mps: 7\.0: allowed 15\.\.60"):
+        with_flight(scenario, airspeed_mps=7.0)
+    with pytest.raises(ScenarioError, match=r"--seed: seed: -1: allowed 0\.\."):
+        with_planner(scenario, "--seed", seed=-1)
+
+
+def test_more_threats_stand_on_the_ground_with_the_scales_of_the_others(scenario: Scenario) -> None:
+    more = with_threats(scenario, [(500.0, -300.0, 250.0, 0.0), (0.0, 600.0, 0.0, 900.0)], "--threat")
+    assert more.threats.names[-2:] == ("pop-up 1", "pop-up 2")
+    assert more.terrain is not None
+    for place in more.threats.position[-2:]:
+        assert place[2] == pytest.approx(float(more.terrain.height(place[0], place[1])))
+    # The medians of 100 / 400 and 2 / 1, and of 2 / 1.
+    assert more.threats.kill_scale[-2:].tolist() == pytest.approx([250.0 * 1.125, 0.0])
+    assert more.threats.detection_scale[-2:].tolist() == pytest.approx([0.0, 1800.0])
+    assert same_scenario(from_spec(more.to_json(), "again"), more)
+    with pytest.raises(ScenarioError, match=r"--threat: kill_radius_m: -5\.0: allowed above 0"):
+        with_threats(scenario, [(0.0, 0.0, -5.0, 0.0)], "--threat")
+
+
+def test_ends_keep_their_heights_above_the_sea_whatever_is_below() -> None:
+    before = load_scenario("jacksboro")
+    ends = fixed_ends(before.to_json(), before.start, before.destination)
+    assert [ends[key]["amsl_m"] for key in ("start", "destination")] == [before.start[2], before.destination[2]]
+    assert not any("height_m" in ends[key] for key in ("start", "destination"))
+    after = over_terrain(before, "jacksboro")
+    assert np.array_equal(after.start, before.start)
+    assert np.array_equal(after.destination, before.destination)
+    assert np.array_equal(after.bounds, before.bounds)
+
+
+@pytest.mark.parametrize(("radius", "held"), [(995.0, False), (1005.0, True)])
+def test_more_zones_hold_no_end_but_of_a_scenario_made_around_a_mission(
+    scenario: Scenario, radius: float, held: bool
+) -> None:
+    """A cylinder 1 km beside the start, as wide as nearly that, or a little more."""
+    east, north = float(scenario.start[0]), float(scenario.start[1]) + 1000.0
+    tables = [ZoneTable(name="mill", kind="exclusion", east_m=east, north_m=north, radius_m=radius)]
+    external = replace(scenario, external=True)
+    made = with_zones(external, tables, "mills.geojson")
+    assert [zone.name for zone in made.zones] == ["mill"]
+    again = from_spec(made.to_json(), "a log", ground=made.terrain, external=True)
+    assert again.zones == made.zones
+    if held:
+        with pytest.raises(ScenarioError, match=r"mills\.geojson: zones: mill: start lies inside"):
+            with_zones(scenario, tables, "mills.geojson")
+    else:
+        assert with_zones(scenario, tables, "mills.geojson").zones == made.zones
+
+
+def test_zones_are_counted_with_those_that_are_there(scenario: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("world.scenario.MOST_ZONES", 2)
+    tables = [ZoneTable(name="mill", kind="exclusion", east_m=9000.0, north_m=9000.0, radius_m=5.0)]
+    two = with_zones(with_zones(scenario, tables, "a"), tables, "b")
+    assert len(two.zones) == 2
+    with pytest.raises(ScenarioError, match="c: 1 zones more: at most 2 in all"):
+        with_zones(two, tables, "c")

@@ -1,14 +1,317 @@
 """Files of zones, GeoJSON and KML, as the tables that a scenario file would have them in."""
 
-from collections.abc import Sequence
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
-from world.airspace.geojson_zones import geojson_zones
-from world.airspace.kml_zones import kml_zones
-from world.airspace.zone_tables import MOST_ZONES, ZoneTable
+from world.airspace.zones import holes_lie_inside
 from world.errors import ScenarioError
 from world.scenario_file import checked_table
+from world.scenario_tables import MOST_ZONES, ZoneTable
+
+# ----------------------------------------------------------------------
+# What files of zones say beside their shapes: kind, floor and ceiling, as entries of a [[zones]] table.
+
+# Keys that mean what they mean in a scenario file.
+_OWN = ("kind", "floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
+# A property that begins so and is none of ours, nor another's that is read, may be one of ours misspelt.
+_LIKE_OURS = ("floor", "ceiling", "radius")
+# openAIP's limits: the API's keys and numbers, and the keys and names of its converters from OpenAir and AIXM.
+# https://docs.openaip.net, and the results in https://github.com/openAIP/openaip-openair-parser
+_LIMITS = {"lowerLimit": "floor", "lowerCeiling": "floor", "upperLimit": "ceiling", "upperCeiling": "ceiling"}
+_UNITS = {0: 1.0, "M": 1.0, 1: 0.3048, "FT": 0.3048, 6: 30.48, "FL": 30.48}
+_DATUMS = {0: "agl", "GND": "agl", 1: "amsl", "MSL": "amsl", 2: "standard", "STD": "standard"}
+# m.  A flight level is a pressure, not a height: between a low of 965 hPa and a high of 1,060 at the sea it lies up to
+# this far below or above where it is at 1,013.25 hPa (27 ft per hPa, ICAO Doc 7488).
+FLIGHT_LEVEL_ERROR = 400.0
+
+
+def zone_entries(properties: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Entries of a [[zones]] table that a zone's properties state; an exclusion where no kind is stated.
+
+    A flight level bounds an exclusion by the height that it is within `FLIGHT_LEVEL_ERROR` of, on the safe side.
+    Raises ScenarioError for a limit that is none, for a flight level of an inclusion, and for a property that looks
+    like one of ours and is not.
+
+    >>> zone_entries({"lowerLimit": {"value": 0, "unit": 1, "referenceDatum": 0}, "ceiling_agl_m": 90.0}, "a file")
+    {'kind': 'exclusion', 'ceiling_agl_m': 90.0}
+    """
+    entries: dict[str, Any] = {"kind": "exclusion"}
+    for key, value in properties.items():
+        if value is None:
+            continue
+        if key in _LIMITS:
+            entries |= _limit(value, key, properties.get("kind"), source)
+        elif key in _OWN:
+            entries[key] = value
+        elif key.lower().startswith(_LIKE_OURS):
+            raise ScenarioError.at(source, key, value, f"unknown; known are {', '.join(_OWN)}", shown="")
+    return entries
+
+
+def _limit(value: Any, key: str, kind: Any, source: str) -> dict[str, float]:
+    """The entry that one of openAIP's limits comes to; none for the ground as a floor."""
+    if not isinstance(value, dict):
+        allowed = "a table of value, unit and referenceDatum is expected"
+        raise ScenarioError.at(source, key, value, allowed, shown="")
+    height, unit, datum = value.get("value"), value.get("unit"), value.get("referenceDatum")
+    if isinstance(height, bool) or not isinstance(height, int | float):
+        raise ScenarioError.at(source, f"{key}.value", height, "a number is expected", shown="")
+    # A list, say, is not even looked for.
+    if not isinstance(unit, int | str) or unit not in _UNITS:
+        allowed = f"allowed {', '.join(map(str, _UNITS))}"
+        raise ScenarioError.at(source, f"{key}.unit", unit, allowed, shown="")
+    if not isinstance(datum, int | str) or datum not in _DATUMS:
+        allowed = f"allowed {', '.join(map(str, _DATUMS))}"
+        raise ScenarioError.at(source, f"{key}.referenceDatum", datum, allowed, shown="")
+    side, metres, counted = _LIMITS[key], round(height * _UNITS[unit], 3), _DATUMS[datum]
+    if side == "floor" and counted == "agl" and metres <= 0.0:
+        return {}
+    if counted == "standard" or _UNITS[unit] == _UNITS["FL"]:
+        if kind == "inclusion":
+            allowed = "a flight level bounds no inclusion; give a height in metres"
+            raise ScenarioError.at(source, key, value, allowed, shown="")
+        # Beyond the heights that a table takes there is no flight to bound.
+        wider = metres + (FLIGHT_LEVEL_ERROR if side == "ceiling" else -FLIGHT_LEVEL_ERROR)
+        return {f"{side}_amsl_m": min(9000.0, max(-500.0, wider))}
+    return {f"{side}_{counted}_m": metres}
+
+
+# ----------------------------------------------------------------------
+# Zones of a GeoJSON file (RFC 7946): polygons, multipolygons with their holes, and points with a radius.
+
+# Names of the CRS that the older GeoJSON of 2008 may state and that means longitude and latitude on WGS84.
+_DEGREES = ("CRS84", "4326")
+
+
+def geojson_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Where each zone stands in a file, and its entries as a [[zones]] table has them.
+
+    A multipolygon is one zone of several parts.  Raises ScenarioError for what is no GeoJSON, and for a geometry that
+    is no zone.
+
+    >>> square = '{"type": "Polygon", "coordinates": [[[8, 46], [8.01, 46], [8.01, 46.01], [8, 46]]]}'
+    >>> [(where, entries["name"], len(entries["rings_deg"][0])) for where, entries in geojson_zones(square, "a file")]
+    [('geometry (zone 1)', 'zone 1', 4)]
+    """
+    try:
+        data = json.loads(text, parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        raise ScenarioError(f"{source}: not valid JSON: {str(error).splitlines()[0]}", file=source) from error
+    if not isinstance(data, dict):
+        raise ScenarioError(f"{source}: a GeoJSON object is expected, got {type(data).__name__}", file=source)
+    _check_crs(data, source)
+    kind = data.get("type")
+    if kind == "FeatureCollection":
+        features = data.get("features")
+        if not isinstance(features, list):
+            raise ScenarioError(f"{source}: features: a list is expected", file=source, field="features")
+        for k, feature in enumerate(features):
+            yield _geojson_zone(feature, f"features[{k}]", k, source)
+    elif kind == "Feature":
+        yield _geojson_zone(data, "feature", 0, source)
+    else:
+        yield _geojson_zone({"type": "Feature", "geometry": data}, "geometry", 0, source)
+
+
+def _no_number(name: str) -> float:
+    raise ValueError(f"{name} is no number of JSON")
+
+
+def _check_crs(data: dict[str, Any], source: str) -> None:
+    """Raise ScenarioError for coordinates of another kind than longitude and latitude."""
+    crs = data.get("crs")
+    if crs is None:
+        return
+    properties = crs.get("properties") if isinstance(crs, dict) else None
+    name = properties.get("name") if isinstance(properties, dict) else None
+    if not (isinstance(name, str) and name.endswith(_DEGREES)):
+        raise ScenarioError(
+            f"{source}: crs: coordinates are longitude and latitude on WGS84 (RFC 7946)", file=source, field="crs"
+        )
+
+
+def _geojson_zone(feature: Any, where: str, number: int, source: str) -> tuple[str, dict[str, Any]]:
+    if not isinstance(feature, dict) or feature.get("type") != "Feature":
+        raise ScenarioError(f"{source}: {where}: a Feature is expected", file=source, field=where)
+    properties, geometry = feature.get("properties"), feature.get("geometry")
+    properties = properties if isinstance(properties, dict) else {}
+    name = properties.get("name") or f"zone {number + 1}"
+    label = f"{where} ({name})" if isinstance(name, str) and name.isprintable() else where
+    geometry = geometry if isinstance(geometry, dict) else {}
+    kind = geometry.get("type")
+    coordinates: Any = geometry.get("coordinates")
+    entries: dict[str, Any] = {"name": name, **zone_entries(properties, f"{source}: {label}")}
+    try:
+        if kind == "Point":
+            lat, lon = _corner(coordinates)
+            if "radius_m" not in entries:
+                message = f"{source}: {label}: radius_m: missing; a point is the centre of a cylinder"
+                raise ScenarioError(message, file=source, field="radius_m")
+            return label, entries | {"lat_deg": lat, "lon_deg": lon}
+        if kind == "Polygon":
+            coordinates, kind = [coordinates], "MultiPolygon"
+        if kind == "MultiPolygon":
+            parts = [_rings(part) for part in coordinates]
+            if not all(holes_lie_inside(part) for part in parts if part):
+                message = f"{source}: {label}: coordinates: a hole lies outside its outline"
+                raise ScenarioError(message, file=source, field="coordinates")
+            rings = [[list(corner) for corner in ring] for part in parts for ring in part]
+            return label, entries | {"rings_deg": rings}
+    except (TypeError, ValueError, IndexError) as error:
+        allowed = "lists of [longitude, latitude] are expected"
+        message = f"{source}: {label}: coordinates: {allowed}"
+        raise ScenarioError(message, file=source, field="coordinates", allowed=allowed) from error
+    allowed = "a Polygon, MultiPolygon or Point is expected"
+    message = f"{source}: {label}: geometry {json.dumps(kind)[:40]}: {allowed}"
+    raise ScenarioError(message, file=source, field="geometry", value=kind, allowed=allowed)
+
+
+def _rings(coordinates: Any) -> list[list[tuple[float, float]]]:
+    """Rings of (latitude, longitude) of a polygon's coordinates."""
+    return [[_corner(corner) for corner in ring] for ring in coordinates]
+
+
+def _corner(coordinates: Any) -> tuple[float, float]:
+    """Latitude and longitude of a position, whose height, if it has one, says nothing of a zone."""
+    if not isinstance(coordinates, list) or not all(type(value) in (int, float) for value in coordinates):
+        raise TypeError("no position")
+    lon, lat = coordinates[0], coordinates[1]
+    return lat, lon
+
+
+# ----------------------------------------------------------------------
+# Zones of a KML file (OGC 07-147r2): placemarks with polygons, and with a point and a radius.
+
+# The names of KML 2.0 to 2.2 stand in several namespaces, which nothing of ours needs to tell apart.
+_Element = ElementTree.Element
+# m.  Corners of one level differ by no more.
+_LEVEL = 0.5
+_NUMBERS = ("floor_amsl_m", "floor_agl_m", "ceiling_amsl_m", "ceiling_agl_m", "radius_m")
+
+
+def kml_zones(text: str, source: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Where each zone stands in a file, and its entries as a [[zones]] table has them.
+
+    An extruded polygon is a zone up to its height, as `altitudeMode` counts it; one that is clamped to the ground has
+    no ceiling.  ExtendedData states kind, floors, ceilings and radii by the keys of a scenario file.  Raises
+    ScenarioError for what is no KML, and for a placemark that is no zone.
+
+    >>> ring = "<coordinates>8,46 8.01,46 8.01,46.01</coordinates>"
+    >>> ring = f"<outerBoundaryIs><LinearRing>{ring}</LinearRing></outerBoundaryIs>"
+    >>> text = f"<kml><Placemark><name>lake</name><Polygon>{ring}</Polygon></Placemark></kml>"
+    >>> [(where, len(entries["rings_deg"][0])) for where, entries in kml_zones(text, "a file")]
+    [('Placemark 1 (lake)', 3)]
+    """
+    # Entities may name other files, and grow a small file without end: KML has no use of them.
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ScenarioError(f"{source}: a document type is declared: not allowed in a file of zones", file=source)
+    try:
+        root = ElementTree.fromstring(text)  # what could grow was refused above
+    except (ElementTree.ParseError, ValueError) as error:
+        raise ScenarioError(f"{source}: not valid XML: {str(error).splitlines()[0]}", file=source) from error
+    if _tag(root) != "kml":
+        raise ScenarioError(f"{source}: a <kml> element is expected", file=source)
+    for number, placemark in enumerate((element for element in root.iter() if _tag(element) == "Placemark"), 1):
+        name = _kml_text(placemark, "name") or f"zone {number}"
+        label = f"Placemark {number}" + (f" ({name})" if name.isprintable() else "")
+        yield label, {"name": name, **_kml_zone(placemark, f"{source}: {label}")}
+
+
+def _tag(element: _Element) -> str:
+    return element.tag.rpartition("}")[2]
+
+
+def _all(element: _Element, tag: str) -> list[_Element]:
+    return [child for child in element.iter() if _tag(child) == tag]
+
+
+def _kml_text(element: _Element, tag: str) -> str:
+    """Text of an element's own child of this name; "" for none."""
+    return next(((child.text or "").strip() for child in element if _tag(child) == tag), "")
+
+
+def _kml_zone(placemark: _Element, source: str) -> dict[str, Any]:
+    entries = zone_entries(_extended(placemark, source), source)
+    polygons, points = _all(placemark, "Polygon"), _all(placemark, "Point")
+    if not polygons:
+        if len(points) != 1 or "radius_m" not in entries:
+            raise ScenarioError(
+                f"{source}: a Polygon is expected, or a Point with radius_m in its ExtendedData", file=source
+            )
+        ((lon, lat, _),) = _coordinates(points[0], source)[:1] or [(math.nan, math.nan, 0.0)]
+        return entries | {"lat_deg": lat, "lon_deg": lon}
+    rings, ceilings = [], set()
+    for polygon in polygons:
+        corners = []
+        for boundary in (*_all(polygon, "outerBoundaryIs"), *_all(polygon, "innerBoundaryIs")):
+            ring = _coordinates(boundary, source)
+            rings.append([[lat, lon] for lon, lat, _ in ring])
+            corners += ring
+        ceilings.add(_ceiling(polygon, [up for _, _, up in corners], source))
+    if len(ceilings) > 1:
+        raise ScenarioError(
+            f"{source}: its polygons have different heights: give each a placemark of its own", file=source
+        )
+    key, height = ceilings.pop()
+    stated = any(side in entries for side in ("ceiling_amsl_m", "ceiling_agl_m"))
+    return {"rings_deg": rings, **({key: height} if key and not stated else {}), **entries}
+
+
+def _ceiling(polygon: _Element, ups: list[float], source: str) -> tuple[str, float]:
+    """The key of a polygon's ceiling and its height, m; ("", 0) where it has none."""
+    mode = _kml_text(polygon, "altitudeMode") or "clampToGround"
+    if mode == "clampToGround":
+        return "", 0.0
+    key = {"absolute": "ceiling_amsl_m", "relativeToGround": "ceiling_agl_m"}.get(mode)
+    if key is None:
+        allowed = "allowed clampToGround, relativeToGround, absolute"
+        message = f"{source}: altitudeMode {mode[:40]!r}: {allowed}"
+        raise ScenarioError(message, file=source, field="altitudeMode", value=mode, allowed=allowed)
+    if _kml_text(polygon, "extrude") not in ("1", "true"):
+        message = f"{source}: altitudeMode {mode} without extrude: a sheet in the air holds no airspace"
+        raise ScenarioError(message, file=source, field="altitudeMode", value=mode)
+    if not ups or max(ups) - min(ups) > _LEVEL:
+        raise ScenarioError(f"{source}: its corners have different heights: a zone has a level ceiling", file=source)
+    return key, ups[0]
+
+
+def _coordinates(element: _Element, source: str) -> list[tuple[float, float, float]]:
+    """Longitude, latitude and height of an element's positions."""
+    out = []
+    for coordinates in _all(element, "coordinates"):
+        for position in (coordinates.text or "").split():
+            try:
+                lon, lat, *rest = (float(part) for part in position.split(","))
+            except ValueError as error:
+                allowed = "lon,lat or lon,lat,up is expected"
+                message = f"{source}: coordinates {position[:40]!r}: {allowed}"
+                raise ScenarioError(
+                    message, file=source, field="coordinates", value=position, allowed=allowed
+                ) from error
+            out.append((lon, lat, rest[0] if rest else 0.0))
+    return out
+
+
+def _extended(placemark: _Element, source: str) -> dict[str, Any]:
+    """What a placemark's ExtendedData states: Data with a value, and SimpleData."""
+    stated = {str(one.get("name")): _kml_text(one, "value") for one in _all(placemark, "Data")}
+    stated |= {str(one.get("name")): (one.text or "").strip() for one in _all(placemark, "SimpleData")}
+    found: dict[str, Any] = {}
+    for key, value in stated.items():
+        if key in _NUMBERS:
+            try:
+                found[key] = float(value)
+            except ValueError as error:
+                shown = repr(value[:40])
+                raise ScenarioError.at(source, key, value, "a number is expected", shown=shown) from error
+        elif value:
+            found[key] = value
+    return found
+
 
 _READERS = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
 SUFFIXES = tuple(_READERS)

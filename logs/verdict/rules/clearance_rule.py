@@ -6,7 +6,7 @@ import numpy as np
 
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.path_sweeps import path_clearance
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import HEIGHT_ROUNDING

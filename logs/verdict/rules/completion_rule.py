@@ -3,7 +3,7 @@
 import numpy as np
 
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP

@@ -4,7 +4,7 @@ import math
 
 from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import ROUNDING
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.track import ROLL
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import MOST_BANK, SLOWEST, SLOWEST_SHARE

@@ -5,9 +5,9 @@ import math
 import numpy as np
 
 from aircraft.envelope import ground_speed
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_demands import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import RESERVE

@@ -7,10 +7,10 @@ included; that the corridor about it reaches further is told beside.
 import math
 from collections.abc import Callable
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
-from logs.verdict.measures.route_demands import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION

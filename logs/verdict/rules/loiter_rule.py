@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.tolerances import RADIUS_TOLERANCE

@@ -25,7 +25,7 @@ from flight.mission.items import (
     MissionItem,
     command_name,
 )
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Message, make_finding, message
 from logs.verdict.places import Place
 from logs.verdict.tolerances import (

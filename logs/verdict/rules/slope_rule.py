@@ -3,11 +3,9 @@
 import math
 
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.jogs import step
-from logs.verdict.measures.leg_fits import LegFit
-from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.measures.slopes import SlopeMeasure, measure_slope
-from logs.verdict.measures.tighter_limits import slope_limit, steep_arc
+from logs.verdict.measures.acceptance import step
+from logs.verdict.measures.route_requirements import RouteDemands, slope_limit, steep_arc
+from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.tolerances import (

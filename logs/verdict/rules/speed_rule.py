@@ -5,9 +5,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.ardupilot.speed_commands import takes_speed
+from flight.autopilots.arduplane.parameters import takes_speed
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import (

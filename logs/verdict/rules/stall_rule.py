@@ -16,7 +16,7 @@ from aircraft.envelope import GRAVITY
 from aircraft.path_limits import ROLL_TIME
 from flight.simulation.track import ROLL
 from logs.verdict.findings import Finding, make_finding, message
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import GUST_SHARE, STALL_MEAN, STALL_TOLERANCE

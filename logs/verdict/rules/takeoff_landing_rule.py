@@ -9,7 +9,7 @@ import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from logs.verdict.findings import Finding, make_finding, message
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.tolerances import PLAN_TOLERANCE
 
 # How the flight does it instead.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from logs.verdict.findings import Fact, Finding, make_finding
 from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.path_sweeps import SphereVisits, path_spheres
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from world.threats import Threats, threat_label

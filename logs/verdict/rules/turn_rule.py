@@ -2,12 +2,11 @@
 
 import math
 
-from flight.guidance.fly_by_path import SHARPEST
 from flight.guidance.navigation_error import ERRORS
+from flight.guidance.path import SHARPEST
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.jogs import jog
-from logs.verdict.measures.route_demands import RouteDemands
-from logs.verdict.measures.tighter_limits import turn_limit
+from logs.verdict.measures.acceptance import jog
+from logs.verdict.measures.route_requirements import RouteDemands, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.tolerances import (

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import Reach, reach
-from logs.verdict.measures.route_demands import RouteDemands
+from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
 

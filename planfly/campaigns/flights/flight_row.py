@@ -2,19 +2,131 @@
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
-from logs.verdict.findings import Finding, Verdict
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.route import Route
+from flight.simulation.track import Track
+from logs.verdict.findings import RULES, Finding, Verdict
+from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.places import Place
-from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.margin_scales import COUNTS, SCALES
-from planfly.campaigns.flights.narrow_passes import NarrowPass, narrow_passes
-from planfly.campaigns.flights.track_shape import clearance_profile, waypoint_crossings
-from planfly.campaigns.flights.varied_flight import GivenWind, vary
+from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, vary
 from planfly.campaigns.spread.draws import Draw, draw_flight
 from planfly.pipeline import fly_and_judge
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+
+
+# ----------------------------------------------------------------------
+# What a margin is measured by where flights are put in order, or a pass is called narrow; it decides no verdict.
+
+# Of each rule, a difference that a person would call noticeable, in the rule's unit.
+SCALES = dict.fromkeys(RULES, 10.0) | {
+    "turn": 5.0, "slope": 1.0, "clearance": 10.0, "height": 10.0, "speed": 1.0, "stall": 1.0, "energy": 50.0,
+    "waypoint": 10.0, "corridor": 10.0, "departure": 10.0, "completion": 1.0,
+}  # fmt: skip
+# Of a missile's sphere, by the distance outside it, m.
+SPHERE_SCALE = 10.0
+# Rules whose margin is a count or a time, and tells nothing of how close a flight was.
+COUNTS = ("completion", "threat", "mission", "takeoff", "landing", "turn")
+
+
+# ----------------------------------------------------------------------
+# Where a flight passed narrowly, and by how much: what tells more of the risk than that it did not fail.
+#
+# A narrow pass is one with less room than the rule's scale (`planfly.campaigns.flights.flight_row`).  The room is
+# that to where the rule fails, its tolerance counted; of a missile it is the distance outside its sphere.
+
+# Rule, place, and room as a share of the rule's scale, 0 to 1.
+NarrowPass = tuple[str, Place, float]
+
+
+def narrow_passes(findings: Iterable[Finding], scenario: Scenario, track: Track) -> tuple[NarrowPass, ...]:
+    """Rule, place and room of each narrow pass of a flight, the verdict's order, then missiles.
+
+    Where a rule passes what lies beyond its limit, for reasons of its own, the room is 0.
+    """
+    room: dict[tuple[str, Place], float] = {}
+    failed = {(item.rule, item.place) for item in findings if item.ok is False}
+    for item in findings:
+        at = item.rule, item.place
+        if at in failed or not item.ok or item.margin is None or item.rule in COUNTS:
+            continue
+        share = max(0.0, item.margin + (item.tolerance or 0.0)) / SCALES[item.rule]
+        if share < 1.0:
+            room[at] = min(share, room.get(at, share))
+    for place, distance in _outside_spheres(scenario, track):
+        if ("threat", place) not in failed and distance < SPHERE_SCALE:
+            room["threat", place] = max(0.0, distance) / SPHERE_SCALE
+    return tuple((rule, place, share) for (rule, place), share in room.items())
+
+
+def _outside_spheres(scenario: Scenario, track: Track) -> list[tuple[Place, float]]:
+    """How far outside each missile's sphere the track stays, m."""
+    threats = scenario.threats
+    if scenario.external or len(track) < 2:
+        return []
+    visits = path_spheres(track.position, track.time, threats.position, threats.kill_radius, threats.kill_scale)
+    return [
+        (Place("missile", m, name=table.name or ""), float(visits.closest[m] - threats.kill_radius[m]))
+        for m, table in enumerate(scenario.spec.threats)
+        if threats.kill_radius[m] > 0.0
+    ]
+
+
+# ----------------------------------------------------------------------
+# What the pictures keep of a flight: its clearance along the way, and where it crossed each waypoint.
+
+
+# Equal pieces of the route's length, of each of which the least clearance is kept.
+STATIONS = 150
+
+
+def clearance_profile(route: Route, track: Track) -> Singles:
+    """(STATIONS,) the least height above ground on each equal piece of the route's length, m; NaN where none was flown.
+
+    The place on the route is that beside the track, on the leg that was flown then.
+    """
+    starts, ends = route.waypoints[:-1, :2], route.waypoints[1:, :2]
+    lengths = np.hypot(*(ends - starts).T)
+    before = np.concatenate([[0.0], np.cumsum(lengths)])
+    leg = np.clip(track.leg, 0, len(lengths) - 1)
+    along = (ends - starts)[leg] / np.maximum(lengths[leg], 1e-9)[:, None]
+    covered = np.einsum("ij,ij->i", track.position[:, :2] - starts[leg], along)
+    distance = before[leg] + np.clip(covered, 0.0, lengths[leg])
+    piece = np.minimum((distance / before[-1] * STATIONS).astype(int), STATIONS - 1)
+    least = np.full(STATIONS, np.inf, dtype=np.float32)
+    np.fmin.at(least, piece, track.clearance)
+    return np.where(np.isfinite(least), least, np.float32(np.nan)).astype(np.float32)
+
+
+def waypoint_crossings(route: Route, track: Track) -> Singles:
+    """(w, 2) how far right of and above each waypoint the track was at its nearest, m; NaN where it did not get there.
+
+    Right is seen along the mean of the courses in and out.
+    """
+    points = route.waypoints
+    out = np.full((len(points), 2), np.nan, dtype=np.float32)
+    steps = np.diff(points[:, :2], axis=0)
+    courses = np.unwrap(np.arctan2(steps[:, 0], steps[:, 1]))
+    middle = np.concatenate([courses[:1], 0.5 * (courses[:-1] + courses[1:]), courses[-1:]])
+    for k, point in enumerate(points):
+        near = np.flatnonzero((track.leg == k) | (track.leg == k - 1))
+        passed = len(track) and (track.leg.max() >= k or k == len(points) - 1)
+        if not near.size or not passed:
+            continue
+        off = track.position[near] - point
+        nearest = off[np.argmin(off[:, 0] ** 2 + off[:, 1] ** 2)]
+        out[k] = nearest[0] * np.cos(middle[k]) - nearest[1] * np.sin(middle[k]), nearest[2]
+    return out
+
 
 # A lost flight could not be flown: its workers died on it.
 Outcome = Literal["flyable", "not flyable", "lost"]
@@ -38,7 +150,7 @@ class FlightRow:
     margins: by rule, of those that were judged.
     energy_left: Wh; None where nothing was flown.
     duration: s.
-    clearance, crossings: bytes of `planfly.campaigns.flights.track_shape`'s arrays; empty where nothing was flown.
+    clearance, crossings: bytes of `planfly.campaigns.flights.flight_row`'s arrays; empty where nothing was flown.
     narrow: where it passed narrowly, and with how much room; the table of a campaign does not keep it.
     seconds: that it took.  worker: who flew it.  Both are no part of what is the same for any number of workers.
     """

@@ -8,17 +8,23 @@ import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from logs.figures.elements.style import png_bytes
+from logs.figures.style import png_bytes
 from logs.verdict.findings import RULES
 from logs.verdict.wording import place_text
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.track_shape import STATIONS
-from planfly.campaigns.pictures.failure_picture import draw_failures
-from planfly.campaigns.pictures.probability_pictures import Bar, draw_probability, draw_tornado, speed_bins
-from planfly.campaigns.pictures.track_pictures import draw_clearance_fan, draw_crossings
+from planfly.campaigns.flights.flight_row import STATIONS
+from planfly.campaigns.pictures import (
+    Bar,
+    draw_clearance_fan,
+    draw_crossings,
+    draw_failures,
+    draw_probability,
+    draw_tornado,
+    speed_bins,
+)
 from planfly.campaigns.report.summary import CampaignSummary, campaign_lines, closest_text, log_name
-from planfly.campaigns.spread.quantities import BY_NAME
-from planfly.campaigns.storage.store import Store
+from planfly.campaigns.spread.spread_file import BY_NAME
+from planfly.campaigns.storage.stores import Store
 from planfly.pipeline import make_setup
 
 # Flights whose way is drawn, at most: of more a picture shows no more.

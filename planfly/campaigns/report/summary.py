@@ -12,12 +12,11 @@ from logs.verdict.findings import RULES
 from logs.verdict.places import Place
 from logs.verdict.wording import place_text
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.flights.flight_row import FlightRow
-from planfly.campaigns.flights.margin_scales import SCALES
-from planfly.campaigns.spread.quantities import BY_NAME
+from planfly.campaigns.flights.flight_row import SCALES, FlightRow
+from planfly.campaigns.spread.spread_file import BY_NAME
 from planfly.campaigns.statistics.decision import Estimate, Goal
 from planfly.campaigns.statistics.sensitivities import first_order, rank_slope
-from planfly.campaigns.storage.store import Store
+from planfly.campaigns.storage.stores import Store
 
 SCHEMA = "planfly.campaign-summary/1"
 # Of a margin's variance, the share from which on a quantity is named as explaining it.

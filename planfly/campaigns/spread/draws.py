@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.spread.quantities import QUANTITIES
-from planfly.campaigns.spread.spread_file import FlightSpread
+from planfly.campaigns.spread.spread_file import QUANTITIES, FlightSpread
 
 Floats = NDArray[np.float64]
 

@@ -1,6 +1,6 @@
 """The spread of a campaign: which quantities vary and by which distribution, read from a TOML file.
 
-A table a quantity, named as in `planfly.campaigns.spread.quantities`; `distribution` is the name of one of
+A table a quantity, named as in `planfly.campaigns.spread.spread_file`; `distribution` is the name of one of
 `scipy.stats`' distributions, the other keys are its parameters, and `source` says where the numbers are from:
 
     [wind_speed]
@@ -14,16 +14,64 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.spread.quantities import BY_NAME, NAMES, Quantity
 from world.errors import PlanflyError
-from world.text_files import read_small_file, toml_table, utf8_text
+from world.files import read_small_file, toml_table, utf8_text
 
 Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# What may vary between the flights of a campaign: each quantity's unit, how it changes the flight, and its range.
+
+
+class Quantity(NamedTuple):
+    """One number that is drawn once a flight.
+
+    name: its table in a spread file, and its column in the campaign's.
+    combine: "added" to what the scenario has, or "factor" on it.
+    unit: of what is added; "" for a factor.
+    low, high: the least and the largest that may be drawn; a draw beyond them is none of this aircraft or world.
+    whole: whether it counts steps, so that its distribution is a discrete one.
+    title: for a person.
+    """
+
+    name: str
+    combine: Literal["added", "factor"]
+    unit: str
+    low: float
+    high: float
+    title: str
+    whole: bool = False
+
+    @property
+    def nominal(self) -> float:
+        """The value that changes nothing."""
+        return 1.0 if self.combine == "factor" else 0.0
+
+
+# In this order a flight's numbers are drawn, whether they vary or not: what one quantity does leaves the others alone.
+QUANTITIES = (
+    Quantity("wind_speed", "added", "m/s", -40.0, 40.0, "wind speed"),
+    Quantity("wind_from", "added", "deg", -180.0, 180.0, "wind direction"),
+    Quantity("wind_gradient", "added", "1/s", -0.05, 0.05, "wind gradient"),
+    Quantity("turbulence", "added", "levels", -2.0, 2.0, "turbulence", whole=True),
+    Quantity("mass", "factor", "", 0.5, 2.0, "mass"),
+    Quantity("drag", "factor", "", 0.3, 3.0, "drag"),
+    Quantity("control_power", "factor", "", 0.25, 2.0, "control power"),
+    Quantity("battery", "factor", "", 0.05, 1.5, "battery"),
+    Quantity("terrain_height", "added", "m", -100.0, 100.0, "terrain height"),
+    Quantity("start_east", "added", "m", -200.0, 200.0, "start, east"),
+    Quantity("start_north", "added", "m", -200.0, 200.0, "start, north"),
+    Quantity("start_up", "added", "m", -100.0, 100.0, "start, height"),
+)
+BY_NAME = {quantity.name: quantity for quantity in QUANTITIES}
+NAMES = tuple(BY_NAME)
+
 
 # Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
 INSIDE = 0.99
@@ -86,7 +134,7 @@ class Varying:
 
 @dataclass(frozen=True)
 class FlightSpread:
-    """All that varies, in the order of `planfly.campaigns.spread.quantities.QUANTITIES`; name: where it is from."""
+    """All that varies, in the order of `planfly.campaigns.spread.spread_file.QUANTITIES`; name: where it is from."""
 
     varying: tuple[Varying, ...]
     name: str

@@ -18,16 +18,222 @@ Neural Computation 4, 1992).  Where few flights failed it is far from that: the 
 posterior itself (`importance_sampling`).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from planfly.campaigns.statistics.importance_sampling import importance_sample
-from planfly.campaigns.statistics.links import BinaryLink
-
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+
+
+# ----------------------------------------------------------------------
+# The links of a binary regression: the probability to fail as a function of a linear predictor.
+#
+# `PROBIT` is that of a threshold which is distributed normally; `CLOGLOG` (complementary log-log) that of the least of
+# many thresholds, Gumbel's law for minima, whose tail towards little wind is the longer one (McCullagh and Nelder,
+# Generalized Linear Models, 2nd edition, 1989, section 4.3).
+
+
+# exp of more than this is more than any number; and the least number that is not taken as none.
+_MOST, _LEAST = 700.0, 1e-300
+
+
+class BinaryLink(Protocol):
+    """All of predictors in an array of any shape, and each of the same shape."""
+
+    def log_cdf(self, x: Floats) -> Floats:
+        """Logarithm of the probability to fail."""
+
+    def log_survival(self, x: Floats) -> Floats:
+        """Logarithm of the probability to fly."""
+
+    def survival(self, x: Floats) -> Floats:
+        """Probability to fly."""
+
+    def density(self, x: Floats) -> Floats:
+        """Derivative of the probability to fail."""
+
+    def information(self, x: Floats, width: float = 0.0) -> Floats:
+        """Fisher's, of a flight about its predictor.
+
+        width: of predictors above its own; by how much a flight passed is told where that is less, so that 0 is for
+        one that tells no more than whether it failed.
+        """
+
+    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+        """First and second derivative of the logarithm of the probability of what came out."""
+
+    def log_density(self, x: Floats) -> Floats:
+        """Logarithm of `density`."""
+
+    def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
+        """First and second derivative of `log_density`."""
+
+
+class _Probit:
+    def log_cdf(self, x: Floats) -> Floats:
+        from scipy.special import log_ndtr
+
+        out: Floats = log_ndtr(x)
+        return out
+
+    def log_survival(self, x: Floats) -> Floats:
+        return self.log_cdf(-x)
+
+    def survival(self, x: Floats) -> Floats:
+        from scipy.special import ndtr
+
+        out: Floats = ndtr(-x)
+        return out
+
+    def density(self, x: Floats) -> Floats:
+        out: Floats = np.exp(-0.5 * x * x) / np.sqrt(2.0 * np.pi)
+        return out
+
+    def information(self, x: Floats, width: float = 0.0) -> Floats:
+        from scipy.special import ndtr
+
+        more = x + width
+        # Of one that fails and of one that passes by more, and between them the law's mean square there.
+        ends = self.density(x) ** 2 / np.maximum(ndtr(x), _LEAST) + self.density(more) ** 2 / np.maximum(
+            ndtr(-more), _LEAST
+        )
+        between = ndtr(more) - ndtr(x) - more * self.density(more) + x * self.density(x)
+        out: Floats = ends + np.maximum(between, 0.0)
+        return out
+
+    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+        from scipy.special import log_ndtr
+
+        sign = np.where(failed, 1.0, -1.0)
+        z = sign * x
+        # By logarithms, for Phi is 0 long before its logarithm's derivative is.
+        ratio = np.exp(-0.5 * z * z - 0.5 * np.log(2.0 * np.pi) - log_ndtr(z))
+        return sign * ratio, -ratio * (z + ratio)
+
+    def log_density(self, x: Floats) -> Floats:
+        out: Floats = -0.5 * x * x - 0.5 * np.log(2.0 * np.pi)
+        return out
+
+    def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
+        return -x, np.full_like(x, -1.0)
+
+
+class _ComplementaryLogLog:
+    def log_cdf(self, x: Floats) -> Floats:
+        with np.errstate(divide="ignore"):
+            # Where the rate is 0, the probability is the rate.
+            out: Floats = np.where(x < -30.0, x, np.log(-np.expm1(self.log_survival(x))))
+        return out
+
+    def log_survival(self, x: Floats) -> Floats:
+        out: Floats = -np.exp(np.minimum(x, _MOST))
+        return out
+
+    def survival(self, x: Floats) -> Floats:
+        out: Floats = np.exp(self.log_survival(x))
+        return out
+
+    def density(self, x: Floats) -> Floats:
+        out: Floats = np.exp(x - np.exp(np.minimum(x, _MOST)))
+        return out
+
+    def information(self, x: Floats, width: float = 0.0) -> Floats:
+        rate, more = (np.exp(np.clip(at, -_MOST, 0.5 * _MOST)) for at in (x, x + width))
+        # As the probit's: of those that fail rate * ratio * exp(-rate), of the others by integrals over the rate.
+        fails = rate * _rate_ratio(rate) * np.exp(-rate)
+        between = np.maximum(_square_above(rate) - _square_above(more), 0.0)
+        out: Floats = fails + between + more * more * np.exp(-more)
+        return out
+
+    def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
+        rate = np.exp(np.clip(x, -_MOST, 0.5 * _MOST))
+        first = _rate_ratio(rate)
+        second = first * (1.0 - rate - first)
+        return np.where(failed, first, -rate), np.where(failed, np.minimum(second, 0.0), -rate)
+
+    def log_density(self, x: Floats) -> Floats:
+        out: Floats = x - np.exp(np.minimum(x, _MOST))
+        return out
+
+    def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
+        rate = np.exp(np.minimum(x, 0.5 * _MOST))
+        return 1.0 - rate, -rate
+
+
+def _square_above(rate: Floats) -> Floats:
+    """Integral of (1 - r)^2 exp(-r) from a rate on."""
+    out: Floats = (rate * rate + 1.0) * np.exp(-rate)
+    return out
+
+
+def _rate_ratio(rate: Floats) -> Floats:
+    """Rate / (exp(rate) - 1): near 1 for a small rate, 0 for a large one."""
+    with np.errstate(over="ignore"):
+        out: Floats = rate / np.expm1(rate)
+    return out
+
+
+PROBIT: BinaryLink = _Probit()
+CLOGLOG: BinaryLink = _ComplementaryLogLog()
+LINKS = (PROBIT, CLOGLOG)
+
+
+# ----------------------------------------------------------------------
+# A sample of a distribution of which only the density's logarithm, up to a constant, can be had.
+#
+# Importance sampling (Robert and Casella, Monte Carlo Statistical Methods, 2nd edition, 2004, chapters 3.3 and 14.3):
+# the
+# points are those of a multivariate t distribution about the mode, whose tails are longer than a posterior's, evenly
+# spread by Sobol's sequence; each weighs by how much likelier it is than t has it.  They are then drawn again by their
+# weights, so that all that are left weigh the same: systematically in the order of the first coordinate (Kitagawa,
+# "Monte
+# Carlo filter and smoother for non-Gaussian nonlinear state space models", Journal of Computational and Graphical
+# Statistics 5, 1996), for in the order of the sequence, which repeats itself, every second point may be on one side.
+
+# Degrees of freedom of the t distribution, and how many of its points are weighed for each that is left.
+_FREEDOM, _WEIGHED = 6.0, 2
+_SEED = 1
+
+
+def importance_sample(
+    log_density: Callable[[Floats], Floats], middle: Floats, covariance: Floats, count: int
+) -> Floats:
+    """(count, k) points of a distribution, each as likely as the other, in no order; most even in the first coordinate.
+
+    log_density: of (n, k) points (n,), up to a constant; -inf where there is none.
+    middle, covariance: (k,) and (k, k), about those of the distribution.  count: a power of two.
+    Raises LinAlgError where the covariance is not positive definite.
+
+    >>> sample = importance_sample(lambda x: -0.5 * x[:, 0] ** 2, np.ones(1), np.eye(1), 256)
+    >>> round(float(sample.std()), 1)
+    1.0
+    """
+    standard, log_proposal = _t_points(middle.size, _WEIGHED * count)
+    points = middle + standard @ np.linalg.cholesky(covariance).T
+    logs = log_density(points) - log_proposal
+    order = np.argsort(points[:, 0], kind="stable")
+    summed = np.cumsum(np.exp(logs - logs.max())[order])
+    steps = (np.arange(count) + 0.5) / count
+    kept = order[np.searchsorted(summed / summed[-1], steps).clip(0, order.size - 1)]
+    out: Floats = np.random.default_rng(_SEED).permutation(points[kept])
+    return out
+
+
+@lru_cache
+def _t_points(size: int, count: int) -> tuple[Floats, Floats]:
+    """(count, size) points of the standard t distribution, and (count,) the logarithm of its density there."""
+    from scipy.stats import chi2, norm, qmc
+
+    # A power of two: the points of Sobol's sequence are balanced then.
+    shares = qmc.Sobol(size + 1, seed=_SEED).random(count).clip(1e-12, 1.0 - 1e-12)
+    points = norm.ppf(shares[:, :size]) / np.sqrt(chi2.ppf(shares[:, size:], _FREEDOM) / _FREEDOM)
+    return points, -0.5 * (_FREEDOM + size) * np.log1p((points * points).sum(axis=1) / _FREEDOM)
+
 
 # Standard deviation of the prior of the constant.  More wind never has fewer fail: the wind's coefficient, 1/(m/s), is
 # above 0, and its logarithm normal; it changes a probit by one within 0.3 to 14 m/s at 95 %.
@@ -103,7 +309,7 @@ def fit_regression(outcomes: Outcomes, link: BinaryLink, near: RegressionFit | N
 
     near: another, of the same coefficients, whose mode is a place to look from, too; that of room alone may have two.
 
-    >>> from planfly.campaigns.statistics.links import PROBIT
+    >>> from planfly.campaigns.statistics.censored_regression import PROBIT
     >>> wind = np.linspace(-5.0, 5.0, 200)
     >>> room = 2.0 - wind
     >>> outcomes = Outcomes(np.column_stack((np.ones(200), wind)), room < 0.0, room.clip(0.0, 1.0))

@@ -1,10 +1,205 @@
 """What a campaign's flights say of its target: reached, missed, or neither yet."""
 
+import math
 from dataclasses import dataclass
-from typing import Literal
+from functools import cached_property
+from typing import Literal, NamedTuple
 
-from planfly.campaigns.statistics.proportions import Interval, Tally, clopper_pearson, lower_bound, upper_bound
-from planfly.campaigns.statistics.stopping_bound import StoppingBound
+import numpy as np
+
+# ----------------------------------------------------------------------
+# The probability of success behind a fixed number of flights: intervals and one-sided bounds.
+#
+# They hold for a number of flights that was fixed beforehand; where flying stops by what came out,
+# `planfly.campaigns.statistics.decision` holds.
+
+
+class Interval(NamedTuple):
+    """Of a probability."""
+
+    low: float
+    high: float
+
+
+class Tally(NamedTuple):
+    """How many flights came out how.
+
+    lost: could not be flown; they count as failures where a lower bound is stated, and as successes in an upper one.
+    """
+
+    flyable: int
+    failed: int
+    lost: int = 0
+
+    @property
+    def flown(self) -> int:
+        """All flights, the lost among them."""
+        return self.flyable + self.failed + self.lost
+
+    @property
+    def share(self) -> float:
+        """Share of flyable flights, the lost not counted as such; NaN for no flight."""
+        return self.flyable / self.flown if self.flown else math.nan
+
+
+def clopper_pearson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
+    """The exact two-sided interval of Clopper and Pearson (Biometrika 26, 1934); it covers at least ``confidence``.
+
+    >>> [round(bound, 4) for bound in clopper_pearson(299, 299)]
+    [0.9877, 1.0]
+    """
+    return _interval(successes, trials, confidence, "exact")
+
+
+def wilson(successes: int, trials: int, confidence: float = 0.95) -> Interval:
+    """Wilson's score interval (JASA 22, 1927), for pictures: its mean coverage is near ``confidence``.
+
+    >>> [round(bound, 4) for bound in wilson(8, 10)]
+    [0.4902, 0.9433]
+    """
+    return _interval(successes, trials, confidence, "wilson")
+
+
+def lower_bound(tally: Tally, confidence: float = 0.95) -> float:
+    """Clopper and Pearson's one-sided lower bound: with 299 flights and no failure P is 0.99 at least, at 95 %.
+
+    >>> round(lower_bound(Tally(299, 0)), 4), round(lower_bound(Tally(298, 0)), 4)
+    (0.99, 0.99)
+    >>> lower_bound(Tally(299, 0)) >= 0.99 > lower_bound(Tally(298, 0))
+    True
+    """
+    return clopper_pearson(tally.flyable, tally.flown, 2.0 * confidence - 1.0).low if tally.flown else 0.0
+
+
+def upper_bound(tally: Tally, confidence: float = 0.95) -> float:
+    """Clopper and Pearson's one-sided upper bound.
+
+    >>> round(upper_bound(Tally(0, 10)), 4)
+    0.2589
+    """
+    if not tally.flown:
+        return 1.0
+    return clopper_pearson(tally.flyable + tally.lost, tally.flown, 2.0 * confidence - 1.0).high
+
+
+def _interval(successes: int, trials: int, confidence: float, method: str) -> Interval:
+    from scipy.stats import binomtest
+
+    if not trials:
+        return Interval(0.0, 1.0)
+    found = binomtest(successes, trials).proportion_ci(confidence, method=method)
+    return Interval(float(found.low), float(found.high))
+
+
+# ----------------------------------------------------------------------
+# Bounds of a probability that hold however long one looks: the beta-binomial mixture of Robbins.
+#
+# For s successes and f failures the set of p with
+#
+#     E(p) = sum_i w_i B(s + a_i, f + b_i) / B(a_i, b_i) / (p^s (1 - p)^f) < 1 / alpha
+#
+# contains the true p at all times at once, with probability 1 - alpha: E is a martingale that begins at 1 (Robbins,
+# "Statistical methods related to the law of the iterated logarithm", Ann. Math. Stat. 41, 1970; Ville's inequality).
+# Whoever stops when it says enough is therefore not led astray, as with an interval for a fixed number of flights.
+#
+# The mixture has two parts.  One, of nearly all the weight, lies so near to 1 that without a failure a target is
+# reached
+# after as many flights as with a fixed number (299 for 0.99); the other, Jeffreys' Beta(1/2, 1/2), finds out about
+# probabilities far from the target.
+
+# Weight of the part that is far from the target.
+_FAR = 0.001
+# What the mixture may cost where nothing fails, in the logarithm of 1 / alpha: a flight at P = 0.99.
+_COST = 0.009
+_BISECTIONS = 60
+
+
+@dataclass(frozen=True)
+class StoppingBound:
+    """The bound for a target probability (0 to 1) and a confidence.
+
+    >>> bound = StoppingBound(0.99)
+    >>> bound.fewest, bound.interval(299, 0).low >= 0.99, bound.interval(298, 0).low >= 0.99
+    (299, True, False)
+    """
+
+    target: float
+    confidence: float = 0.95
+
+    @property
+    def fewest(self) -> int:
+        """Flights that reach the target where none fails."""
+        return math.ceil((self._enough + _COST) / -math.log(self.target))
+
+    @property
+    def _enough(self) -> float:
+        return -math.log1p(-self.confidence)
+
+    @cached_property
+    def parts(self) -> tuple[tuple[float, float, float], ...]:
+        """Weight, a and b of each part of the mixture."""
+        scale, low, high = float(self.fewest), 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            evidence = _log_mixture(self._parts(scale, middle), self.fewest, 0) - self.fewest * math.log(self.target)
+            low, high = (middle, high) if evidence >= self._enough else (low, middle)
+        # A hair less, for what rounding takes.
+        return self._parts(scale, 0.999 * low)
+
+    @staticmethod
+    def _parts(scale: float, failures: float) -> tuple[tuple[float, float, float], ...]:
+        return (1.0 - _FAR, scale, max(failures, 1e-9)), (_FAR, 0.5, 0.5)
+
+    def evidence(self, successes: int, failures: int, p: float) -> float:
+        """Logarithm of E(p): p is excluded where it is ``-log(1 - confidence)`` or more."""
+        likelihood = _times_log(successes, p) + _times_log(failures, 1.0 - p)
+        return _log_mixture(self.parts, successes, failures) - likelihood
+
+    def excludes(self, successes: int, failures: int, p: float, *, above: bool) -> bool:
+        """Whether p is excluded, and the flights' own share lies above it (or, where that is asked, below)."""
+        share = successes / max(1, successes + failures)
+        beyond = share > p if above else share < p
+        return beyond and self.evidence(successes, failures, p) >= self._enough
+
+    def interval(self, successes: int, failures: int) -> Interval:
+        """All p that are not excluded: they lie about the share of successes, where E is least."""
+        trials = successes + failures
+        if not trials:
+            return Interval(0.0, 1.0)
+        share = successes / trials
+        low = 0.0 if not successes else self._edge(successes, failures, 0.0, share)
+        high = 1.0 if not failures else self._edge(successes, failures, 1.0, share)
+        return Interval(low, high)
+
+    def _edge(self, successes: int, failures: int, outside: float, inside: float) -> float:
+        """Where between p that is excluded and p that is not the border lies: the excluded side of it."""
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (outside + inside)
+            if self.evidence(successes, failures, middle) >= self._enough:
+                outside = middle
+            else:
+                inside = middle
+        return outside
+
+    def bounds(self, tally: Tally) -> Interval:
+        """The interval of a tally: lost flights are failures for its low end, successes for its high one."""
+        low = self.interval(tally.flyable, tally.failed + tally.lost).low
+        high = self.interval(tally.flyable + tally.lost, tally.failed).high
+        return Interval(low, high)
+
+
+def _times_log(count: int, p: float) -> float:
+    if not count:
+        return 0.0
+    return count * math.log(p) if p > 0.0 else -math.inf
+
+
+def _log_mixture(parts: tuple[tuple[float, float, float], ...], successes: int, failures: int) -> float:
+    from scipy.special import betaln
+
+    terms = [math.log(w) + float(betaln(successes + a, failures + b) - betaln(a, b)) for w, a, b in parts]
+    return float(np.logaddexp.reduce(terms))
+
 
 Answer = Literal["reached", "missed", "undecided", "none asked"]
 

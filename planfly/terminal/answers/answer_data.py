@@ -1,10 +1,419 @@
 """What each command answers with ``--json``.  Paths are as the command names them; numbers carry their unit."""
 
-from typing import Literal
+import json
+import math
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple
 
+from pydantic import ConfigDict, TypeAdapter
 from pydantic.dataclasses import dataclass
 
-from planfly.terminal.answers.verdict_document import STRICT, VerdictDocument
+from aircraft.catalog import Aircraft
+from aircraft.envelope import Envelope
+from flight.dynamics.characteristics import Mode, TrimRow
+from logs.verdict.findings import Verdict, verdict_json
+
+# ----------------------------------------------------------------------
+# What ``verdict.json`` holds, as data that a JSON schema is made of.
+
+STRICT = ConfigDict(extra="forbid", use_attribute_docstrings=True, json_schema_serialization_defaults_required=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class PlaceDocument:
+    """Where something was judged."""
+
+    kind: str
+    """flight, mission, plan, leg, waypoint, missile, radar, exclusion or inclusion."""
+    index: int | None
+    """Of the leg, waypoint, threat or zone, from 0; null for the whole."""
+    item: int | None
+    """The mission item that a waypoint comes from."""
+    name: str
+    """That the scenario gives a threat or a zone."""
+    to_item: int | None
+    """Of a leg: the mission item that it leads to."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ChangeDocument:
+    """One change of the plan."""
+
+    what: str
+    place: PlaceDocument
+    current: float | None
+    wanted: float
+    unit: str
+    most: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FactDocument:
+    """A number that was measured and is not judged."""
+
+    what: str
+    value: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FindingDocument:
+    """One rule at one place."""
+
+    rule: str
+    where: str
+    """The place in words."""
+    place: PlaceDocument
+    planned: float | None
+    flown: float | None
+    limit: float | None
+    limit_source: str
+    """Whose the limit is: scenario, aircraft, mission, autopilot, default, ..."""
+    tolerance: float | None
+    margin: float | None
+    """How far inside the limit; negative: beyond."""
+    unit: str
+    """Of planned, flown, limit, tolerance and margin."""
+    method: str
+    ok: bool | None
+    """null: not judged, and the reason says why."""
+    reason: str
+    suggestions: list[list[ChangeDocument]]
+    """Alternatives, each of changes to make together; any would pass."""
+    brief: str
+    placed: bool
+    check: str
+    facts: list[FactDocument]
+    suggestion: str
+    """The suggestions in words."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class DifferenceDocument:
+    """What another level and the verdict judge differently."""
+
+    rule: str
+    place: PlaceDocument
+    level: str
+    there: bool
+    here: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class LevelDocument:
+    """What one level says: geometry, airframe or autopilot."""
+
+    name: str
+    flyable: bool
+    headline: str
+    disagreements: list[str]
+    differences: list[DifferenceDocument]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class DecidingDocument:
+    """The parameter of the autopilot that decides."""
+
+    name: str
+    current: float
+    passing: float
+    unit: str
+    rule: str
+    place: PlaceDocument
+    off: float | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ParameterDocument:
+    """A parameter in ArduPlane's unit, and who states it."""
+
+    name: str
+    value: float
+    origin: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ParametersDocument:
+    """Parameters of the ArduPlane that flew."""
+
+    file: str
+    values: list[ParameterDocument]
+    unused: list[str]
+    not_flown: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ProgramDocument:
+    """The real autopilot that flew."""
+
+    version: str
+    sha256: str
+    parameters: dict[str, float]
+    changed: dict[str, float]
+    unused: list[str]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class VerdictDocument:
+    """Whether a plan really flies: also the content of verdict.json."""
+
+    schema: Literal["planfly.verdict/3"]
+    level: str
+    """flown, geometric (without a flight) or plan (no feasible plan, so nothing was flown)."""
+    flyable: bool
+    complete: bool
+    summary: str
+    """Lines for a person, of which the first answers the question."""
+    flown_by: ProgramDocument | None
+    parameters: ParametersDocument | None
+    levels: list[LevelDocument]
+    deciding_parameter: DecidingDocument | None
+    findings: list[FindingDocument]
+
+
+def verdict_document(verdict: Verdict) -> VerdictDocument:
+    """A verdict as its file has it."""
+    return TypeAdapter(VerdictDocument).validate_python(json.loads(verdict_json(verdict)))
+
+
+# ----------------------------------------------------------------------
+# What ``planfly aircraft`` answers with ``--json``.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class TrimEntry:
+    """Level flight at one airspeed."""
+
+    airspeed_mps: float
+    alpha_deg: float
+    elevator_deg: float
+    throttle: float
+    power_w: float
+    endurance_s: float | None
+    """How long 80 % of what it carries lasts."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class ModeEntry:
+    """A mode in cruise: its root, of a pair the one with the positive imaginary part."""
+
+    name: str
+    root_real_1_s: float
+    root_imaginary_1_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class AircraftDetail:
+    """What is worked out of one aircraft."""
+
+    model_sha256: str
+    level_speed_min_mps: float
+    """At sea level."""
+    level_speed_max_mps: float
+    trims: list[TrimEntry]
+    modes: list[ModeEntry]
+    lacking: list[str]
+    """What lacks in its folder for a flight."""
+    files: list[str]
+    """The pictures."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class AircraftEntry:
+    """An aircraft."""
+
+    name: str
+    title: str
+    folder: str
+    mass_kg: float
+    wing_area_m2: float
+    wing_span_m: float
+    airspeed_mps: float
+    airspeed_min_mps: float
+    airspeed_max_mps: float
+    stall_speed_mps: float
+    max_bank_deg: float
+    detail: AircraftDetail | None
+    """null in a list."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class AircraftAnswer:
+    """planfly aircraft: the one that was named or made, or all that come with planfly."""
+
+    schema: Literal["planfly.aircraft/1"] = "planfly.aircraft/1"
+    exit_code: int
+    aircraft: list[AircraftEntry]
+
+
+class AircraftNumbers(NamedTuple):
+    """What the command works out of an aircraft.
+
+    modes: by airspeed, m/s.  cruise: modes in cruise.  steps: of `flight.dynamics.characteristics.step_responses`.
+    """
+
+    envelope: Envelope
+    trims: tuple[TrimRow, ...]
+    modes: dict[float, tuple[Mode, ...]]
+    cruise: tuple[Mode, ...]
+    steps: Any
+
+
+def aircraft_entry(one: Aircraft, detail: AircraftDetail | None) -> AircraftEntry:
+    """An aircraft's metadata, and what was worked out."""
+    return AircraftEntry(
+        name=one.name,
+        title=one.title,
+        folder=str(one.folder),
+        mass_kg=one.mass,
+        wing_area_m2=one.wing_area,
+        wing_span_m=one.wing_span,
+        airspeed_mps=one.airspeed,
+        airspeed_min_mps=one.airspeed_min,
+        airspeed_max_mps=one.airspeed_max,
+        stall_speed_mps=one.stall_speed,
+        max_bank_deg=round(math.degrees(one.max_bank), 9),
+        detail=detail,
+    )
+
+
+def aircraft_detail(
+    numbers: AircraftNumbers, identity: str, lacking: Sequence[str], files: Sequence[str]
+) -> AircraftDetail:
+    """What was worked out, in the answer's units."""
+    slow, fast = numbers.envelope.level_speeds(0.0)
+    trims = [
+        TrimEntry(
+            airspeed_mps=row.trim.airspeed,
+            alpha_deg=math.degrees(row.trim.alpha),
+            elevator_deg=math.degrees(row.trim.elevator),
+            throttle=row.trim.throttle,
+            power_w=row.power,
+            endurance_s=row.endurance if math.isfinite(row.endurance) else None,
+        )
+        for row in numbers.trims
+    ]
+    modes = [
+        ModeEntry(name=mode.name, root_real_1_s=mode.root.real, root_imaginary_1_s=mode.root.imag)
+        for mode in numbers.cruise
+    ]
+    return AircraftDetail(
+        model_sha256=identity,
+        level_speed_min_mps=float(slow),
+        level_speed_max_mps=float(fast),
+        trims=trims,
+        modes=modes,
+        lacking=list(lacking),
+        files=list(files),
+    )
+
+
+# ----------------------------------------------------------------------
+# What ``planfly campaign`` and ``planfly winds`` answer: also the content of summary.json and winds.json.
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FailedPlace:
+    """Flights that failed a rule at a place; the place as of a verdict's finding."""
+
+    where: str
+    flights: int
+    kind: str
+    index: int | None
+    item: int | None
+    name: str
+    to_item: int | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class FailedRule:
+    """Flights that failed a rule."""
+
+    rule: str
+    flights: int
+    places: list[FailedPlace]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class SensitivityEntry:
+    """How much of the deciding margin's spread a quantity makes."""
+
+    quantity: str
+    first_order: float | None
+    rank_slope: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class CampaignDocument:
+    """planfly campaign: how likely a mission is to fly."""
+
+    schema: Literal["planfly.campaign-summary/1"]
+    name: str
+    seed: int
+    target: float | None
+    """The probability that was asked for."""
+    answer: str
+    """reached, missed, undecided or none asked."""
+    flights: int
+    flyable: int
+    not_flyable: int
+    lost: list[int]
+    """Flights without an outcome."""
+    probability: float | None
+    confidence: float
+    lower_bound: float | None
+    upper_bound: float | None
+    interval: list[float | None]
+    method: str
+    failed_by_rule: list[FailedRule]
+    deciding_rule: str
+    margin_of_one_in_twenty: float | None
+    margin_unit: str
+    sensitivities: list[SensitivityEntry]
+    worst: list[dict[str, Any]]
+    spread: dict[str, Any]
+    made_of: str
+    """What the campaign was made of, as a hash."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class WindFlights:
+    """Flights in one wind."""
+
+    speed_mps: float
+    flights: int
+    flyable: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class WindDirection:
+    """The boundary of one direction."""
+
+    from_deg: float
+    boundary_mps: float
+    interval_mps: list[float]
+    beyond: bool
+    """Whether it flies in every wind that was looked at."""
+    flown: list[WindFlights]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)
+class WindsDocument:
+    """planfly winds: the largest wind from each direction."""
+
+    schema: Literal["planfly.winds/1"]
+    name: str
+    seed: int
+    target: float
+    confidence: float
+    most: float
+    """The strongest wind that was looked at, m/s."""
+    flights: int
+    lost: list[int]
+    """Flights without an outcome, from 0 in the order in which they were asked for; they count as not flyable."""
+    directions: list[WindDirection]
+    spread: dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, config=STRICT)

@@ -2,17 +2,66 @@
 
 import argparse
 import contextlib
+import json
 import os
 import sys
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
-from planfly.terminal.progress import silent_progress
-from planfly.terminal.targets import refuse_existing
-from world.atomic_files import write_whole
+from pydantic import TypeAdapter
+
+from planfly.terminal.answers import answer_data
+from planfly.terminal.answers.answer_data import AircraftAnswer, CampaignDocument, VerdictDocument, WindsDocument
+from planfly.terminal.output import silent_progress
+from planfly.terminal.results import refuse_existing
 from world.errors import PlanflyError
+from world.files import write_whole
+
+# ----------------------------------------------------------------------
+# The answer of each command that has ``--json``, and its JSON schema.
+
+ANSWERS: dict[str, type[Any]] = {
+    "run": answer_data.RunAnswer,
+    "plan": answer_data.PlanAnswer,
+    "export": answer_data.ExportAnswer,
+    "fly": answer_data.FlyAnswer,
+    "check": VerdictDocument,
+    "replay": answer_data.ReplayAnswer,
+    "recover": answer_data.RecoverAnswer,
+    "report": answer_data.ReportAnswer,
+    "compare": answer_data.CompareAnswer,
+    "import": answer_data.ImportAnswer,
+    "refly": answer_data.ReflyAnswer,
+    "paper": answer_data.PaperAnswer,
+    "campaign": CampaignDocument,
+    "winds": WindsDocument,
+    "aircraft": AircraftAnswer,
+    "scenarios": answer_data.ScenariosAnswer,
+}
+_DRAFT = "https://json-schema.org/draft/2020-12/schema"
+
+
+def answer_schema(command: str) -> dict[str, Any]:
+    """The JSON schema, draft 2020-12, of a command's answer.
+
+    >>> sorted(answer_schema("scenarios")["properties"])
+    ['exit_code', 'scenarios', 'schema']
+    """
+    made = TypeAdapter(ANSWERS[command]).json_schema(mode="serialization")
+    return {"$schema": _DRAFT, **made, "title": f"planfly {command} --json"}
+
+
+def schema_text(command: str) -> str:
+    """The schema as the text of a file."""
+    return json.dumps(answer_schema(command), indent=1) + "\n"
+
+
+def answer_text(answer: object) -> str:
+    """An answer as the text of a file; what is no number is null."""
+    return TypeAdapter(type(answer)).dump_json(answer, indent=1).decode() + "\n"
+
 
 STANDARD_OUTPUT = "-"
 # The standard output of the command under way, while what it prints goes elsewhere.
@@ -46,13 +95,12 @@ def asked_output(args: argparse.Namespace) -> Iterator[None]:
 def give_answer(args: argparse.Namespace, answer: Callable[[], object | str]) -> None:
     """Write what a command answers, where it was asked for; it is made only then.
 
-    answer: gives the data of `planfly.terminal.answers.schemas.ANSWERS`, or its text.
+    answer: gives the data of `planfly.terminal.answers.giving.ANSWERS`, or its text.
     """
     target = getattr(args, "json", None)
     if target is None:
         return
     # Imported here: nobody else needs schemas.
-    from planfly.terminal.answers.schemas import answer_text
 
     made = answer()
     text = made if isinstance(made, str) else answer_text(made)

@@ -1,18 +1,93 @@
-"""The JSBSim wrapper: units, signs, starts, winds, actuators, and what it refuses."""
+"""Nothing comes out while a library talks, by either way, and everything does afterwards."""
 
 import math
+import os
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
-from flight.dynamics.fdm import Fdm, Variation
+from flight.dynamics.fdm import Fdm, Variation, check_place, silence
 from flight.dynamics.jsbsim_properties import FOOT, TERRAIN
 from flight.dynamics.state import STATE, Commands
 from flight.dynamics.trim import straight
 from world.errors import FlightError
 from world.kernels import Record, field_names
+
+OPEN_FILES = Path("/proc/self/fd")
+
+
+def test_neither_python_nor_a_library_is_heard(capfd: pytest.CaptureFixture[str]) -> None:
+    print("before")
+    with silence():
+        print("python talks")
+        os.write(1, b"a library talks\n")
+    print("after")
+    os.write(1, b"and the library\n")
+    sys.stdout.flush()
+    out = capfd.readouterr().out
+    assert "talks" not in out
+    assert [line in out for line in ("before", "after", "and the library")] == [True] * 3
+
+
+def test_errors_are_still_heard(capfd: pytest.CaptureFixture[str]) -> None:
+    with silence():
+        os.write(2, b"wrong\n")
+    assert capfd.readouterr().err == "wrong\n"
+
+
+def test_a_failure_inside_gives_the_output_back(capfd: pytest.CaptureFixture[str]) -> None:
+    stdout = sys.stdout
+    with pytest.raises(ValueError, match="broken"), silence():
+        raise ValueError("broken")
+    os.write(1, b"heard\n")
+    assert sys.stdout is stdout
+    assert capfd.readouterr().out == "heard\n"
+
+
+@pytest.mark.skipif(not OPEN_FILES.is_dir(), reason="only Linux lists a process's open files there")
+def test_no_files_stay_open() -> None:
+    before = len(list(OPEN_FILES.iterdir()))
+    for _ in range(5):
+        with silence():
+            pass
+    assert len(list(OPEN_FILES.iterdir())) == before
+
+
+# ----------------------------------------------------------------------
+# Where a flight may begin, at each limit and just beyond it.
+
+BEYOND = {
+    "latitude": (90.0, 8.0, 500.0, 400.0),
+    "longitude": (46.0, -180.1, 500.0, 400.0),
+    "on the ground": (46.0, 8.0, 400.0, 400.0),
+    "too high": (46.0, 8.0, 11000.0, 400.0),
+}
+
+
+@pytest.mark.parametrize("place", [(-89.9, 180.0, 500.0, 400.0), (46.0, 8.0, 400.1, 400.0), (46.0, 8.0, 10999.9, 0.0)])
+def test_a_place_within_the_limits_is_taken(place: tuple[float, float, float, float]) -> None:
+    check_place(*place)
+
+
+@pytest.mark.parametrize("case", BEYOND)
+def test_a_place_beyond_one_is_refused_by_its_name_and_value(case: str) -> None:
+    place = BEYOND[case]
+    with pytest.raises(FlightError) as caught:
+        check_place(*place)
+    error = caught.value
+    # Both heights are the start's.
+    field, value = {"latitude": ("latitude", 90.0), "longitude": ("longitude", -180.1)}.get(case, ("start", place[2]))
+    assert (error.field, error.value) == (field, value)
+    assert str(error).startswith("start at")
+    assert str(error).endswith(error.allowed)
+
+
+# ----------------------------------------------------------------------
+# The JSBSim wrapper: units, signs, starts, winds, actuators, and what it refuses.
 
 AEROSONDE = load_aircraft("aerosonde")
 

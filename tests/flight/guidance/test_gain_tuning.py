@@ -10,19 +10,9 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import Aircraft, load_aircraft
+from benchmarks.tuning.tune_gains import DIGITS, REPORTED, SEARCHED, TRAINED, model_gains, rounded, search, start, write
+from benchmarks.tuning.tuning_missions import Case, cases
 from flight.guidance.gains import Gains, load_gains
-from tests.bench.tuning.tune_gains import (
-    DIGITS,
-    REPORTED,
-    SEARCHED,
-    TRAINED,
-    model_gains,
-    rounded,
-    search,
-    start,
-    write,
-)
-from tests.bench.tuning.tuning_missions import Case, cases
 from tests.setups import setup_maker, standard
 
 NAMES = sorted(TRAINED)

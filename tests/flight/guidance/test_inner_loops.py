@@ -1,8 +1,8 @@
-"""The vertical channel and the inner loops: nothing to do in steady flight, and each error is worked against."""
+"""Guidance's memory begins as nothing flown, and each law that a scenario may name has a number of its own."""
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -11,11 +11,46 @@ from aircraft.catalog import load_aircraft
 from aircraft.envelope import GRAVITY
 from flight.dynamics.state import COMMANDS, STATE
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.guidance_memory import GUIDANCE_MEMORY
-from flight.guidance.inner_loops import roll_model, steer_bank, steer_height
+from flight.guidance.inner_loops import (
+    ARDUPILOT,
+    CROSS_TRACK,
+    GUIDANCE_MEMORY,
+    L1,
+    VECTOR_FIELD,
+    roll_model,
+    steer_bank,
+    steer_height,
+)
 from flight.guidance.navigation_error import MOTION
-from flight.guidance.path_kernels import NODE
-from world.kernels import Record
+from flight.guidance.path import NODE
+from flight.simulation.simulate import LAWS
+from world.kernels import Record, field_names
+from world.scenario_tables import FlightTable, Guidance
+
+
+def test_every_law_of_a_scenario_has_its_number() -> None:
+    assert set(LAWS) == set(get_args(Guidance))
+    assert sorted(LAWS.values()) == sorted({CROSS_TRACK, L1, VECTOR_FIELD})
+    assert (LAWS["l1"], LAWS["vector-field"]) == (L1, VECTOR_FIELD)
+    assert ARDUPILOT not in LAWS.values()
+
+
+def test_a_fresh_memory_steers_by_the_default_law_from_the_paths_beginning() -> None:
+    memory: Record = np.zeros(1, GUIDANCE_MEMORY)[0]
+    assert memory.law == LAWS[FlightTable().steering.guidance]
+    assert (memory.piece, memory.leg, memory.distance, bool(memory.done)) == (0, 0, 0.0, False)
+
+
+def test_counts_are_whole_and_an_end_is_a_truth() -> None:
+    kinds = {name: GUIDANCE_MEMORY[name] for name in field_names(GUIDANCE_MEMORY)}
+    whole = {name for name, kind in kinds.items() if kind == np.int64}
+    assert whole == {"law", "piece", "leg", "l1_leg"}
+    assert {name for name, kind in kinds.items() if kind == np.bool_} == {"done"}
+    assert all(kind == np.float64 for name, kind in kinds.items() if name not in whole | {"done"})
+
+
+# ----------------------------------------------------------------------
+# The vertical channel and the inner loops: nothing to do in steady flight, and each error is worked against.
 
 GAINS = load_gains(load_aircraft("aerosonde"))
 DT = 1.0 / 60.0

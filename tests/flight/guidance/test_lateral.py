@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 
 from aircraft.catalog import Aircraft
 from flight.dynamics.state import COMMANDS, STATE
-from flight.guidance.fly_by_path import fly_by_path, waypoint_records
 from flight.guidance.gains import Gains, load_gains
-from flight.guidance.guidance_memory import GUIDANCE_MEMORY
+from flight.guidance.inner_loops import GUIDANCE_MEMORY
 from flight.guidance.lateral import guide
 from flight.guidance.navigation_error import MOTION
-from flight.simulation.flight_setup import FlightSetup
+from flight.guidance.path import fly_by_path, waypoint_records
+from flight.simulation.setup import FlightSetup
 from tests.setups import MakeSetup
 from world.kernels import Record
 

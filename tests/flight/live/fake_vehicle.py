@@ -5,10 +5,9 @@ import multiprocessing
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from flight.live.flight_process import JudgeMission, MissionJudged, send_event
-from flight.live.link import Access, Link
-from flight.live.parameters import vehicle_parameters
-from flight.live.signing import EPOCH
-from flight.live.snapshot import Snapshot
+from flight.live.link import EPOCH, Access, Link
+from flight.live.station_requests import vehicle_parameters
+from flight.live.telemetry import Snapshot
 from flight.live.vehicle import Standby, Vehicle
 from flight.mission.items import Home
 

@@ -21,10 +21,10 @@ from flight.live.flight_process import (
     read_event,
     serve_flights,
 )
-from flight.live.snapshot import Snapshot
+from flight.live.telemetry import Snapshot
 from flight.mission.items import Mission
-from flight.simulation.flight_setup import FlightSetup
-from flight.simulation.local_map import LocalMap
+from flight.simulation.airborne import LocalMap
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.mission_lines import setup_of, wp
 

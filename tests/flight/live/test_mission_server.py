@@ -1,9 +1,10 @@
-"""The mission protocol, without sockets: whole or nothing, one station at a time, on any link."""
+"""Items as MISSION_ITEM_INT: the same after the wire, or refused with the item and the field."""
+
+import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from flight.live.mavlink_items import MissionType
 from flight.live.mission_server import (
     CONFIRM,
     CONFIRMATIONS,
@@ -11,10 +12,94 @@ from flight.live.mission_server import (
     MOST_UPLOADED,
     UPLOAD_TIMEOUT,
     MissionServer,
+    MissionType,
     Station,
+    from_message,
+    item_type,
+    listed,
+    to_message,
+    uploaded,
 )
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem
+from tests.flight.mission_files.worldwide_mission import some_mission
 from tests.soak import scaled, tally
 from tests.stations import Medium, Uploader, decode, item, many_items
+from world.errors import MissionError
+
+
+def test_messages_come_back_the_same() -> None:
+    from pymavlink.dialects.v20 import common
+
+    link = common.MAVLink(None, srcSystem=1, srcComponent=1)
+    mission = some_mission(200, seed=2)
+    jump = MissionItem(201, int(Command.DO_JUMP), int(Frame.MISSION), (3.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    unset = MissionItem(202, 16, 3, (0.0, 0.0, 0.0, math.nan), math.nan, math.nan, 100.0)
+    for sent in (*mission.items, *mission.fences, *mission.rally, jump, unset):
+        back = link.decode(bytearray(to_message(sent, target_system=7).pack(link)))
+        assert (back.x, back.y, back.seq, back.target_system) == (sent.x, sent.y, sent.seq, 7)
+        assert back.mission_type == item_type(sent)
+        again = from_message(back, "station")
+        assert (again.x, again.y, again.command, again.frame) == (sent.x, sent.y, sent.command, sent.frame)
+        assert str(again.params) == str(sent.params)
+        assert math.isnan(again.lat_deg) == math.isnan(sent.lat_deg)
+    assert item_type(mission.rally[0]) == MissionType.RALLY
+
+
+def test_a_bad_message_is_refused() -> None:
+    from pymavlink.dialects.v20 import common
+
+    good = to_message(some_mission(1).items[0])
+    for field, value, text in (
+        ("x", 910_000_000, "latitude 91"),
+        ("frame", 1, "frame 1"),
+        ("param1", math.inf, "p1 inf"),
+        ("z", math.inf, "altitude inf"),
+    ):
+        message = common.MAVLink_mission_item_int_message(
+            *(getattr(good, name) if name != field else value for name in good.fieldnames)
+        )
+        with pytest.raises(MissionError, match=f"^station: item 1: .*{text}"):
+            from_message(message, "station")
+
+
+# ----------------------------------------------------------------------
+# Missions between stations and files: home is item 0, seq has no gaps, jumps go where they went.
+
+HOME, OWN = Home(46.0, 8.0, 400.0), Home(47.0, 9.0, 500.0)
+
+
+def waypoint(seq: int, lat: float, frame: int = 3, radius: float = 0.0) -> MissionItem:
+    return MissionItem(seq, 16, frame, (0.0, radius, 0.0, 0.0), lat, 8.0, 100.0)
+
+
+def lists_of(*items: MissionItem) -> dict[MissionType, tuple[MissionItem, ...]]:
+    return dict.fromkeys(MissionType, ()) | {MissionType.MISSION: items}
+
+
+def test_jumps_keep_their_targets_in_numbers_without_gaps() -> None:
+    jump = MissionItem(9, 177, 2, (7.0, 2.0, 0.0, 0.0), 0.0, 0.0, 0.0)
+    items, fences, rally = listed(Mission(HOME, (waypoint(3, 46.1), waypoint(7, 46.2), jump)))
+    assert [item.seq for item in items] == [0, 1, 2, 3]
+    assert (items[0].lat_deg, items[0].alt) == (46.0, 400.0)
+    assert items[3].params[:2] == (2.0, 2.0)
+    assert (fences, rally) == ((), ())
+
+
+def test_a_listed_mission_comes_back() -> None:
+    mission = Mission(HOME, (waypoint(1, 46.1), waypoint(2, 46.2)))
+    back, shift = uploaded(lists_of(*listed(mission)[0]), OWN)
+    assert (back, shift) == (mission, 0)
+
+
+def test_a_station_that_sends_no_home_gets_its_own_numbers() -> None:
+    """MAVSDK's mission plugin: the first item is relative and has a radius."""
+    back, shift = uploaded(lists_of(waypoint(0, 46.1, radius=1.0), waypoint(1, 46.2, radius=1.0)), OWN)
+    assert back.home == OWN
+    assert [item.seq + shift for item in back.items] == [0, 1]
+
+
+# ----------------------------------------------------------------------
+# The mission protocol, without sockets: whole or nothing, one station at a time, on any link.
 
 ONE, TWO = Station("one", 255, 190), Station("two", 254, 190)
 

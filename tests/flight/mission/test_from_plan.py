@@ -13,12 +13,11 @@ from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.dynamics.envelope_tables import load_envelope
 from flight.mission.from_plan import plan_mission
 from flight.mission.items import item_problem
-from flight.mission.routing import make_route
+from flight.mission.route import make_route
 from flight.mission_files.formats import mission_text, parse_mission
-from flight.simulation.flight_setup import make_limits
+from flight.simulation.setup import make_limits
 from tests.mission_lines import a_plan
-from world.scenario import load_scenario
-from world.scenario_variants import with_wind
+from world.scenario import load_scenario, with_wind
 
 
 @settings(max_examples=40, deadline=None)

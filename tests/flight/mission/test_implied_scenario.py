@@ -9,7 +9,7 @@ import pytest
 from flight.mission.implied_scenario import implied_scenario, mission_origin
 from flight.mission.items import Mission
 from flight.mission.itinerary import make_itinerary
-from flight.mission.routing import make_route
+from flight.mission.route import make_route
 from flight.mission_files.formats import read_mission
 from tests.mission_lines import mission, wp
 from world.errors import MissionError, TerrainError

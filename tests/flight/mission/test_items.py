@@ -1,10 +1,38 @@
-"""Items: which have a position, what no autopilot could make sense of, and numbers after home's."""
+"""Notes stand in the order in which their reasons came up, each with its items in ranges."""
 
 import math
 
 import pytest
 
-from flight.mission.items import Command, Frame, Home, Mission, MissionItem, command_name, item_problem, renumbered
+from flight.mission.items import (
+    Command,
+    Frame,
+    Home,
+    Mission,
+    MissionItem,
+    Notes,
+    command_name,
+    item_problem,
+    renumbered,
+)
+
+
+def test_each_reason_is_said_once_with_all_its_items_in_ranges() -> None:
+    notes = Notes()
+    for text, seq in (("b", 7), ("a", 2), ("b", 8), ("b", 8), ("b", 11), ("whole", None), ("whole", None), ("a", 1)):
+        notes.add(text, seq)
+    assert notes.lines() == ("items 7-8, 11: b", "items 1-2: a", "whole")
+
+
+def test_one_item_is_no_items_and_nothing_noted_is_no_line() -> None:
+    notes = Notes()
+    assert notes.lines() == ()
+    notes.add("a", 5)
+    assert notes.lines() == ("item 5: a",)
+
+
+# ----------------------------------------------------------------------
+# Items: which have a position, what no autopilot could make sense of, and numbers after home's.
 
 
 def item(command: int = 16, frame: int = 3, lat: float = 36.5, lon: float = -84.2, **others: float) -> MissionItem:

@@ -11,10 +11,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from aircraft.catalog import load_aircraft
-from flight.guidance.fly_by_path import fly_by_path
+from flight.guidance.path import fly_by_path
 from flight.mission.itinerary import UNLIMITED
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
@@ -24,7 +24,7 @@ from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from tests.sampled_paths import sample_path
 from world.frames import to_map
 from world.geometry import leg_slopes, signed_turns
-from world.scenario_types import MAP_EXTENT
+from world.scenario_tables import MAP_EXTENT
 
 TURN = 2.0 * math.pi
 

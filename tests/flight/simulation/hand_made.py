@@ -5,11 +5,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.guidance.fly_by_path import FlyByPath
 from flight.guidance.gains import Gains
 from flight.guidance.lateral_reference_laws import WAYPOINT
-from flight.guidance.path_kernels import NODE, PIECE
-from flight.simulation.workspace import Workspace
+from flight.guidance.path import NODE, PIECE, FlyByPath
+from flight.simulation.tick import Workspace
 from world.frames import PolyMap, fit_polymap
 from world.kernels import field_names
 from world.terrain import Heights

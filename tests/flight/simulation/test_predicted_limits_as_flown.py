@@ -1,10 +1,10 @@
-"""What the envelope predicts against what flights show (`tests.bench.limits`); every case with PLANFLY_SOAK=1."""
+"""What the envelope predicts against what flights show (`benchmarks.limits`); every case with PLANFLY_SOAK=1."""
 
 import math
 
 import pytest
 
-from tests.bench.limits import Limit, calm_limits, wind_limits
+from benchmarks.limits import Limit, calm_limits, wind_limits
 from tests.soak import SOAK
 
 

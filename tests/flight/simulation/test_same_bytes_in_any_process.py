@@ -10,7 +10,7 @@ import warnings
 import pytest
 
 from aircraft.catalog import load_aircraft
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from flight.simulation.track import COLUMNS
 from tests.setups import MakeSetup, standard

@@ -4,8 +4,7 @@ import math
 
 import pytest
 
-from flight.simulation.tick import tick
-from flight.simulation.workspace import READ_FIELDS, Workspace
+from flight.simulation.tick import READ_FIELDS, Workspace, tick
 from tests.flight.simulation.hand_made import HEIGHT, RADIUS, level_ground, make_workspace
 
 

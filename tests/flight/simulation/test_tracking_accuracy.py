@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.bench import flight as bench
+from benchmarks import flight as bench
 from tests.soak import SOAK
 
 

@@ -1,6 +1,6 @@
 """Turning angle and slope as flown against the plan, on random feasible missions; 100 with PLANFLY_SOAK=1."""
 
-from tests.bench.angles import angles
+from benchmarks.angles import angles
 from tests.soak import SOAK
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from flight.simulation.track import COLUMNS, Track
-from logs.figures.elements.failures import route_distance
+from logs.figures.failures import route_distance
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import Place
 from world.scenario import Scenario, from_spec

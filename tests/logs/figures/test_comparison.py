@@ -6,7 +6,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.figures.comparison import NamedFlight, draw_both_on_map, draw_both_over_distance
+from flight.simulation.setup import MissionStretch
+from logs.figures.comparison import (
+    NamedFlight,
+    draw_both_on_map,
+    draw_both_over_distance,
+    refly_figures,
+    refly_pictures,
+)
+from logs.recording.example_log import example_log
+from logs.verdict.imported.flown_legs import flown_legs
+from logs.verdict.imported.model_comparison import compare_with_model
 from tests.logs.report.report_data import make_setup, make_track
 from world.wind import Wind
 
@@ -81,3 +91,33 @@ def test_a_small_cross_track_fills_its_panel() -> None:
     panels = draw_both_over_distance((flight, replace(flight, name="second.mcap"))).axes
     (cross,) = [axes for axes in panels if axes.get_ylabel().startswith("cross-track")]
     assert cross.get_ylim() == pytest.approx((-0.07 - 0.0112, 0.07 + 0.0112), abs=1e-6)
+
+
+# ----------------------------------------------------------------------
+# Refly.
+
+LOG = example_log()
+FLOWN = flown_legs(LOG.setup, LOG.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+assert FLOWN is not None
+MOVED = replace(LOG.track, position=LOG.track.position + np.array([0.0, -2.0, 0.0]))
+AGAIN = compare_with_model(LOG.setup, FLOWN, MOVED, "completed")
+NONE = np.full(len(AGAIN.distance), np.nan)
+
+
+def test_a_picture_a_quantity_and_none_of_what_was_not_logged() -> None:
+    assert len(refly_figures(AGAIN)) == 5
+    silent = replace(AGAIN, flown=replace(AGAIN.flown, energy=np.full(len(AGAIN.distance), np.nan)))
+    assert "refly-energy.png" not in refly_figures(silent)
+
+
+def test_lines_are_where_the_data_puts_them() -> None:
+    upper, lower = refly_figures(AGAIN)["refly-cross-track.png"].axes
+    flown, model = (line.get_ydata() for line in upper.lines[:2])
+    assert np.nanmax(np.abs(flown)) < 1e-6
+    assert abs(np.nanmedian(model[: len(model) // 2]) - 2.0) < 1e-6
+    assert lower.get_xlabel() == "along the legs (km)"
+
+
+def test_the_same_bytes_twice() -> None:
+    one = replace(AGAIN, flown=replace(AGAIN.flown, **dict.fromkeys(("bank", "energy", "ground_speed"), NONE)))
+    assert refly_pictures(one) == refly_pictures(one)

@@ -10,7 +10,7 @@ import matplotlib as mpl
 import pytest
 
 from logs.figures.draw_all import draw_map, draw_profile, write_png
-from logs.figures.elements.style import FAIL, png_bytes
+from logs.figures.style import FAIL, png_bytes
 from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
 from tests.logs.figures.figure_data import ALL, FAILED, NONE_TERRAIN, ROUTE, make_scenario, make_track, make_verdict

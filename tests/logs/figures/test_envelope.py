@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.figures.elements.style import FLOWN
 from logs.figures.envelope import draw_envelope_and_flight
+from logs.figures.style import FLOWN
 from tests.logs.report.report_data import make_setup, make_track
 
 

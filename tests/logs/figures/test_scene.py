@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.figures.elements.style import ZONE, png_bytes
 from logs.figures.scene import Projection, draw_scene
+from logs.figures.style import ZONE, png_bytes
 from logs.verdict.places import Place
 from tests.logs.figures.figure_data import make_verdict
 from tests.logs.report.report_data import make_setup, make_track

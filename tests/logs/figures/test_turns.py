@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from logs.figures.elements.style import FAIL, FLOWN
+from logs.figures.style import FAIL, FLOWN
 from logs.figures.turns import draw_turns, place_values
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.places import FLIGHT, Place

@@ -1,14 +1,145 @@
-"""The scene's messages are drawn in the frames that their docstring names."""
+"""The aircraft's model, as another program's reader of glTF has it, in the frame that its transforms move."""
 
+import importlib.util
+import inspect
+import io
+import json
 import math
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
-from logs.recording.foxglove_scene import body_rotation, plan_scene, threats_scene, zones_scene
-from logs.recording.state_channel import EPOCH_NS
+from logs.recording.foxglove_scene import (
+    AIRCRAFT,
+    SPAN,
+    aircraft_glb,
+    aircraft_scene,
+    body_rotation,
+    layout_text,
+    model_corners,
+    plan_scene,
+    threats_scene,
+    zones_scene,
+)
+from logs.recording.recorder import _CHANNELS, ZONES_TOPIC
+from logs.recording.state_channel import EPOCH_NS, FIELDS, STATE_TOPIC
+from tests.clients import need
 from tests.logs.made_flight import make_setup
+
+
+def seen(data: bytes) -> trimesh.Scene:
+    return trimesh.load_scene(io.BytesIO(data), file_type="glb")
+
+
+def test_the_model_has_the_right_sides() -> None:
+    """A viewer turns glTF's y up to its own z: its x, y, z are then forward, left, up."""
+    scene = seen(aircraft_glb())
+    assert len(scene.geometry) == 3
+    points = {}
+    for name, mesh in scene.geometry.items():
+        x, y, z = np.asarray(mesh.vertices).T
+        points[name] = np.stack([x, -z, y], axis=1)
+    every = np.concatenate(list(points.values()))
+    assert np.ptp(every[:, 1]) == pytest.approx(1.0)
+    assert np.ptp(every[:, 0]) == pytest.approx(0.92, abs=0.02)
+    # The fin stands up, at the tail.
+    assert every[every[:, 2].argmax(), 0] < -0.4
+    colours = {name: mesh.visual.material.baseColorFactor for name, mesh in scene.geometry.items()}
+    for name, (red, green, _, _) in colours.items():
+        side = points[name][:, 1].mean()
+        assert (red > green) == (side > 0.1) or abs(side) < 0.1, "red on the left, green on the right"
+    assert sum(len(mesh.faces) for mesh in scene.geometry.values()) == len(model_corners()) == 13
+
+
+def test_the_scene_carries_it_in_the_aircrafts_frame() -> None:
+    (entity,) = SceneUpdate.FromString(aircraft_scene(EPOCH_NS)).entities
+    (model,) = entity.models
+    assert (entity.frame_id, entity.frame_locked, model.media_type) == (AIRCRAFT, True, "model/gltf-binary")
+    assert (model.scale.x, model.scale.y, model.scale.z) == (SPAN,) * 3
+    assert np.ptp(seen(model.data).bounds[:, 2]) * model.scale.y == pytest.approx(100.0)
+    assert model.pose.orientation.w == 1.0
+
+
+# ----------------------------------------------------------------------
+# The layout speaks of topics, fields and settings that are there.
+
+
+def test_the_layout_names_only_topics_and_fields_of_a_log() -> None:
+    layout = json.loads(layout_text())
+    fields = {field.name for field in FIELDS}
+    topics = {*_CHANNELS, STATE_TOPIC, ZONES_TOPIC}
+    assert set(layout["configById"]["3D!planfly"]["topics"]) <= topics
+    for name, panel in layout["configById"].items():
+        for path in panel.get("paths", ()):
+            topic, _, field = path["value"].partition(".")
+            field, _, function = field.partition(".@")
+            assert topic == STATE_TOPIC, name
+            assert field in fields, name
+            # Angles are shown in degrees, and said to be.
+            assert function == ("rad2deg" if field.endswith("_rad") else ""), name
+            assert path["label"] == (field.removesuffix("_rad") + "_deg" if function else field)
+        # A legend beside the curves covers none of them.
+        assert panel.get("legendDisplay", "top") == "top", name
+        named = [panel.get(key) for key in ("followTopic", "topicToRender", "topicPath") if key in panel]
+        assert set(named) | set(panel.get("topics", ())) <= topics
+
+    # A layout file as Foxglove exports one: these parts, and panels of these kinds.
+    assert set(layout) == {"configById", "globalVariables", "userNodes", "playbackConfig", "layout"}
+    assert {name.split("!")[0] for name in layout["configById"]} == {"3D", "map", "Plot", "RosOut", "RawMessages"}
+
+    def leaves(node: Any) -> list[str]:
+        return [node] if isinstance(node, str) else [*leaves(node["first"]), *leaves(node["second"])]
+
+    assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
+
+
+def test_the_layouts_settings_are_those_that_foxglove_knows() -> None:
+    """By the classes that Foxglove publishes for making layouts."""
+    need(
+        None if importlib.util.find_spec("foxglove") is None else Path("/"), "foxglove-sdk", "pip package foxglove-sdk"
+    )
+    from foxglove import layouts as known
+
+    def names(kind: Any) -> set[str]:
+        """Its settings as JSON spells them."""
+        parts = [name.split("_") for name in inspect.signature(kind).parameters]
+        return {first + "".join(word.capitalize() for word in rest) for first, *rest in parts}
+
+    kinds = {
+        "3D": known.ThreeDeeConfig,
+        "map": known.MapConfig,
+        "Plot": known.PlotConfig,
+        "RosOut": known.LogConfig,
+        "RawMessages": known.RawMessagesConfig,
+    }
+    for name, panel in json.loads(layout_text())["configById"].items():
+        # A panel's title stands beside its settings there.
+        assert set(panel) - {"title"} <= names(kinds[name.split("!")[0]]), name
+        for path in panel.get("paths", ()):
+            assert set(path) <= names(known.PlotSeries)
+        assert set(panel.get("cameraState", ())) <= names(known.ThreeDeeCameraState)
+        assert set(panel.get("scene", ())) <= names(known.BaseRendererSceneSettings)
+        # The 3D panel itself reads `axisScale` (FrameAxes.ts); the class of the SDK calls it otherwise.
+        assert set(panel.get("scene", {}).get("transforms", ())) <= {"axisScale", *names(known.BaseRendererTransforms)}
+
+
+def test_the_start_is_in_view() -> None:
+    """Wherever on the map that is: the camera keeps to the aircraft, some ten of its drawn spans away."""
+    panel = json.loads(layout_text())["configById"]["3D!planfly"]
+    assert (panel["followTf"], panel["followMode"], panel["cameraState"]["target"]) == (
+        AIRCRAFT, "follow-position", [0, 0, 0],
+    )  # fmt: skip
+    assert 8.0 < panel["cameraState"]["distance"] / SPAN < 20.0
+    assert panel["scene"]["transforms"]["axisScale"] < SPAN
+    assert panel["topics"]["/scene/aircraft"]["visible"]
+
+
+# ----------------------------------------------------------------------
+# The scene's messages are drawn in the frames that their docstring names.
 
 
 @pytest.mark.parametrize("attitude", [(0.0, 0.0, 0.0), (0.3, -0.2, 1.9), (-1.1, 0.7, -2.8), (math.pi, 0.1, 0.4)])

@@ -1,4 +1,4 @@
-"""A recorded flight comes back bit for bit; rows that cannot be part of it end it."""
+"""Messages and channels of a log are those that mcap's own reader finds."""
 
 import dataclasses
 import math
@@ -10,14 +10,49 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from mcap.reader import make_reader
 
 from flight.simulation.track import COLUMNS, Track
-from logs.recording.reader import read_log
+from logs.recording.reader import log_channels, log_messages, read_log
 from logs.recording.recorder import Recorder
 from logs.recording.state_channel import state_class
 from tests.logs.log_copies import prefix_of, rewrite, same
 from tests.logs.made_flight import make_setup
 from world.errors import LogError
+
+
+def test_every_message_is_given_as_it_was_written(log_file: Path) -> None:
+    with log_file.open("rb") as file:
+        found = [
+            (channel.topic, message.log_time, message.data)
+            for _, channel, message in make_reader(file).iter_messages(log_time_order=False)
+        ]
+    assert [(item.channel.topic, item.log_time, item.data) for item in log_messages(log_file)] == found
+
+
+def test_the_first_chunk_declares_every_channel(log_file: Path) -> None:
+    with log_file.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    schemas = {number: (schema.name, schema.encoding, schema.data) for number, schema in summary.schemas.items()}
+    assert [
+        (channel.topic, channel.encoding, (channel.schema, channel.schema_encoding, channel.schema_data))
+        for channel in log_channels(log_file)
+    ] == [
+        (channel.topic, channel.message_encoding, schemas[channel.schema_id]) for channel in summary.channels.values()
+    ]
+
+
+def test_a_cut_log_gives_its_messages_up_to_the_cut(log_file: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(log_file.read_bytes()[: log_file.stat().st_size * 3 // 4])
+    whole, part = (list(log_messages(path)) for path in (log_file, cut))
+    assert 0 < len(part) < len(whole)
+    assert part == whole[: len(part)]
+
+
+# ----------------------------------------------------------------------
+# A recorded flight comes back bit for bit; rows that cannot be part of it end it.
 
 
 def test_a_track_comes_back_bit_for_bit(log_file: Path, track: Track) -> None:

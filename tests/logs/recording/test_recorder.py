@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from mcap.records import Attachment
 from mcap.stream_reader import StreamReader
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder

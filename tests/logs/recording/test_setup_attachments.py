@@ -1,4 +1,4 @@
-"""A setup comes back whole from its attachments, and one that does not fit is refused."""
+"""A written log's attachments are named and typed as this module has it."""
 
 import dataclasses
 import hashlib
@@ -9,22 +9,83 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.reader import make_reader
 
 from aircraft.envelope import Envelope
 from aircraft.path_limits import Limits
-from flight.ardupilot.parameters import default_parameters, parameters_of
+from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.autopilot_program import AutopilotProgram
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import AutopilotProgram, FlightSetup
 from flight.simulation.track import Track
+from logs.recording import setup_attachments as names
 from logs.recording.reader import read_log
 from logs.recording.setup_attachments import pack_setup, unpack_setup
 from tests.logs.log_copies import Attachments, same
 from tests.logs.made_flight import make_setup, record
 from world import scenario as scenario_module
 from world.errors import LogError
-from world.scenario import from_spec
+from world.scenario import from_spec, load_scenario
+
+
+def test_a_log_holds_exactly_these(log_file: Path) -> None:
+    with log_file.open("rb") as file:
+        found = {one.name: one.media_type for one in make_reader(file).iter_attachments()}
+    assert found == {
+        "setup.json": "application/json",
+        "scenario.json": "application/json",
+        "plan.json": "application/json",
+        "mission.waypoints": "text/plain",
+        "terrain.json": "application/json",
+        "terrain-000.heights": "application/octet-stream",
+        "verdict.json": "application/json",
+        "result.json": "application/json",
+    }
+    fixed = {
+        names.SETUP_FILE,
+        names.SCENARIO_FILE,
+        names.PLAN_FILE,
+        names.MISSION_FILE,
+        names.TERRAIN_FILE,
+        names.VERDICT_FILE,
+        names.RESULT_FILE,
+    }
+    assert fixed | {names.heights_name(0)} == set(found)
+    assert names.RECOVERY_FILE not in found
+
+
+def test_parts_of_the_terrain_sort_in_their_order() -> None:
+    parts = [names.heights_name(part) for part in range(120)]
+    assert sorted(parts) == parts
+    assert len(set(parts)) == 120
+
+
+def test_a_name_of_no_kind_has_no_media_type() -> None:
+    with pytest.raises(KeyError):
+        names.media_type("picture.png")
+
+
+# ----------------------------------------------------------------------
+# Terrain is read from the log alone, bit for bit.
+
+
+def test_a_dem_comes_from_the_log_and_not_from_its_file(
+    tmp_path: Path, track: Track, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = load_scenario("jacksboro")
+    assert scenario.terrain is not None
+    setup = dataclasses.replace(make_setup(with_plan=False), scenario=scenario)
+    path = record(tmp_path / "a.mcap", setup, track)
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("the elevation file was opened")
+
+    monkeypatch.setattr(scenario_module, "open_raster", refuse)
+    same(read_log(path).setup.scenario, scenario)
+
+
+# ----------------------------------------------------------------------
+# A setup comes back whole from its attachments, and one that does not fit is refused.
 
 
 @pytest.mark.parametrize("with_plan", [True, False])

@@ -1,10 +1,32 @@
-"""State messages are whole rows of the track to readers that know only the schema in the file."""
+"""Arrays of messages have the bytes that the protobuf library gives to each message."""
 
 from pathlib import Path
 
+import numpy as np
+import pytest
+from foxglove_schemas_protobuf.LinePrimitive_pb2 import LinePrimitive
+from foxglove_schemas_protobuf.Point3_pb2 import Point3
+from google.protobuf.wrappers_pb2 import BytesValue
+
 from flight.simulation.track import Track
-from logs.recording.state_channel import EPOCH_NS
+from logs.recording.state_channel import EPOCH_NS, length_delimited, repeated_submessages
 from tests.logs.mcap_messages import messages
+
+
+def test_repeated_messages_read_as_those_of_the_library() -> None:
+    values = np.random.default_rng(3).normal(size=(50, 3))
+    data = repeated_submessages(LinePrimitive.POINTS_FIELD_NUMBER, "xyz", values)
+    points = [Point3(x=x, y=y, z=z) for x, y, z in values.tolist()]
+    assert data == LinePrimitive(points=points).SerializeToString()
+
+
+@pytest.mark.parametrize("size", [1, 127, 128, 16_384, 3_000_000])
+def test_a_field_of_bytes_has_the_librarys_length(size: int) -> None:
+    assert length_delimited(1, bytes(size)) == BytesValue(value=bytes(size)).SerializeToString()
+
+
+# ----------------------------------------------------------------------
+# State messages are whole rows of the track to readers that know only the schema in the file.
 
 
 def test_an_independent_reader_finds_every_row_with_its_values(log_file: Path, track: Track) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.replay.instruments import LEAST_WIDTH, make_instruments

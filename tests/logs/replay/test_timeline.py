@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flight.simulation.field_source import FieldSource
+from flight.simulation.setup import FieldSource
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.replay.instruments import make_instruments
 from logs.replay.timeline import TimelineEntry, entry_lines, timeline
-from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
+from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from tests.logs.made_flight import make_setup, make_track
 
 

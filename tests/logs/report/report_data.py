@@ -13,7 +13,7 @@ import numpy as np
 from aircraft.envelope import Envelope
 from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
-from flight.simulation.flight_setup import FlightSetup, make_limits
+from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.track import COLUMNS, Track
 from logs.report.page import write_report
 from logs.verdict.findings import Finding, Verdict

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, read_log
-from logs.report.compare import compare_logs
-from logs.report.compare_page import write_comparison
+from logs.report.compare import compare_logs, write_comparison
 from logs.report.page import write_report
 from logs.verdict.judge_flight import judge_flight
 from tests.browser import Browser

@@ -1,21 +1,31 @@
-"""The report is whole in one file, safe with hostile names, the verdict first."""
+"""Captions of the pictures that were drawn, and of no others, fitting what was flown."""
 
 import base64
+import gzip
 import hashlib
 import json
 import re
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from plotly.offline import get_plotlyjs
 
 import logs.figures.draw_all
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.figures.draw_all import FIGURE_FILES
-from logs.report.page import write_report
-from logs.report.page_parts import page_library
+from logs.report.page import (
+    CHART_SCRIPTS,
+    VIEW_SCRIPTS,
+    page_library,
+    report_pictures,
+    script_text,
+    style_text,
+    write_report,
+)
 from logs.verdict.findings import Verdict
 from logs.verdict.places import Place
 from tests.logs.report.report_data import (
@@ -31,6 +41,74 @@ from tests.logs.report.report_data import (
     report_html,
 )
 from tests.soak import SOAK
+
+NAMES = (*FIGURE_FILES, "time", "exposure", "controls", "energy")
+DRAWN = {f"{name}.png": name.encode() for name in NAMES}
+
+
+def test_every_picture_that_is_drawn_has_its_caption_and_its_bytes() -> None:
+    pictures = report_pictures(make_setup(), True, DRAWN)
+    assert sorted(picture.identifier for picture in pictures) == sorted(NAMES)
+    for picture in pictures:
+        head, _, data = picture.data.partition(",")
+        assert head == "data:image/png;base64"
+        assert base64.b64decode(data) == picture.identifier.encode()
+        assert picture.title
+        assert len(picture.alternative) > 30
+        assert len(picture.caption) > 30
+    assert len({picture.title for picture in pictures}) == len({picture.caption for picture in pictures}) == len(NAMES)
+    assert pictures[0].identifier == "map"
+
+
+def test_what_was_not_drawn_is_left_out_in_the_same_order() -> None:
+    whole = [picture.identifier for picture in report_pictures(make_setup(), True, DRAWN)]
+    some = {name: data for name, data in DRAWN.items() if name not in ("scene.png", "time.png")}
+    left = [picture.identifier for picture in report_pictures(make_setup(), True, some)]
+    assert left == [name for name in whole if name not in ("scene", "time")]
+    assert report_pictures(make_setup(), True, {}) == []
+
+
+def test_a_plan_alone_is_not_said_to_have_been_flown() -> None:
+    setup = make_setup(terrain={"kind": "none"}, threats=[])
+    drawn = {name: DRAWN[name] for name in ("map.png", "profile.png", "scene.png")}
+    flown, planned = report_pictures(make_setup(), True, drawn), report_pictures(setup, False, drawn)
+    assert all("flown" in picture.alternative for picture in flown)
+    assert not any("flown" in picture.alternative for picture in planned)
+    # Three legs and one unit over terrain; the other has neither.
+    assert "shaded terrain, 1 threats, the planned path of 3 legs" in flown[0].alternative
+    assert "no terrain, 0 threats, the planned path of 3 legs." in planned[0].alternative
+
+
+# ----------------------------------------------------------------------
+# The page's scripts are whole files of their own, and plotly.js comes out of the page as it went in.
+
+
+def test_plotly_comes_out_as_it_went_in_and_its_hash_is_named() -> None:
+    library = page_library()
+    text = gzip.decompress(base64.b64decode(library.packed))
+    assert text.decode("utf-8") == get_plotlyjs()
+    assert library.digest == "sha256-" + base64.b64encode(hashlib.sha256(text).digest()).decode()
+    assert library.version in text[:200].decode()
+    # A third of the script, so that a page with all it may hold stays below 8 MB.
+    assert len(library.packed) < 2.2e6
+
+
+def test_every_script_stands_in_the_page_once_and_none_is_long() -> None:
+    folder = resources.files("logs.report").joinpath("templates", "scripts")
+    names = {file.name.removesuffix(".js") for file in folder.iterdir()}
+    assert names == {*CHART_SCRIPTS, *VIEW_SCRIPTS, "start"}
+    whole = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
+    for name in names:
+        text = folder.joinpath(f"{name}.js").read_text(encoding="utf-8")
+        assert whole.count(text) == 1
+        assert text.startswith("// ")
+        assert text.count("\n") <= 200, name
+    assert "</script" not in whole
+    assert "http" not in whole + style_text("style", "report", "compare")
+
+
+# ----------------------------------------------------------------------
+# The report is whole in one file, safe with hostile names, the verdict first.
 
 
 @pytest.fixture

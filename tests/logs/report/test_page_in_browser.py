@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.report.page import write_report
 from logs.verdict.judge_flight import judge_flight

@@ -1,16 +1,82 @@
-"""Numbers keep their value and unit as text, and rows of findings their order."""
+"""What would have passed is the limit on the side to which the margin counts, with what the verdict knows beside it."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from logs.report.text import badge_of, finding_rows, number, quantity, rule_rows
-from logs.verdict.findings import Finding, Verdict
-from logs.verdict.places import FLIGHT, Place
+from flight.simulation.setup import MissionStretch
+from logs.recording.example_log import example_log
+from logs.report.text import (
+    badge_of,
+    finding_rows,
+    left_lines,
+    number,
+    quantity,
+    refly_lines,
+    rule_rows,
+    trust_line,
+    would_pass,
+)
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.imported.flown_legs import flown_legs
+from logs.verdict.imported.model_comparison import Spread, compare_with_model
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place
 from logs.verdict.wording import place_text
 from tests.logs.report.report_data import FINDINGS, finding
+from world.scenario import with_wind
+
+LEG = Place("leg", 4)
+DECIDING = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", LEG, -8.2)
+
+
+def failed(rule: str, flown: float | None, limit: float, margin: float | None, place: Place = LEG) -> Finding:
+    return make_finding(rule, place, ok=False, reason="", flown=flown, limit=limit, margin=margin)
+
+
+@pytest.mark.parametrize(
+    ("rule", "flown", "limit", "margin", "bound"),
+    [
+        ("clearance", 52.0, 60.0, -8.0, "at least"),
+        ("stall", 15.0, 17.5, -2.5, "at least"),
+        ("bounds", -7.0, 0.0, -7.0, "at least"),
+        ("turn", 59.0, 9.0, -50.0, "at most"),
+        ("threat", 1.6, 0.0, -1.6, "at most"),
+        # Descents: the steepness is bounded, not the number.
+        ("slope", -11.0, -9.5, -1.5, "at most"),
+        ("energy", 800.0, 710.0, -90.0, "at most"),
+    ],
+)
+def test_the_number_that_passes_bounds_on_the_side_of_the_margin(
+    rule: str, flown: float, limit: float, margin: float, bound: str
+) -> None:
+    found = would_pass(failed(rule, flown, limit, margin), None)
+    assert (found.bound, found.value, found.misses) == (bound, limit, -margin)
+    assert found
+
+
+def test_a_finding_that_fails_by_other_evidence_names_no_number() -> None:
+    found = would_pass(failed("turn", 6.9, 15.6, 8.7), None)
+    assert (found.bound, found.value, found.misses) == (None, None, None)
+    assert not found
+
+
+def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
+    low = failed("clearance", 52.0, 60.0, -8.0)
+    assert would_pass(low, DECIDING).parameter == DECIDING
+    assert would_pass(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5)), DECIDING).parameter is None
+    assert would_pass(failed("height", 52.0, 60.0, -8.0), DECIDING).parameter is None
+
+
+def test_suggestions_are_those_of_the_finding() -> None:
+    change = (Change("height", LEG, None, 9.0, "m"),)
+    assert would_pass(replace(failed("turn", 6.9, 15.6, 8.7), suggestions=(change,)), None).suggestions == (change,)
+
+
+# ----------------------------------------------------------------------
+# Numbers keep their value and unit as text, and rows of findings their order.
 
 
 @pytest.mark.parametrize(
@@ -66,3 +132,48 @@ def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) 
         assert row.where in [place_text(item.place) for item in findings if item.margin == worst]
     states = [item.state for item in finding_rows(findings)]
     assert states == sorted(states, key=["fail", "pass", "unjudged"].index)
+
+
+# ----------------------------------------------------------------------
+# Refly lines.
+
+LOG = example_log()
+FLOWN = flown_legs(LOG.setup, LOG.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+assert FLOWN is not None
+AGAIN = compare_with_model(LOG.setup, FLOWN, LOG.track, "completed")
+
+
+def test_a_row_a_leg_and_a_turn() -> None:
+    lines = refly_lines(AGAIN)
+    assert [line.split()[:2] for line in lines if line.startswith(("leg", "waypoint"))] == [
+        ["leg", "0"],
+        ["leg", "1"],
+        ["waypoint", "1"],
+    ]
+
+
+def test_what_is_not_known_is_a_dash() -> None:
+    silent = replace(AGAIN.legs[0], energy=(math.nan, 2.0))
+    assert "- / 2.0" in refly_lines(replace(AGAIN, legs=(silent,)))[2]
+
+
+def test_the_trust_is_a_line_with_medians() -> None:
+    spread = (Spread("cross_track", "m", 0.5, 2.0),)
+    line = trust_line(replace(AGAIN, spreads=spread))
+    blown = "Model aerosonde in 0.0 m/s of wind, no gusts, against the flight"
+    assert line == f"{blown}, median (95 %): cross-track 0.50 m (2.00 m)"
+    scenario = with_wind(AGAIN.setup.scenario, 4.0, 0.0, "light")
+    gusty = replace(AGAIN, setup=replace(AGAIN.setup, scenario=scenario))
+    assert "in 4.0 m/s of wind, light turbulence, against" in trust_line(gusty)
+    assert "which stands in for an aircraft that is not named" in trust_line(replace(AGAIN, stands_in=True))
+    assert "ended early: departure" in trust_line(replace(AGAIN, ended="departure"))
+    assert "no place in common" in trust_line(replace(AGAIN, spreads=()))
+
+
+def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
+    other = MissionStretch(50.0, 60.0, "AUTO", "log")
+    assert left_lines((AGAIN,), (AGAIN.stretch,), 9) == []
+    (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 9)
+    assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order"
+    (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 1)
+    assert line.endswith("in order, or 1 longer ones were")

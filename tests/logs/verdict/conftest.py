@@ -2,7 +2,7 @@
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.logs.verdict.judging import ROUTE
 from tests.synthetic import fly_path, make_setup

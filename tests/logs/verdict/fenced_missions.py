@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_setup
 from tests.setups import spec_around

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict, verdict_json
 from logs.verdict.judge_flight import judge_flight

@@ -9,11 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import RULES, verdict_json
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.places import FLIGHT, Place
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of, waypoint
 from tests.synthetic import (

@@ -1,8 +1,12 @@
 """A plan that is not feasible has a verdict without a flight."""
 
-from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.findings import verdict_json
+from flight.simulation.setup import FlightSetup
+from logs.recording.example_log import example_log
+from logs.verdict.findings import RULES, verdict_json
 from logs.verdict.judge_flight import judge_plan_only
+from logs.verdict.judge_geometry import flown_findings
+from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.places import PLAN
 from tests.logs.verdict.judging import bad_plan, failing
 
@@ -15,3 +19,22 @@ def test_a_plan_that_is_not_feasible(setup: FlightSetup) -> None:
     assert failing(verdict) == {("slope", PLAN), ("completion", PLAN)}
     assert "slope" in verdict.summary.split("\n")[0]
     assert "leg 2: slope 16.6 deg" in verdict.summary
+
+
+# ----------------------------------------------------------------------
+# Flown findings.
+
+
+def test_rules_come_in_the_verdicts_order() -> None:
+    log = example_log()
+    demands = route_demands(log.setup)
+    findings = flown_findings(demands, lay_track(demands, log.track), "completed", True, True)
+    order = list(RULES)
+    assert [order.index(item.rule) for item in findings] == sorted(order.index(item.rule) for item in findings)
+
+
+def test_without_the_envelope_nothing_is_said_of_the_stall() -> None:
+    log = example_log()
+    demands = route_demands(log.setup, envelope=False)
+    findings = flown_findings(demands, lay_track(demands, log.track), "completed", True, False)
+    assert not [item for item in findings if item.rule == "stall"]

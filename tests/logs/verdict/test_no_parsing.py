@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.elements.failures import failures
+from logs.figures.failures import failures
 from logs.figures.turns import place_values
 from logs.report.text import badge_of, rule_rows
 from logs.verdict import findings, wording

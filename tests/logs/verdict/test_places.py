@@ -1,10 +1,29 @@
 """Places are values: equal by what they hold, usable as keys, and not to be changed."""
 
 import dataclasses
+import json
+from dataclasses import replace
 
 import pytest
 
-from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Disagreement, Place
+from flight.autopilots.arduplane.parameters import default_parameters
+from flight.simulation.setup import AutopilotProgram, FlightSetup
+from logs.verdict.findings import Verdict, verdict_json
+from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.verdict.places import (
+    FLIGHT,
+    MISSION,
+    PLAN,
+    AirframeAnswer,
+    Change,
+    DecidingParameter,
+    Disagreement,
+    FlownBeside,
+    Place,
+)
+from logs.verdict.wording import deciding_text
+from tests.logs.verdict.judging import leg
+from tests.synthetic import bump, fly_path, make_setup
 
 
 def test_places_of_the_same_data_are_one_key() -> None:
@@ -30,3 +49,108 @@ def test_a_place_a_change_and_a_disagreement_cannot_be_changed() -> None:
         with pytest.raises(dataclasses.FrozenInstanceError):
             setattr(thing, field, 1)
     assert {change: 1}[dataclasses.replace(change)] == 1
+
+
+# ----------------------------------------------------------------------
+# Three levels in one verdict: which are asked, where they differ, and whose fault a failure is.
+
+STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
+PASSED = AirframeAnswer(True, "flyable")
+DECIDING = DecidingParameter("NAVL1_PERIOD", 17.0, 14.0, "s", "corridor", leg(1), 70.0)
+
+
+@pytest.fixture(scope="module")
+def autopilot() -> FlightSetup:
+    return replace(make_setup(STRAIGHT, limits={"corridor_m": 60.0}), parameters=default_parameters())
+
+
+def aside(setup: FlightSetup, metres: float, beside: FlownBeside | None) -> Verdict:
+    """The verdict on a flight that is so far beside its second leg."""
+    return judge_flight(setup, fly_path(setup, across=bump(4500.0, metres, 150.0)), "completed", beside=beside)
+
+
+def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> None:
+    ideal = replace(autopilot, parameters=None)
+    asked = {
+        ("geometry",): judge_geometry(ideal),
+        ("geometry", "airframe"): aside(ideal, 0.0, None),
+        ("geometry", "autopilot"): aside(autopilot, 0.0, None),
+        ("geometry", "airframe", "autopilot"): aside(autopilot, 0.0, FlownBeside(PASSED)),
+    }
+    for names, verdict in asked.items():
+        assert tuple(level.name for level in verdict.levels) == names
+        assert verdict.flyable
+        assert all(level.flyable for level in verdict.levels)
+        assert verdict.levels[-1].headline == verdict.headline
+    three = asked["geometry", "airframe", "autopilot"]
+    assert three.lines[-2:] == (
+        "By geometry alone: flyable; flight and geometry agree on every finding",
+        "By the airframe (planfly's guidance, exact navigation): flyable; both flights agree",
+    )
+
+
+def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: FlightSetup) -> None:
+    verdict = aside(autopilot, 70.0, FlownBeside(PASSED, DECIDING))
+    assert verdict.lines[:2] == (
+        "not flyable: corridor on leg 1, to item 2 (70.0 m > 60.0 m)",
+        "The aircraft can, ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it 70 m off leg 1; 14 would"
+        " pass",
+    )
+    assert [level.flyable for level in verdict.levels] == [True, True, False]
+    for level in verdict.levels[:2]:
+        assert level.disagreements == (Disagreement("corridor", leg(1), level.name, there=True, here=False),)
+    assert verdict.lines[-1].endswith(
+        "flyable; corridor at leg 1, to item 2, passes with planfly's guidance and fails in flight"
+    )
+    assert verdict.deciding == DECIDING
+    written = json.loads(verdict_json(verdict))
+    assert [level["name"] for level in written["levels"]] == ["geometry", "airframe", "autopilot"]
+    assert written["deciding_parameter"]["name"] == "NAVL1_PERIOD"
+    assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
+    undecided = aside(autopilot, 70.0, FlownBeside(PASSED))
+    assert undecided.lines[1].endswith("cannot: no single parameter that was tried would pass")
+
+
+def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
+    program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0" * 64, {}, {})
+    real = replace(autopilot, program=program)
+    said = aside(real, 70.0, FlownBeside(PASSED, DECIDING)).lines[1]
+    assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the flight of its law")
+    assert aside(real, 70.0, FlownBeside(PASSED)).lines[1].endswith("with these parameters cannot")
+
+
+def test_where_the_aircraft_fails_too_no_parameter_is_blamed(autopilot: FlightSetup) -> None:
+    failed = AirframeAnswer(False, "not flyable: corridor on leg 1 (65.0 m > 60.0 m)", (("corridor", leg(1)),))
+    verdict = aside(autopilot, 70.0, FlownBeside(failed))
+    assert "The aircraft can" not in verdict.summary
+    assert verdict.levels[1].disagreements == ()
+    assert verdict.lines[-1].endswith("(65.0 m > 60.0 m); both flights agree")
+
+
+def test_where_only_the_aircraft_fails_the_verdict_is_the_autopilots(autopilot: FlightSetup) -> None:
+    failed = AirframeAnswer(False, "not flyable: corridor on leg 1 (65.0 m > 60.0 m)", (("corridor", leg(1)),))
+    verdict = aside(autopilot, 0.0, FlownBeside(failed, DECIDING))
+    assert (verdict.flyable, verdict.deciding) == (True, None)
+    assert verdict.levels[1].disagreements == (Disagreement("corridor", leg(1), "airframe", there=False, here=True),)
+
+
+@pytest.mark.parametrize(
+    ("rule", "off", "text"),
+    [
+        ("clearance", -8.2, "TECS_HDEM_TCONST 3 puts it 8 m low on leg 4; 1.2 would pass"),
+        ("clearance", 8.2, "TECS_HDEM_TCONST 3 puts it 8 m high on leg 4; 1.2 would pass"),
+        ("corridor", 41.0, "TECS_HDEM_TCONST 3 takes it 41 m off leg 4; 1.2 would pass"),
+        ("waypoint", None, "TECS_HDEM_TCONST 3 fails waypoint at leg 4; 1.2 would pass"),
+    ],
+)
+def test_words_of_a_deciding_parameter(rule: str, off: float | None, text: str) -> None:
+    assert deciding_text(DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", rule, leg(4), off)) == text
+
+
+def test_a_flight_that_never_began_fails_its_own_level_and_not_geometry(autopilot: FlightSetup) -> None:
+    for setup, name in ((autopilot, "autopilot"), (replace(autopilot, parameters=None), "airframe")):
+        verdict = judge_flight(setup, fly_path(setup).rows(0, 0), "not started: no way made")
+        assert [(level.name, level.flyable) for level in verdict.levels] == [("geometry", True), (name, False)]
+        assert verdict.headline == verdict.levels[-1].headline
+        assert "not started: no way made" in verdict.headline
+        assert verdict.lines[-1] == "By geometry alone: flyable"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry

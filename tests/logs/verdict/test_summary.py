@@ -1,13 +1,13 @@
 """The summary's first line: the answer, the worst of each rule, and no more than four of them."""
 
 from dataclasses import replace
+from xml.etree import ElementTree
 
-from flight.ardupilot.parameters import default_parameters, parameters_of
-from flight.simulation.autopilot_program import AutopilotProgram
-from logs.verdict.findings import RULES, Finding, make_finding, message
-from logs.verdict.levels import LevelAnswer
-from logs.verdict.places import FLIGHT, Place
-from logs.verdict.summary import flown_by, headline, summary_lines
+from flight.autopilots.arduplane.parameters import default_parameters, parameters_of
+from flight.simulation.setup import AutopilotProgram
+from logs.verdict.findings import RULES, Finding, Verdict, make_finding, message
+from logs.verdict.places import FLIGHT, Change, LevelAnswer, Place
+from logs.verdict.summary import flown_by, headline, summary_lines, verdict_html
 from tests.logs.verdict.judging import leg, missile, waypoint
 from tests.synthetic import make_setup
 
@@ -98,3 +98,44 @@ def test_who_flew_is_said_with_the_parameters_that_decide_most() -> None:
     returns = parameters_of("RTL_RADIUS 80\nALT_HOLD_RTL 12000\n", "mine.parm")
     lines = summary_lines([], replace(setup, parameters=returns), "flown", levels)
     assert any(line.endswith("defaults; read, not flown: RTL_ALTITUDE, RTL_RADIUS") for line in lines)
+
+
+# ----------------------------------------------------------------------
+# A verdict on a terminal's one line, and as a notebook shows it.
+
+TURN = Place("waypoint", 1)
+FAILS = make_finding("turn", TURN, ok=False, reason="turns 90° <of 60°>", planned=90.0, limit=60.0)
+PASSES = make_finding("turn", Place("waypoint", 2), ok=True, reason="turns 10°")
+UNKNOWN = make_finding("clearance", Place("leg", 0), ok=None, reason="no terrain")
+VERDICT = Verdict((FAILS, PASSES, UNKNOWN), flyable=False, complete=True, lines=("not flyable: turn",), level="flown")
+
+
+def test_a_verdict_prints_in_a_line_whatever_it_holds() -> None:
+    assert repr(VERDICT) == "<Verdict flown: not flyable; 3 findings, 1 failed>"
+    many = Verdict((PASSES,) * 500, flyable=True, complete=True, lines=("flyable",), level="geometric")
+    assert repr(many) == "<Verdict geometric: flyable; 500 findings, 0 failed>"
+    cut = Verdict((PASSES,), flyable=False, complete=False, lines=(), level="flown")
+    assert repr(cut) == "<Verdict flown: incomplete; 1 findings, 0 failed>"
+
+
+def test_a_notebook_shows_each_rule_and_what_fails_of_it() -> None:
+    page = ElementTree.fromstring(VERDICT._repr_html_())
+    rows = [[cell.text or "" for cell in row] for row in page.find("table/tbody") or ()]
+    assert rows == [
+        ["turns", "1 of 2 ok", "", ""],
+        ["", "waypoint 1", "turns 90° <of 60°>", ""],
+        ["clearance", "not judged", "", ""],
+    ]
+    assert page.findtext("strong") == "not flyable: turn"
+
+
+def test_what_would_pass_stands_beside_what_fails() -> None:
+    change = Change("turn", TURN, 90.0, 60.0, "deg")
+    failing = make_finding("turn", TURN, ok=False, reason="too far")
+    mended = replace(failing, suggestions=((change,),))
+    text = verdict_html(Verdict((mended,), flyable=False, complete=True, lines=("no",), level="flown"))
+    assert "turn at most 60.0° there" in text
+
+
+def test_the_failed_findings_are_at_hand() -> None:
+    assert VERDICT.failed == (FAILS,)

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.places import FLIGHT, MISSION, PLAN, Change, Place
 from logs.verdict.wording import change_text, place_text, shortened, suggestion_text, suggestions_text

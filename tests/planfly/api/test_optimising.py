@@ -10,12 +10,10 @@ import planfly
 from planfly.airframe import load_airframe
 from planfly.api.optimising import Model
 from planner.plan import Violation
-from planner.search import path_generations
+from planner.search import generations as path_generations
 from planner.search.plan_path import plan_path
-from planner.search.score_table import KILL, LENGTH
-from planner.search.search_state import Search
-from world.scenario import load_scenario
-from world.scenario_variants import with_planner
+from planner.search.search_state import KILL, LENGTH, Search
+from world.scenario import load_scenario, with_planner
 
 EDAS: tuple[Model, ...] = ("umda", "emna")
 

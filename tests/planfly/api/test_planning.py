@@ -1,18 +1,66 @@
-"""`planfly.plan` and `planfly.scenarios`: the planner's own plans, by every way to name a scenario."""
+"""A scenario by name, path or itself, and what keywords change in it."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import planfly
+from aircraft.catalog import aircraft_names, load_aircraft
 from planfly.airframe import load_airframe
+from planfly.api.planning import changed_scenario, opened_scenario
 from planner.plan import plan_json, read_plan
 from planner.search.plan_path import plan_path
 from tests.planfly.conftest import FIELD
 from tests.setups import small_scenario
-from world.scenario import embedded_names, load_scenario
-from world.scenario_variants import with_wind
+from world.errors import ScenarioError
+from world.scenario import embedded_names, load_scenario, with_wind
+
+
+def test_a_scenario_is_named_in_three_ways(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text(FIELD)
+    named = load_scenario("tight")
+    assert opened_scenario(named) is named
+    assert opened_scenario("tight").name == "tight"
+    as_text, as_path = opened_scenario(str(tmp_path / "mine.toml")), opened_scenario(tmp_path / "mine.toml")
+    assert as_text.to_json() == as_path.to_json()
+
+
+def test_nothing_asked_changes_nothing() -> None:
+    scenario = load_scenario("tight")
+    assert changed_scenario(scenario).to_json() == scenario.to_json()
+
+
+def test_each_keyword_changes_its_own(tmp_path: Path) -> None:
+    scenario = load_scenario("tight")
+    (tmp_path / "my.parm").write_text("WP_RADIUS 50\n")
+    windy = changed_scenario(scenario, wind=(8.0, 270.0))
+    assert windy.wind.speed == 8.0
+    assert np.degrees(windy.wind.from_course) == pytest.approx(270.0)
+    assert changed_scenario(scenario, turbulence="light").wind.turbulence == "light"
+    assert changed_scenario(scenario, airspeed=28.0).flight.airspeed_mps == 28.0
+    assert changed_scenario(scenario, guidance="l1").flight.steering.guidance == "l1"
+    assert changed_scenario(scenario, nav="rtk").flight.steering.nav == "rtk"
+    for params in (tmp_path / "my.parm", str(tmp_path / "my.parm")):
+        assert changed_scenario(scenario, params=params).flight.params == str(tmp_path / "my.parm")
+
+
+def test_an_aircraft_is_a_name_or_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = load_scenario("tight")
+    assert changed_scenario(scenario, aircraft="c172x").flight.aircraft == "c172x"
+    monkeypatch.chdir(tmp_path)
+    # A path is a folder even where it looks like a name.
+    assert changed_scenario(scenario, aircraft=Path("c172x")).flight.aircraft == str(tmp_path / "c172x")
+
+
+def test_a_value_that_no_scenario_may_have_is_refused() -> None:
+    with pytest.raises(ScenarioError, match="speed_mps: 50"):
+        changed_scenario(load_scenario("tight"), wind=(50.0, 0.0))
+
+
+# ----------------------------------------------------------------------
+# `planfly.plan` and `planfly.scenarios`: the planner's own plans, by every way to name a scenario.
 
 
 def test_it_is_the_planners_plan(path: planfly.Plan) -> None:
@@ -71,3 +119,29 @@ def test_the_scenarios_are_those_embedded() -> None:
     found = planfly.scenarios()
     assert tuple(found) == tuple(embedded_names())
     assert found["tight"] == load_scenario("tight").spec.description
+
+
+# ----------------------------------------------------------------------
+# `planfly.aircraft`: those embedded, and one in a folder.
+
+
+def test_without_a_name_all_embedded_ones_come() -> None:
+    assert planfly.aircraft() == {name: load_aircraft(name) for name in aircraft_names()}
+
+
+@pytest.mark.parametrize("kind", [str, Path])
+def test_a_folder_is_named_as_text_or_path(kind: type, tmp_path: Path) -> None:
+    shutil.copytree(load_aircraft("aerosonde").folder, tmp_path / "mine")
+    (tmp_path / "mine" / "aerosonde.toml").rename(tmp_path / "mine" / "mine.toml")
+    (tmp_path / "mine" / "aerosonde.xml").rename(tmp_path / "mine" / "mine.xml")
+    found = planfly.aircraft(kind(tmp_path / "mine"))
+    assert (found.name, found.mass, found.folder) == ("mine", load_aircraft("aerosonde").mass, tmp_path / "mine")
+
+
+@pytest.mark.parametrize(
+    ("name", "file"), [("cessna", "cessna"), (Path("nowhere"), str(Path("nowhere/nowhere.toml").resolve()))]
+)
+def test_a_name_that_is_none_is_bad_input(name: str | Path, file: str) -> None:
+    with pytest.raises(planfly.FlightError) as caught:
+        planfly.aircraft(name)
+    assert caught.value.file == file

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 import planfly
 from flight.mission_files.formats import read_mission
 from logs.figures import draw_all
-from logs.figures.elements.style import new_figure, png_bytes
+from logs.figures.style import new_figure, png_bytes
 from planfly.cli import main
 
 FLOWN = ["map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy"]

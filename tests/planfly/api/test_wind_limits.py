@@ -12,7 +12,7 @@ from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow
 from planfly.campaigns.spread.draws import draw_flight
 from planfly.campaigns.statistics.wind_boundary import Direction
-from planfly.campaigns.storage.winds_store import AskedFlight, WindsStore
+from planfly.campaigns.storage.stores import AskedFlight, WindsStore
 from tests.planfly.campaigns.made_campaigns import table
 from tests.planfly.campaigns.statistics.made_directions import no_numbers
 

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from logs.verdict.places import Place
-from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign
+from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, open_campaign
 from planfly.campaigns.flights.flight_row import FlightRow, LeastMargin
-from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.draws import draw_flight
 from planfly.campaigns.spread.spread_file import FlightSpread, default_spread
-from planfly.campaigns.storage.row_values import NOT_THE_SAME
+from planfly.campaigns.storage.table import NOT_THE_SAME
 
 SCENARIO = """\
 name = "short"

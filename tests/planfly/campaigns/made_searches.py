@@ -8,13 +8,12 @@ from pathlib import Path
 import pytest
 
 from planfly.campaigns import find_winds as module
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.flight_loop import Flown, Order
-from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.engine.flight_loop import Flown, FlyOne, Order
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.storage.row_values import row_of
-from planfly.campaigns.storage.winds_store import KIND, WINDS_DATABASE, AskedFlight, narrow_passes_of
+from planfly.campaigns.storage.stores import WINDS_DATABASE, WINDS_KIND, AskedFlight, narrow_passes_of
+from planfly.campaigns.storage.table import row_of
 from tests.planfly.campaigns.made_campaigns import made_flight, table
 
 GOAL = WindsGoal(0.9, 0.95, 4, 20.0, 400)
@@ -61,7 +60,7 @@ def keep_part(base: CampaignBase, whole: Path, part: Path, numbers: set[int], go
     with open_winds_store(base, goal, part, resume=False) as store:
         for values in table(whole / WINDS_DATABASE):
             if values[0] in numbers:
-                known = dict(zip(KIND.columns, (*values, 0.0, ""), strict=True))
+                known = dict(zip(WINDS_KIND.columns, (*values, 0.0, ""), strict=True))
                 row = replace(row_of(known["draw"], known), narrow=narrow_passes_of(known["narrow"]))
                 store.add(AskedFlight(*values[:4]), row)
 

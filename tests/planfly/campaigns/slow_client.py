@@ -8,12 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from planfly.campaigns.engine.cluster import Workers
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import ASKED, WindsGoal, find_winds, open_winds_store
 from planfly.campaigns.fly_campaign import fly_campaign, open_store
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.held_table import HeldTable
+from planfly.campaigns.storage.table import HeldTable
 from tests.planfly.campaigns.made_campaigns import short_base, slow_flight
 
 

@@ -17,7 +17,7 @@ from planfly.campaigns.flights.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.store import DATABASE
+from planfly.campaigns.storage.stores import DATABASE
 from planfly.terminal.parser import build_parser
 from tests.planfly.campaigns.made_campaigns import short_base, write_short
 from world.errors import PlanflyError

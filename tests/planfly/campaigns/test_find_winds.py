@@ -13,8 +13,8 @@ import pytest
 
 from logs.verdict.places import Place
 from planfly.campaigns import find_winds as module
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.engine.flight_loop import FlyOne
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import (
     ASKED,
     WindsFound,
@@ -24,12 +24,11 @@ from planfly.campaigns.find_winds import (
     find_winds,
     open_winds_store,
 )
-from planfly.campaigns.flights.campaign_base import CampaignBase
+from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
-from planfly.campaigns.flights.varied_flight import GivenWind
 from planfly.campaigns.spread.spread_file import default_spread
-from planfly.campaigns.storage.held_table import StoreError
-from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, FlownFlight
+from planfly.campaigns.storage.stores import WINDS_DATABASE, AskedFlight, FlownFlight
+from planfly.campaigns.storage.table import StoreError
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     deadly_in_the_east,
@@ -188,7 +187,7 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("planfly.campaigns.engine.flight_rate.TOLD_EVERY", 0.0)
+    monkeypatch.setattr("planfly.campaigns.engine.flight_loop.TOLD_EVERY", 0.0)
     monkeypatch.setattr(module, "FEWEST", 30)
     monkeypatch.setattr(module, "ACCURACY", 0.8)
     goal = replace(GOAL, flights=600)

@@ -14,18 +14,15 @@ from typing import Any, cast
 
 import pytest
 
-from planfly.campaigns.engine.cluster import Workers
-from planfly.campaigns.engine.flight_loop import Order, Pilots
-from planfly.campaigns.engine.flight_tasks import FlyOne
+from planfly.campaigns.engine.flight_loop import FlyOne, Order, Pilots
+from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, fly_one, lost_row
 from planfly.campaigns.fly_campaign import _Book, _fly_rest, _Pace, fly_campaign, open_store, resumed_goal
 from planfly.campaigns.report.summary import summarise
-from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal
-from planfly.campaigns.statistics.proportions import Tally, lower_bound
-from planfly.campaigns.storage.held_table import StoreError
-from planfly.campaigns.storage.read_table import read_table
-from planfly.campaigns.storage.store import DATABASE
+from planfly.campaigns.statistics.decision import Estimate, Estimator, Goal, Tally, lower_bound
+from planfly.campaigns.storage.stores import DATABASE, read_table
+from planfly.campaigns.storage.table import StoreError
 from tests.planfly.campaigns.kills import finish_client, kill_while_it_flies, start_client, workers_killed
 from tests.planfly.campaigns.made_campaigns import (
     all_fly,
@@ -171,7 +168,7 @@ def test_a_deadly_flight_is_named_and_counts_against(
 ) -> None:
     if not SOAK:
         # Given up with the second worker, not with the third: workers take their time to start.
-        monkeypatch.setattr("planfly.campaigns.engine.cluster.ALLOWED_FAILURES", 1)
+        monkeypatch.setattr("planfly.campaigns.engine.workers.ALLOWED_FAILURES", 1)
     goal, count = Goal(None, False, 12), 12
     found = flown(base, goal, tmp_path, Workers(2), deadly_flight)
     others = [row for row in expected(base, tmp_path / "one", count) if row[0] != 5]

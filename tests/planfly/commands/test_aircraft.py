@@ -12,8 +12,7 @@ from logs.recording.reader import read_log
 from planfly.cli import main
 from tests.authorities.make_digests import track_digests
 from tests.own_aircraft import write_mission, write_scenario
-from world.scenario import load_scenario
-from world.scenario_variants import with_flight
+from world.scenario import load_scenario, with_flight
 
 ROOT = Path(__file__).parents[3]
 PICTURES = ["envelope.png", "steps.png", "trims.png"]

@@ -10,7 +10,7 @@ from planfly.campaigns.flights.flight_row import fly_one
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.spread.spread_file import default_spread
 from planfly.campaigns.statistics.decision import Goal
-from planfly.campaigns.storage.row_values import same_flight
+from planfly.campaigns.storage.table import same_flight
 from planfly.cli import main
 from tests.planfly.campaigns.made_campaigns import write_short
 from tests.planfly.terminal.answers.checked_answers import validate

@@ -13,7 +13,7 @@ import pytest
 from logs.recording.reader import read_log
 from logs.verdict.findings import RULES
 from planfly.cli import main
-from planfly.terminal.targets import RUN_FILES
+from planfly.terminal.results import RUN_FILES
 from tests.planfly.conftest import FIELD
 from tests.soak import SOAK, scaled
 

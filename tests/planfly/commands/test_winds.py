@@ -11,7 +11,7 @@ import pytest
 
 from planfly.campaigns.find_winds import WindsGoal
 from planfly.campaigns.flights.campaign_base import CampaignBase
-from planfly.campaigns.storage.winds_store import WINDS_DATABASE, AskedFlight, WindsStore
+from planfly.campaigns.storage.stores import WINDS_DATABASE, AskedFlight, WindsStore
 from planfly.cli import main
 from planfly.commands import winds as command
 from tests.planfly.campaigns.made_campaigns import made_flight, table, write_short

@@ -1,8 +1,8 @@
 """Every command's units are there, and every unit is some command's."""
 
 from planfly.commands.registry import COMMAND_NAMES
+from planfly.kernel_units.ready_kernels import UNITS
 from planfly.kernel_units.unit_kernels import BOTH, COMMAND_UNITS, FLYING, PLANNING, UNIT_KERNELS
-from planfly.kernel_units.units import UNITS
 from planner.search.kernel_calls import PARTS
 
 

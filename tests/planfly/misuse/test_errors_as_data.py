@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flight.ardupilot.parameter_file import parse_parameters
+from flight.autopilots.arduplane.parameters import parse_parameters
 from flight.mission_files.formats import read_mission
 from flight.mission_files.qgc_plan import parse_plan_file
 from flight.mission_files.wpl import HEADER, parse_waypoints
@@ -17,9 +17,8 @@ from planner.search.algorithms import find_algorithm
 from tests.world.made.made_scenario import SMALL
 from world.errors import PlanflyError
 from world.raster import open_raster
-from world.scenario import load_scenario
+from world.scenario import load_scenario, with_flight, with_wind
 from world.scenario_file import parse_scenario
-from world.scenario_variants import with_flight, with_wind
 
 _ITEM = "0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t500\t1"
 _PARAMETERS = "WP_RADIUS\t90\nROLL_LIMIT_DEG\t{}\n"

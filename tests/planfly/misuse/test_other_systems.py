@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import planfly
-from planfly.paper.seeded_plans import usable_cores
+from planfly.paper import usable_cores
 from tests.soak import SOAK
 
 ROOT = Path(planfly.__file__).parents[1]
@@ -27,9 +27,9 @@ LINUX_ALONE = {
     "signal.pthread_sigmask": {"world/interruption.py"},
     "signal.SIGHUP": set(),
     "signal.SIGALRM": set(),
-    "signal.SIGKILL": {"flight/real_autopilot/autopilot_process.py"},
+    "signal.SIGKILL": {"flight/autopilots/arduplane_sitl/process.py"},
     "select.select": set(),
-    "import fcntl": {"world/atomic_files.py"},
+    "import fcntl": {"world/files.py"},
     "import resource": set(),
     "import select": set(),
     "import pwd": set(),

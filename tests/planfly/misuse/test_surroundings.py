@@ -16,11 +16,11 @@ import pytest
 from logs.recording.example_log import example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.whole_log import WholeLog
+from planfly.crash_safe_log import WholeLog
 from tests.planfly.conftest import FIELD
 from tests.soak.test_hostile_files import WPL
-from world.atomic_files import hold, write_whole
 from world.errors import PlanflyError
+from world.files import hold, write_whole
 
 ROOT = Path(__file__).parents[3]
 Done: TypeAlias = subprocess.CompletedProcess

@@ -1,6 +1,6 @@
 """Default plans among zones and in a band of heights above ground: planned where a grid can, and flown inside all.
 
-The counts that docs/measured.md states are `tests.bench.airspace.flights` and `tests.bench.airspace.many_zones`.
+The counts that docs/measured.md states are `benchmarks.airspace.flights` and `benchmarks.airspace.many_zones`.
 """
 
 import dataclasses
@@ -9,11 +9,11 @@ import itertools
 import numpy as np
 import pytest
 
+from benchmarks.airspace.flights import fly, kept_by
+from benchmarks.airspace.many_zones import crowded_scenario
+from benchmarks.airspace.scenarios import draw_scenario, passable, ring_distance
 from planfly.airframe import load_airframe
 from planfly.pipeline import make_plan
-from tests.bench.airspace.flights import fly, kept_by
-from tests.bench.airspace.many_zones import crowded_scenario
-from tests.bench.airspace.scenarios import draw_scenario, passable, ring_distance
 
 # Of the bench's: the first draws of these numbers that the grid search passes.
 DRAWS = {0: 1, 3: 3}

@@ -1,4 +1,4 @@
-"""The parser knows every command, its defaults, and answers bad usage in a line."""
+"""The options of commands that take logs."""
 
 import subprocess
 import sys
@@ -7,6 +7,45 @@ import pytest
 
 from planfly.commands.registry import COMMAND_NAMES
 from planfly.terminal.parser import build_parser
+
+
+def test_defaults_and_places_of_logs() -> None:
+    parse = build_parser().parse_args
+    assert parse(["compare", "a.mcap", "b.mcap"]).second == "b.mcap"
+    replay = parse(["replay", "a.mcap", "--to", "127.0.0.1:14550"])
+    assert (replay.to, replay.bind, replay.port, replay.speed) == ("127.0.0.1:14550", "127.0.0.1:0", 8765, None)
+    assert parse(["replay", "a.mcap", "--to", "90"]).to == 90.0
+    assert parse(["report", "--layout", "l.json"]).log is None
+
+
+def test_a_log_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        build_parser().parse_args(["recover"])
+    assert "LOG.mcap" in capsys.readouterr().err
+
+
+# ----------------------------------------------------------------------
+# Field parser.
+
+
+def test_import_takes_a_log_and_a_target() -> None:
+    args = build_parser().parse_args(["import", "a.tlog", "a.mcap", "--terrain", "dem.tif"])
+    assert (args.command, args.log, args.target, args.terrain) == ("import", "a.tlog", "a.mcap", "dem.tif")
+
+
+def test_refly_takes_a_flight() -> None:
+    args = build_parser().parse_args(["refly", "a.mcap", "--turbulence", "light"])
+    assert (args.log, args.turbulence, args.out) == ("a.mcap", "light", None)
+
+
+def test_flights_are_numbered_from_1(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        build_parser().parse_args(["check", "a.BIN", "--flight", "0"])
+    assert "a whole number from 1" in capsys.readouterr().err
+
+
+# ----------------------------------------------------------------------
+# The parser knows every command, its defaults, and answers bad usage in a line.
 
 
 def test_help_describes_every_command_and_no_other(capsys: pytest.CaptureFixture[str]) -> None:

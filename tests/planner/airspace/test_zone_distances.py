@@ -5,13 +5,115 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from planner.airspace.kept_zones import ZoneMargins, keep_zones
-from planner.airspace.zone_distances import ZONE_ROOM, measure_zone_room
-from tests.bench.airspace.scenarios import ring_distance, star
-from tests.planner.airspace.test_zone_depths import FAR, GROUND, SQUARE
-from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
+from benchmarks.airspace.scenarios import ring_distance, star
+from planner.airspace.zone_distances import ZONE_ROOM, measure_zone_room, zone_excess
+from planner.airspace.zone_limits import ZoneMargins, keep_zones
+from world.airspace.zones import Cylinder, Polygon, Zone, ZoneKind, ZoneLevel, make_polygon
+from world.terrain import Terrain, gridded
 
-MARGINS = ZoneMargins(10.0, 5.0, 0.75)
+# ----------------------------------------------------------------------
+# What a leg in zones is charged: nothing where it keeps their margins, and more the deeper and longer it is in.
+
+MARGINS = ZoneMargins(15.0, 8.0, 1.0)
+FAR = np.zeros((0, 3))
+SQUARE = make_polygon([[(0.0, 0.0), (800.0, 0.0), (800.0, 800.0), (0.0, 800.0)]])
+Charge = Callable[..., float]
+
+
+def slanting() -> Terrain:
+    """Ground that rises by a tenth to the east, from 0 m at 0."""
+    east, north = np.linspace(-5000.0, 5000.0, 101), np.linspace(-5000.0, 5000.0, 101)
+    heights = np.broadcast_to(0.1 * east, (101, 101)).copy()
+    return gridded(heights, east, north, source="a slope", sha256="", datum="mean sea level")
+
+
+GROUND = slanting()
+
+
+@pytest.fixture
+def charge() -> Charge:
+    def made(
+        zone: Zone, a: list[float], b: list[float], beside: float = 0.0, below: float = 0.0, above: float = 0.0
+    ) -> float:
+        zones = keep_zones([zone], FAR, GROUND, MARGINS)
+        ends = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
+        return float(zone_excess(zones, GROUND.heights, GROUND.to_pixel.record, 40.0, *ends, beside, below, above))
+
+    return made
+
+
+@pytest.mark.parametrize("shape", [Cylinder(400.0, 400.0, 400.0), SQUARE])
+@pytest.mark.parametrize(("off", "charged"), [(15.1, False), (14.9, True)])
+def test_beside_an_exclusion(charge: Charge, shape: Polygon | Cylinder, off: float, charged: bool) -> None:
+    zone = Zone("it", "exclusion", shape)
+    assert (charge(zone, [-900.0, 800.0 + off, 90.0], [1700.0, 800.0 + off, 90.0]) > 0.0) == charged
+    # As far again for an autopilot that may be 20 m beside the leg.
+    assert (charge(zone, [-900.0, 820.0 + off, 90.0], [1700.0, 820.0 + off, 90.0], 20.0) > 0.0) == charged
+
+
+@pytest.mark.parametrize("shape", [Cylinder(400.0, 400.0, 400.0), SQUARE])
+@pytest.mark.parametrize(("off", "charged"), [(15.1, False), (14.9, True)])
+def test_inside_the_edge_of_an_inclusion(charge: Charge, shape: Polygon | Cylinder, off: float, charged: bool) -> None:
+    zone = Zone("it", "inclusion", shape)
+    assert (charge(zone, [400.0, 400.0, 90.0], [400.0, 800.0 - off, 90.0]) > 0.0) == charged
+    assert (charge(zone, [400.0, 400.0, 90.0], [400.0, 780.0 - off, 90.0], 20.0) > 0.0) == charged
+
+
+@pytest.mark.parametrize(("up", "charged"), [(91.9, False), (92.1, True), (307.9, True), (308.1, False)])
+def test_below_a_floor_and_above_a_ceiling(charge: Charge, up: float, charged: bool) -> None:
+    zone = Zone("it", "exclusion", SQUARE, ZoneLevel(100.0, "amsl"), ZoneLevel(300.0, "amsl"))
+    assert (charge(zone, [-900.0, 400.0, up], [1700.0, 400.0, up]) > 0.0) == charged
+    inclusion = Zone("it", "inclusion", SQUARE, ZoneLevel(84.0, "amsl"), ZoneLevel(316.0, "amsl"))
+    assert (charge(inclusion, [100.0, 400.0, up], [700.0, 400.0, up]) > 0.0) != charged
+
+
+@pytest.mark.parametrize(("up", "charged"), [(91.9, False), (92.1, True)])
+def test_how_far_a_flight_may_be_above_counts_against_a_floor(charge: Charge, up: float, charged: bool) -> None:
+    zone = Zone("it", "exclusion", SQUARE, floor=ZoneLevel(100.0, "amsl"))
+    assert (charge(zone, [-900.0, 400.0, up - 6.0], [1700.0, 400.0, up - 6.0], 0.0, 9.0, 6.0) > 0.0) == charged
+
+
+@pytest.mark.parametrize(("up", "charged"), [(90.0, False), (94.0, True)])
+def test_a_floor_above_the_slope(charge: Charge, up: float, charged: bool) -> None:
+    """Lowest 15 m west of the square, where the ground is 1.5 m below sea level: 8 m under the floor is at 90.5 m."""
+    zone = Zone("it", "exclusion", SQUARE, floor=ZoneLevel(100.0, "ground"))
+    assert (charge(zone, [-900.0, 400.0, up], [1700.0, 400.0, up]) > 0.0) == charged
+    # A leg that climbs with the ground is as far from it everywhere.
+    assert (charge(zone, [-900.0, 400.0, up - 90.0], [1700.0, 400.0, up + 170.0]) > 0.0) == charged
+
+
+def test_deeper_and_longer_is_dearer(charge: Charge) -> None:
+    zone = Zone("it", "exclusion", SQUARE)
+    charges = [charge(zone, [-900.0, north, 90.0], [1700.0, north, 90.0]) for north in (810.0, 780.0, 700.0, 500.0)]
+    assert charges == sorted(charges)
+    assert charges[0] > 0.0
+    assert charge(zone, [300.0, 700.0, 90.0], [500.0, 700.0, 90.0]) < charges[2]
+    fence = Zone("it", "inclusion", SQUARE)
+    outside = [charge(fence, [400.0, 400.0, 90.0], [400.0, north, 90.0]) for north in (790.0, 830.0, 1200.0)]
+    assert outside == sorted(outside)
+    assert outside[0] > 0.0
+
+
+@pytest.mark.parametrize("kind", ["exclusion", "inclusion"])
+def test_nothing_is_charged_only_where_fine_samples_keep_the_margin(charge: Charge, kind: ZoneKind) -> None:
+    rng = np.random.default_rng(11)
+    free = 0
+    for _ in range(300):
+        ring = star(rng, rng.uniform(-300.0, 300.0, 2), float(rng.uniform(200.0, 1500.0)), int(rng.integers(3, 12)))
+        a, b = rng.uniform(-1200.0, 1200.0, (2, 2))
+        places = a + np.linspace(0.0, 1.0, 2000)[:, None] * (b - a)
+        away = ring_distance(np.array(ring), places) * (1.0 if kind == "exclusion" else -1.0)
+        zone = Zone("it", kind, make_polygon([[(x, y) for x, y in ring]]))
+        charged = charge(zone, [*a, 90.0], [*b, 90.0])
+        if away.min() < 14.9:
+            assert charged > 0.0
+        elif away.min() > 16.0:
+            assert charged == 0.0
+            free += 1
+    assert free > 10
+
+
+MARGINS_OF_ZONE_DISTANCES = ZoneMargins(10.0, 5.0, 0.75)
 DEPTHS = -GROUND.heights
 DEPTHS.setflags(write=False)
 Room = Callable[..., np.void]
@@ -24,7 +126,7 @@ def room() -> Room:
     ) -> np.void:
         out = np.zeros(1, ZONE_ROOM)
         ends = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
-        kept = keep_zones(zones, FAR, GROUND, MARGINS)
+        kept = keep_zones(zones, FAR, GROUND, MARGINS_OF_ZONE_DISTANCES)
         to_pixel = GROUND.to_pixel.record
         measure_zone_room(kept, GROUND.heights, DEPTHS, to_pixel, *ends, np.array(beside), 0.0, above, out[0])
         return out[0]

@@ -1,4 +1,4 @@
-"""What zones and a greatest height add to the graded scores, and that a scenario without them is scored as ever."""
+"""What the certificate finds of zones and of a greatest height, just inside and just outside."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,21 +7,131 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits
-from planner.evaluation.airspace_scores import airspace_counts, airspace_excess
+from planner.evaluation.airspace_scores import airspace_counts, airspace_excess, airspace_pieces
+from planner.evaluation.certify import certify
 from planner.evaluation.graded_scores import graded_scores
-from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_ZONE_MARGIN, make_problem
-from planner.evaluation.problem_arrays import ProblemArrays
-from planner.plan import Violation
+from planner.evaluation.problem import (
+    CERTIFIED_BUFFER,
+    CERTIFIED_ZONE_MARGIN,
+    SEARCH_BUFFER,
+    SEARCH_ZONE_MARGIN,
+    Problem,
+    ProblemArrays,
+    make_problem,
+)
+from planner.plan import Certificate, Violation
 from planner.search.plan_path import plan_path
 from tests.planner.straying import straying
 from world.scenario import Scenario
 
-Made = Callable[..., ProblemArrays]
+Made = Callable[..., Problem]
 STRAIGHT = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
+TURNED = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 150.0], [3000.0, 2900.0, 150.0]])
 
 
 @pytest.fixture
 def made(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> Made:
+    def problem(numbers: dict[str, float] | None = None, **tables: Any) -> Problem:
+        scenario = small(**({"terrain": {"kind": "flat", "amsl_m": 0}, "threats": []} | tables))
+        limits = make_limits(scenario)
+        return make_problem(scenario, limits if numbers is None else straying(limits, **numbers))
+
+    return problem
+
+
+def tower(off: float, east: float = 1500.0, **levels: float) -> list[dict[str, Any]]:
+    """A cylinder whose edge is this far (m) south of the straight way."""
+    return [{"name": "mast", "kind": "exclusion", "east_m": east, "north_m": -200.0 - off, "radius_m": 200.0, **levels}]
+
+
+def certificate(problem: Problem, path: np.ndarray) -> Certificate:
+    return certify(problem, path)
+
+
+@pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False), (-40.0, False)])
+def test_a_zone_beside_the_way(made: Made, more: float, ok: bool) -> None:
+    result = certificate(made(zones=tower(CERTIFIED_ZONE_MARGIN + more)), STRAIGHT)
+    assert result.ok == ok
+    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN + more, abs=1e-6)
+    result = certificate(made({"across": 12.0}, zones=tower(CERTIFIED_ZONE_MARGIN + 12.0 + more)), STRAIGHT)
+    assert result.ok == ok
+    assert result.zone_distance == pytest.approx(CERTIFIED_ZONE_MARGIN + more, abs=1e-6)
+
+
+def test_what_fails_names_the_zone_and_the_leg(made: Made) -> None:
+    assert certificate(made(zones=tower(4.0)), STRAIGHT).problems == (
+        "leg 0: 4.0 m from mast, 10 m or 5 m in height wanted",
+    )
+    assert certificate(made(zones=tower(-9.0)), STRAIGHT).problems == ("leg 0: 9.0 m inside mast",)
+
+
+def test_a_zone_inside_a_turn_is_what_the_arc_comes_near(made: Made) -> None:
+    """An arc of 121 m radius or more passes 50 m within the corner of 90 degrees: there stands a mast."""
+    ends = {"destination": {"east_m": 3000, "north_m": 2900, "amsl_m": 150}}
+    zone = {"name": "mast", "kind": "exclusion", "east_m": 2960.0, "north_m": 40.0, "radius_m": 5.0}
+    problem = made(zones=[zone], **ends)
+    result = certificate(problem, TURNED)
+    assert result.problems[0].startswith("turn at waypoint 1")
+    legs = [piece for piece in airspace_pieces(problem.certified, TURNED) if not piece["of_corner"]]
+    assert all(piece["zones"]["kept"] for piece in legs)
+
+
+@pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
+def test_a_floor_over_the_way(made: Made, more: float, ok: bool) -> None:
+    result = certificate(made(zones=tower(-200.0, floor_amsl_m=150.0 + CERTIFIED_BUFFER + more)), STRAIGHT)
+    assert result.ok == ok
+    assert result.zone_distance == pytest.approx(CERTIFIED_BUFFER + more)
+
+
+@pytest.mark.parametrize(("more", "ok"), [(0.1, True), (-0.1, False)])
+def test_a_greatest_height(made: Made, more: float, ok: bool) -> None:
+    path = STRAIGHT + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [0.0, 0.0, 0.0]])
+    limits = {"max_height_m": 180.0 + CERTIFIED_BUFFER + more, "min_clearance_m": 30}
+    result = certificate(made(limits=limits), path)
+    assert result.ok == ok
+    assert result.headroom == pytest.approx(CERTIFIED_BUFFER + more, abs=1e-3)
+    assert ok or "m above ground at its highest" in result.problems[0]
+
+
+def test_a_flight_that_follows_late_is_high_on_the_way_down(made: Made) -> None:
+    """3 s late at 25 m/s down a slope of 1 in 50 is 1.5 m high."""
+    path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 210.0], [6000.0, 0.0, 150.0]])
+    limits = {"max_height_m": 300.0, "min_clearance_m": 30}
+    problem = made({"lag": 3.0}, limits=limits)
+    assert certificate(problem, path).headroom == pytest.approx(90.0, abs=0.2)
+    pieces = airspace_pieces(problem.certified, path)
+    last = [piece for piece in pieces if piece["number"] == 1 and not piece["of_corner"]][-2]
+    # It ends 100 m before the destination, where the leg is at 152 m.
+    begins = 152.0 + (6000.0 - 100.0 - 3000.0 - 4.0 * 75.0) / 50.0
+    assert float(last["height"]) == pytest.approx(begins + 1.5, abs=0.3)
+
+
+def test_the_ground_beside_the_way_is_what_a_flight_is_high_over(made: Made) -> None:
+    """Midway the ground is 140 exp(-2.5^2 / 4.5) = 34.9 m high, 50 m south of it 140 exp(-2.55^2 / 4.5) = 33.0."""
+    hill = {"kind": "peaks", "peak": [{"east_m": 3000, "north_m": 2500, "height_m": 140, "sigma_m": 1500}]}
+    limits = {"max_height_m": 400.0, "min_clearance_m": 1}
+    tables = {"terrain": hill, "limits": limits}
+    exact, wide = made(**tables), made({"across": 50.0}, **tables)
+    path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 250.0], [6000.0, 0.0, 150.0]])
+    assert certificate(exact, path).headroom == pytest.approx(400.0 - 250.0 + 34.9, abs=0.1)
+    assert certificate(wide, path).headroom == pytest.approx(400.0 - 250.0 + 33.0, abs=0.1)
+
+
+def test_without_zones_and_greatest_height_there_is_nothing_to_tell(made: Made) -> None:
+    result = certificate(made(), STRAIGHT)
+    assert (result.zone_distance, result.headroom) == (np.inf, np.inf)
+
+
+# ----------------------------------------------------------------------
+# What zones and a greatest height add to the graded scores, and that a scenario without them is scored as ever.
+
+Made_of_airspace_scores = Callable[..., ProblemArrays]
+
+
+@pytest.fixture
+def made_of_airspace_scores(
+    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
+) -> Made_of_airspace_scores:
     """Arrays of the search over level ground, for an autopilot that strays by these numbers if there are any."""
 
     def arrays(numbers: dict[str, float] | None = None, **tables: Any) -> ProblemArrays:
@@ -37,21 +147,25 @@ def found(data: ProblemArrays, path: np.ndarray, violation: Violation) -> float:
     return float(graded_scores(data, path[None])[0][0, violation])
 
 
-def tower(off: float, radius: float = 200.0, **levels: float) -> list[dict[str, Any]]:
+def tower_of_airspace_scores(off: float, radius: float = 200.0, **levels: float) -> list[dict[str, Any]]:
     """A cylinder whose edge is this far (m) north of the straight way."""
     return [{"name": "it", "kind": "exclusion", "east_m": 1500, "north_m": radius + off, "radius_m": radius, **levels}]
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_zone_beside_the_way(made: Made, more: float, violated: bool) -> None:
-    data = made(zones=tower(SEARCH_ZONE_MARGIN + more))
+def test_a_zone_beside_the_way_of_airspace_scores(
+    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
+) -> None:
+    data = made_of_airspace_scores(zones=tower_of_airspace_scores(SEARCH_ZONE_MARGIN + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
-    data = made({"across": 12.0}, zones=tower(SEARCH_ZONE_MARGIN + 12.0 + more))
+    data = made_of_airspace_scores({"across": 12.0}, zones=tower_of_airspace_scores(SEARCH_ZONE_MARGIN + 12.0 + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(made: Made, more: float, violated: bool) -> None:
+def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(
+    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
+) -> None:
     """The turn of 36.87 degrees strays 40 m x 36.87 / 90; the zone lies 300 m before it, by the leg."""
     path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 150.0], [5400.0, 1800.0, 150.0]])
     ends = {"destination": {"east_m": 5400, "north_m": 1800, "amsl_m": 150}}
@@ -59,44 +173,50 @@ def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(made: Made, mo
     zone = {"name": "it", "kind": "exclusion", "east_m": 2990.0, "radius_m": 50.0}
     zone["north_m"] = -(50.0 + SEARCH_ZONE_MARGIN + strayed + more)
     numbers = {"excursion": 40.0, "before": 200.0, "after": 200.0}
-    data = made(numbers, zones=[zone], **ends)
+    data = made_of_airspace_scores(numbers, zones=[zone], **ends)
     assert (found(data, path, Violation.BOUNDS) > 0.0) == violated
     # Away from the corner the leg's own margin is enough.
-    data = made(numbers, zones=[zone | {"east_m": 1000.0}], **ends)
+    data = made_of_airspace_scores(numbers, zones=[zone | {"east_m": 1000.0}], **ends)
     assert found(data, path, Violation.BOUNDS) == 0.0
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_floor_over_the_way(made: Made, more: float, violated: bool) -> None:
-    data = made(zones=tower(-200.0, floor_amsl_m=150.0 + SEARCH_BUFFER + more))
+def test_a_floor_over_the_way_of_airspace_scores(
+    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
+) -> None:
+    data = made_of_airspace_scores(zones=tower_of_airspace_scores(-200.0, floor_amsl_m=150.0 + SEARCH_BUFFER + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_greatest_height_above_ground(made: Made, more: float, violated: bool) -> None:
-    data = made(limits={"max_height_m": 158.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
+def test_a_greatest_height_above_ground(
+    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
+) -> None:
+    data = made_of_airspace_scores(limits={"max_height_m": 158.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
     path = STRAIGHT + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 0.0]])
     assert (found(data, path, Violation.TERRAIN) > 0.0) == violated
     # Where the autopilot is 5 m off in height.
-    data = made({"up": 5.0}, limits={"max_height_m": 163.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
+    data = made_of_airspace_scores(
+        {"up": 5.0}, limits={"max_height_m": 163.0 + SEARCH_BUFFER + more, "min_clearance_m": 30}
+    )
     assert (found(data, path, Violation.TERRAIN) > 0.0) == violated
 
 
-def test_the_ground_beside_the_way_counts_too(made: Made) -> None:
+def test_the_ground_beside_the_way_counts_too(made_of_airspace_scores: Made_of_airspace_scores) -> None:
     """A hill of 200 m falls away beside the leg: 325 - 167 m above it, and 325 - 148 m above it 60 m aside."""
     hill = {"kind": "peaks", "peak": [{"east_m": 1500, "north_m": 300, "height_m": 200, "sigma_m": 300}]}
     most = {"max_height_m": 175.0, "min_clearance_m": 1}
-    data = made({"across": 0.0}, terrain=hill, limits=most, threats=[])
-    wide = made({"across": 60.0}, terrain=hill, limits=most, threats=[])
+    data = made_of_airspace_scores({"across": 0.0}, terrain=hill, limits=most, threats=[])
+    wide = made_of_airspace_scores({"across": 60.0}, terrain=hill, limits=most, threats=[])
     for arrays, worse in ((data, False), (wide, True)):
         a, b = np.array([1400.0, 150.0, 325.0]), np.array([1600.0, 150.0, 325.0])
         assert (float(airspace_excess(arrays, a, b, 0.0, 0.0)) > 0.0) == worse
 
 
-def test_an_inclusion_near_the_start_leaves_room_to_leave(made: Made) -> None:
+def test_an_inclusion_near_the_start_leaves_room_to_leave(made_of_airspace_scores: Made_of_airspace_scores) -> None:
     """The start is 6 m within the fence: the way straight away from its edge is charged nothing."""
     fence = {"name": "it", "kind": "inclusion", "polygon_m": [[-6, -900], [6900, -900], [6900, 900], [-6, 900]]}
-    data = made({"across": 12.0}, zones=[fence])
+    data = made_of_airspace_scores({"across": 12.0}, zones=[fence])
     assert found(data, STRAIGHT, Violation.BOUNDS) == 0.0
     beside = np.array([[0.0, 0.0, 150.0], [0.0, 800.0, 150.0], [6000.0, 0.0, 150.0]])
     assert found(data, beside, Violation.BOUNDS) > 0.0

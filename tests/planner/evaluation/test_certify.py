@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from aircraft.path_limits import Limits, turn_tangents
-from flight.guidance.fly_by_path import fly_by_path
+from flight.guidance.path import fly_by_path
 from flight.mission.route import Route
 from planner.evaluation.problem import ANGLE_MARGIN, CERTIFIED_KILL_MARGIN
 from planner.plan import Plan

@@ -10,8 +10,7 @@ import pytest
 from aircraft.path_limits import Limits
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_KILL_MARGIN, Problem, make_problem
-from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.problem import SEARCH_BUFFER, SEARCH_KILL_MARGIN, Problem, ProblemArrays, make_problem
 from planner.plan import Objective, Violation
 from tests.planner.straying import straying
 from world.frames import polymap

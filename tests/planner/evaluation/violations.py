@@ -4,7 +4,7 @@ import numpy as np
 
 from planner.evaluation.graded_scores import graded_scores
 from planner.evaluation.paper_scores import paper_scores
-from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.problem import ProblemArrays
 from planner.plan import Violation
 
 

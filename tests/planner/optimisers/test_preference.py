@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks.reference import preferred, ranks_by_definition
 from planner.optimisers.preference import NO_GOAL, Level, ranks
-from tests.bench.reference import preferred, ranks_by_definition
 
 PAPER = (
     Level((0, 1, 2, 3), (0.0, 0.0, 0.0, 0.0)),

@@ -2,9 +2,11 @@
 
 import pytest
 
+from planfly.airframe import load_airframe
 from planner.evaluation.encoding import ENCODINGS
-from planner.search.algorithms import ALGORITHMS, DEFAULT, algorithm_lines, find_algorithm
+from planner.search.algorithms import ALGORITHMS, DEFAULT, algorithm_lines, find_algorithm, limits_for
 from world.errors import ScenarioError
+from world.scenario import load_scenario
 
 
 def test_each_is_found_by_its_own_name_and_the_default_without_one() -> None:
@@ -44,3 +46,19 @@ def test_each_has_a_line_for_people() -> None:
     assert [line.split()[0] for line in lines] == list(ALGORITHMS)
     assert all(line.endswith(item.summary) for line, item in zip(lines, ALGORITHMS.values(), strict=True))
     assert len({line.index(item.summary) for line, item in zip(lines, ALGORITHMS.values(), strict=True)}) == 1
+
+
+# ----------------------------------------------------------------------
+# Which algorithms keep room for an autopilot.
+
+# That search by the paper's counts of violations.
+PAPERS = {"umda", "umda-cartesian", "umda-polar", "umda-polar-45", "umda-bearing", "de-paper"}
+
+
+@pytest.mark.parametrize("name", sorted(ALGORITHMS))
+def test_those_that_count_violations_are_the_papers_and_know_no_autopilot(name: str) -> None:
+    limits = load_airframe(load_scenario("jacksboro")).limits
+    assert limits.tracking is not None
+    within = limits_for(find_algorithm(name, "a.toml"), limits)
+    assert (within.tracking is None) == (name in PAPERS)
+    assert within.max_turn == limits.max_turn

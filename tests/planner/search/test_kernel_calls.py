@@ -5,7 +5,7 @@ import pytest
 from planfly.airframe import load_airframe
 from planner.search.kernel_calls import PARTS, call_kernels
 from planner.search.plan_path import plan_path
-from world.compilation.announcement import tell_before_compiling
+from world.compile_events import tell_before_compiling
 from world.scenario import load_scenario
 
 

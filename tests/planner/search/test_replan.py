@@ -14,8 +14,7 @@ from planner.search.replan import replan, with_waypoints
 from world.airspace.zones import Cylinder, Zone
 from world.errors import MissionError, ScenarioError
 from world.geometry import turning_angles
-from world.scenario import Scenario
-from world.scenario_variants import with_threats
+from world.scenario import Scenario, with_threats
 
 
 @pytest.fixture(scope="module")

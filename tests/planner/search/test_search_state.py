@@ -1,4 +1,4 @@
-"""What a search reports as it goes, and what ends it: a stop, a budget, a first safe path."""
+"""Scores are ordered by constraints, then kill exposure, then length; equal ones keep their order."""
 
 import time
 from collections.abc import Callable
@@ -14,12 +14,34 @@ from planner.plan import Certificate, parse_plan, plan_json
 from planner.search import search_state
 from planner.search.algorithms import DEFAULT
 from planner.search.plan_path import plan_path
+from planner.search.search_state import DETECTION, HEIGHT, KILL, LENGTH, best_first, safe, score_table, violated
 from tests.soak import SOAK
 from world.errors import ScenarioError
-from world.scenario import Scenario, load_scenario
-from world.scenario_variants import with_planner
+from world.scenario import Scenario, load_scenario, with_planner
 
 Floats = NDArray[np.float64]
+
+
+SCORES = score_table(
+    np.array([[1, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 2]]),
+    np.array([[1.0, 0.0, 0, 0], [1.2, 0.5, 9, 9], [1.5, 0.0, 9, 9], [1.2, 0.5, 0, 0], [9.0, 0.0, 0, 0]]),
+)
+
+
+def test_best_first_by_constraints_then_exposure_then_length() -> None:
+    # Rows 1 and 3 differ in what the order does not look at; rows 0 and 4 violate different constraints.
+    assert best_first(SCORES).tolist()[:3] == [2, 1, 3]
+    assert (LENGTH, KILL, DETECTION, HEIGHT) == (4, 5, 6, 7)
+
+
+def test_each_row_is_violated_or_safe_or_neither() -> None:
+    assert violated(SCORES).tolist() == [True, False, False, False, True]
+    assert safe(SCORES).tolist() == [False, False, True, False, False]
+
+
+# ----------------------------------------------------------------------
+# What a search reports as it goes, and what ends it: a stop, a budget, a first safe path.
+
 # s from Ctrl-C to the plan.
 AT_ONCE = 0.05
 # The default in each kind of trap, and each of the others once; in make soak in all traps.

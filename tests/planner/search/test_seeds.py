@@ -1,17 +1,25 @@
 """What a seeded search starts from: the straight line, routes that are fitted, an older path."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
+import pytest
 
+import planner.search.plan_path as whole
 from aircraft.path_limits import Limits
-from planner.evaluation.encoding import ENCODINGS
+from planner.evaluation.encoding import ENCODINGS, rotated_frame
 from planner.evaluation.problem import make_problem
+from planner.plan import Certificate
 from planner.search.algorithms import ALGORITHMS
+from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
-from planner.search.seeds import starting_vectors, straight_line
+from planner.search.seeds import LEAST_DETOUR, search_other_sides, starting_vectors, straight_line
+from tests.instances import random_scenario
+from world.geometry import leg_courses
 from world.random_streams import PLANNER, stream
-from world.scenario import Scenario
+from world.scenario import Scenario, from_spec, load_scenario
+from world.scenario_file import parse_scenario
 
 FLAT = {"kind": "flat", "amsl_m": 0}
 GRIDS = ((24, 2),)
@@ -51,3 +59,78 @@ def test_an_older_path_is_started_from_too(scenario: Scenario, limits: Limits) -
 
 def test_without_seeds_there_are_none(scenario: Scenario, limits: Limits) -> None:
     assert starting_vectors(search_of(scenario, limits, "umda-smooth"), GRIDS, None).size == 0
+
+
+# ----------------------------------------------------------------------
+# The shorter side is found where the grids that know obstacles as they are do not propose it.
+
+
+def fresh(seed: int, folder: Path) -> Scenario:
+    return from_spec(parse_scenario(random_scenario(seed), "random"), "random", base=folder)
+
+
+def without_other_sides(_search: Search) -> None:
+    """What the search was before."""
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_paths_get_no_longer_by_other_sides(
+    seed: int, make_limits: Callable[[Scenario], Limits], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = fresh(seed, tmp_path)
+    limits = make_limits(scenario)
+    now = plan_path(scenario, limits, seed=1)
+    monkeypatch.setattr(whole, "search_other_sides", without_other_sides)
+    before = plan_path(scenario, limits, seed=1)
+    assert now.safe
+    assert now.objectives[0] <= (1.001 * before.objectives[0] if before.safe else 9.0)
+
+
+def test_where_the_way_is_nearly_straight_no_other_side_is_looked_for(
+    make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scenario = load_scenario("paper-07")
+    seen: list[int] = []
+
+    def counted(search: Search) -> None:
+        before = search.evaluations
+        search_other_sides(search)
+        seen.append(search.evaluations - before)
+        assert search.archive.scores[0][4] >= 1.0 + LEAST_DETOUR or seen[-1] == 0
+
+    monkeypatch.setattr(whole, "search_other_sides", counted)
+    assert plan_path(scenario, make_limits(scenario), seed=1).safe
+
+
+# ----------------------------------------------------------------------
+# Traps: paths that turn back or go round, certified, and not looked for where a straight frame does.
+
+
+@pytest.mark.parametrize("name", ["trap-u", "trap-valley", "trap-wall", "trap-spiral"])
+def test_traps_are_left_by_ways_that_no_straight_frame_holds(
+    name: str, make_limits: Callable[[Scenario], Limits]
+) -> None:
+    scenario = load_scenario(name)
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    assert plan.safe, plan.certificate.problems
+    frame = rotated_frame(scenario.start, scenario.destination)
+    assert np.diff(frame.rotate(plan.waypoints)[:, 0]).min() < -100.0
+
+
+def test_the_spiral_goes_round(make_limits: Callable[[Scenario], Limits]) -> None:
+    scenario = load_scenario("trap-spiral")
+    plan = plan_path(scenario, make_limits(scenario), seed=1)
+    courses = np.unwrap(leg_courses(plan.waypoints))
+    assert np.abs(courses - courses[0]).max() > 1.25 * np.pi
+
+
+def test_it_is_not_looked_for_where_a_straight_frame_holds_a_short_path(
+    make_limits: Callable[[Scenario], Limits], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(_search: Search, _found: object) -> tuple[np.ndarray, Certificate]:
+        raise AssertionError("a route that turns back was looked for")
+
+    monkeypatch.setattr(whole, "search_turning_back", refused)
+    for name in ("hard-07", "hard-60"):
+        scenario = load_scenario(name)
+        assert plan_path(scenario, make_limits(scenario), seed=1).safe

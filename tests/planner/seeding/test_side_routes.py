@@ -1,5 +1,7 @@
-"""Routes of different sides: each passes some obstacle elsewhere, cheapest first, none twice."""
+"""Ways past obstacles on each side, against the programme of one cheapest route and all ways of a small grid."""
 
+import itertools
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -8,14 +10,115 @@ from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import rotated_frame
-from planner.evaluation.problem import Problem, make_problem
-from planner.seeding.grid_prices import find_obstacles
-from planner.seeding.grid_routes import grid_route, make_grid
-from planner.seeding.side_kernels import LEFT, OVER, RIGHT
-from planner.seeding.side_routes import optimistic_grid, side_routes, sides_passed
+from planner.evaluation.problem import Problem, ProblemArrays, make_problem
+from planner.seeding.grids import KILL_COST, SIDEWAYS, Grid, cheapest_route, find_obstacles, grid_route, make_grid
+from planner.seeding.side_routes import (
+    LEFT,
+    OVER,
+    RIGHT,
+    UNDER,
+    cheapest_passings,
+    grid_costs,
+    optimistic_grid,
+    route_through,
+    side_of,
+    side_routes,
+    sides_passed,
+)
 from world.scenario import Scenario
 
 Floats = NDArray[np.float64]
+
+
+# Six stages of 1 km over level ground; places 1 km apart.
+GRID = Grid(6, np.arange(-2.0, 3.0) * 1000.0, np.array([150.0, 450.0]))
+
+
+@pytest.fixture
+def data(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> ProblemArrays:
+    """A missile of 900 m a little to the right of the line's middle; 6 km from 150 m to 150 m."""
+    missile = {"east_m": 3000, "north_m": -100, "kill_radius_m": 900, "kill_scale_m": 70}
+    limits = {"max_climb_deg": 20, "max_dive_deg": 20}
+    scenario = small(terrain={"kind": "flat", "amsl_m": 0}, threats=[missile], limits=limits)
+    return make_problem(scenario, make_limits(scenario)).search
+
+
+@pytest.mark.parametrize(
+    ("aside", "above", "side"),
+    [(5.0, 4.9, LEFT), (-5.0, 4.9, RIGHT), (5.0, 5.1, OVER), (-5.0, 5.1, OVER), (4.0, -5.0, UNDER), (0.0, 0.0, LEFT)],
+)
+def test_a_side_is_a_quarter_about_the_middle(aside: float, above: float, side: int) -> None:
+    assert side_of(aside, above) == side
+
+
+def all_ways(data: ProblemArrays) -> list[tuple[float, tuple[tuple[int, int], ...]]]:
+    """Cost and cells (across, layer) of all ways over the grid, by plain sums."""
+    frame = rotated_frame(data.start, data.destination)
+    step, places = frame.length / GRID.stages, list(itertools.product(range(5), range(2)))
+    obstacle = find_obstacles(data, frame, step)[0]
+    found = []
+    for inner in itertools.product(places, repeat=GRID.stages - 1):
+        way = ((2, 0), *inner, (2, 0))
+        total = 0.0
+        for stage, (before, after) in enumerate(itertools.pairwise(way), 1):
+            if abs(after[0] - before[0]) > SIDEWAYS:
+                break
+            at = stage * step, GRID.across[after[0]], GRID.layers[after[1]]
+            away = math.dist(at, (obstacle["along"], obstacle["across"], obstacle["up"]))
+            dear = 1.0 + (KILL_COST * (3.0 - 2.0 * away / obstacle["radius"]) if away < obstacle["radius"] else 0.0)
+            length = math.hypot(step, step * (after[0] - before[0]), 300.0 * (after[1] - before[1]))
+            total += dear * length
+        else:
+            found.append((total, way))
+    return found
+
+
+def test_each_side_is_passed_as_cheaply_as_by_the_best_of_all_ways(data: ProblemArrays) -> None:
+    frame = rotated_frame(data.start, data.destination)
+    costs = grid_costs(data, frame, GRID, math.inf)
+    obstacles = find_obstacles(data, frame, 1000.0)
+    passings = cheapest_passings(costs, GRID, obstacles, 1000.0)[0]
+    ways = all_ways(data)
+    for side in (LEFT, RIGHT, OVER, UNDER):
+        least = math.inf
+        for total, way in ways:
+            across, layer = way[3]
+            if side_of(GRID.across[across] - obstacles[0]["across"], GRID.layers[layer] - obstacles[0]["up"]) == side:
+                least = min(least, total)
+        assert passings[side]["cost"] == pytest.approx(least)
+    assert passings[UNDER]["cost"] == math.inf
+    assert passings[LEFT]["cost"] < passings[RIGHT]["cost"]
+
+
+def test_a_route_through_a_cell_costs_what_was_said_and_leads_from_end_to_end(data: ProblemArrays) -> None:
+    frame = rotated_frame(data.start, data.destination)
+    costs = grid_costs(data, frame, GRID, math.inf)
+    cells, best = cheapest_route(data, frame, GRID, np.zeros((7, 5)), math.inf)
+    assert costs.left[0, 0, 2] == pytest.approx(best)
+    assert costs.reached[6, 0, 2] == pytest.approx(best)
+    through = route_through(costs, 3, int(cells["layer"][3]), int(cells["across"][3]))
+    # Of ways that cost the same either may be taken.
+    assert through[[0, 3, 6]].tolist() == cells[[0, 3, 6]].tolist()
+    way = tuple(zip(through["across"].tolist(), through["layer"].tolist(), strict=True))
+    assert {way: total for total, way in all_ways(data)}[way] == pytest.approx(best)
+    other = route_through(costs, 2, 1, 4)
+    assert (other["across"][[0, 2, 6]].tolist(), other["layer"][[0, 2, 6]].tolist()) == ([2, 4, 2], [0, 1, 0])
+
+
+def test_beyond_the_bound_there_is_no_way(data: ProblemArrays) -> None:
+    frame = rotated_frame(data.start, data.destination)
+    whole = grid_costs(data, frame, GRID, math.inf)
+    bound = 1.2 * whole.left[0, 0, 2]
+    bounded = grid_costs(data, frame, GRID, bound)
+    total, kept = whole.reached + whole.left, bounded.reached + bounded.left
+    assert (kept[total <= bound] == total[total <= bound]).all()
+    assert np.isinf(kept[total > bound + 1e-6]).all()
+    assert np.isinf(kept).sum() > np.isinf(total).sum()
+
+
+# ----------------------------------------------------------------------
+# Routes of different sides: each passes some obstacle elsewhere, cheapest first, none twice.
+
 SPAN = (-2500.0, 2500.0)
 
 

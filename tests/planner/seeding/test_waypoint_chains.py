@@ -9,8 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from aircraft.path_limits import Limits
-from planner.evaluation.problem import Problem, make_problem
-from planner.evaluation.problem_arrays import ProblemArrays
+from planner.evaluation.problem import Problem, ProblemArrays, make_problem
 from planner.seeding.waypoint_chains import open_places, waypoint_chains
 from world.scenario import Scenario
 

@@ -1,22 +1,293 @@
-"""Files of zones named by a scenario: read beside it, written down with it, refused by their names."""
+"""What files state of a zone: our own keys, openAIP's limits in both of its spellings, and what is refused."""
 
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.world.made.made_scenario import SMALL
-from world.airspace.zone_files import MOST_BYTES
+from world.airspace.zone_files import FLIGHT_LEVEL_ERROR, MOST_BYTES, geojson_zones, kml_zones, zone_entries
 from world.airspace.zones import Cylinder, Polygon
-from world.errors import PlanflyError
+from world.errors import PlanflyError, ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
 
+
+def limit(value: Any, unit: Any, datum: Any) -> dict[str, Any]:
+    return {"value": value, "unit": unit, "referenceDatum": datum}
+
+
+def test_our_own_keys_are_taken_and_others_left() -> None:
+    stated = {"kind": "inclusion", "floor_agl_m": 30.0, "ceiling_amsl_m": None, "colour": "red", "icaoClass": 3}
+    assert zone_entries(stated, "a file") == {"kind": "inclusion", "floor_agl_m": 30.0}
+
+
+@pytest.mark.parametrize(
+    ("low", "high"),
+    [
+        (limit(500, 1, 1), limit(400, 1, 0)),
+        (limit(500, "FT", "MSL"), limit(400, "FT", "GND")),
+        (limit(152.4, "M", "MSL"), limit(121.92, 0, 0)),
+    ],
+)
+def test_feet_and_metres_above_the_sea_and_the_ground(low: dict[str, Any], high: dict[str, Any]) -> None:
+    entries = zone_entries({"lowerLimit": low, "upperLimit": high}, "a file")
+    assert entries == {"kind": "exclusion", "floor_amsl_m": 152.4, "ceiling_agl_m": 121.92}
+    assert zone_entries({"lowerCeiling": low, "upperCeiling": high}, "a file") == entries
+
+
+def test_the_ground_is_no_floor() -> None:
+    assert zone_entries({"lowerLimit": limit(0, 1, 0)}, "a file") == {"kind": "exclusion"}
+
+
+def test_a_flight_level_bounds_an_exclusion_on_the_safe_side() -> None:
+    entries = zone_entries({"lowerLimit": limit(65, 6, 2), "upperLimit": limit(195, "FL", "STD")}, "a file")
+    assert entries["floor_amsl_m"] == pytest.approx(6500 * 0.3048 - FLIGHT_LEVEL_ERROR)
+    assert entries["ceiling_amsl_m"] == pytest.approx(19500 * 0.3048 + FLIGHT_LEVEL_ERROR)
+    # FL 660 is above every height that a scenario knows.
+    assert zone_entries({"upperLimit": limit(660, 6, 2)}, "a file")["ceiling_amsl_m"] == 9000.0
+
+
+FAULTS: dict[str, tuple[dict[str, Any], str]] = {
+    "a key misspelt": ({"ceiling_m": 100.0}, "ceiling_m: unknown; known are kind, floor_amsl_m"),
+    "another misspelt": ({"radius": 100.0}, "radius: unknown"),
+    "a limit that is a number": ({"upperLimit": 100.0}, "upperLimit: a table of value, unit and referenceDatum"),
+    "no value": ({"upperLimit": {"unit": 1, "referenceDatum": 1}}, "upperLimit.value: a number"),
+    "a truth": ({"upperLimit": limit(True, 1, 1)}, "upperLimit.value: a number"),
+    "a unit": ({"upperLimit": limit(5, 2, 1)}, "upperLimit.unit: allowed 0, M, 1, FT, 6, FL"),
+    "a list of units": ({"upperLimit": limit(5, [1], 1)}, "upperLimit.unit: allowed"),
+    "a datum": ({"lowerLimit": limit(5, 1, "QFE")}, "lowerLimit.referenceDatum: allowed 0, GND, 1, MSL, 2, STD"),
+    "a flight level of an inclusion": ({"kind": "inclusion", "upperLimit": limit(65, 6, 2)}, "bounds no inclusion"),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS)
+def test_what_is_refused(case: str) -> None:
+    properties, wanted = FAULTS[case]
+    with pytest.raises(ScenarioError) as caught:
+        zone_entries(properties, "a file")
+    assert str(caught.value).startswith("a file: ")
+    assert wanted in str(caught.value)
+
+
+# ----------------------------------------------------------------------
+# GeoJSON: every geometry that is a zone, and what is none, by its name and in one line.
+
+RING = [[8.0, 46.0], [8.1, 46.0], [8.1, 46.1], [8.0, 46.0]]
+HOLE = [[8.05, 46.01], [8.09, 46.01], [8.09, 46.05], [8.05, 46.01]]
+FAR = [[9.0, 46.0], [9.1, 46.0], [9.1, 46.1], [9.0, 46.0]]
+
+
+def feature(geometry_type: str, coordinates: Any, **properties: Any) -> dict[str, Any]:
+    geometry = {"type": geometry_type, "coordinates": coordinates}
+    return {"type": "Feature", "properties": {"name": "lake", **properties}, "geometry": geometry}
+
+
+def read(*features: Any) -> list[tuple[str, dict[str, Any]]]:
+    return list(geojson_zones(json.dumps({"type": "FeatureCollection", "features": list(features)}), "z.geojson"))
+
+
+def turned(ring: list[list[float]]) -> list[list[float]]:
+    """Latitude first."""
+    return [[lat, lon] for lon, lat in ring]
+
+
+def test_each_geometry() -> None:
+    found = read(
+        feature("Polygon", [RING], kind="inclusion", ceiling_agl_m=120),
+        feature("Polygon", [RING, HOLE]),
+        feature("MultiPolygon", [[RING, HOLE], [FAR]]),
+        feature("Point", [8.0, 46.0, 500.0], radius_m=80),
+    )
+    assert [where for where, _ in found] == [f"features[{k}] (lake)" for k in range(4)]
+    assert [entries for _, entries in found] == [
+        {"name": "lake", "kind": "inclusion", "ceiling_agl_m": 120, "rings_deg": [turned(RING)]},
+        {"name": "lake", "kind": "exclusion", "rings_deg": [turned(RING), turned(HOLE)]},
+        {"name": "lake", "kind": "exclusion", "rings_deg": [turned(RING), turned(HOLE), turned(FAR)]},
+        {"name": "lake", "kind": "exclusion", "radius_m": 80, "lat_deg": 46.0, "lon_deg": 8.0},
+    ]
+
+
+def test_a_feature_and_a_geometry_alone() -> None:
+    alone = feature("Polygon", [[[*corner, 0.0] for corner in RING]])
+    for data, where, name in ((alone, "feature (lake)", "lake"), (alone["geometry"], "geometry", "zone 1")):
+        ((found, entries),) = geojson_zones(json.dumps(data), "z.geojson")
+        assert (found.split(" (zone")[0], entries["name"]) == (where, name)
+        assert entries["rings_deg"] == [turned(RING)]
+
+
+DEEP = "[" * 200_000
+FAULTS_OF_GEOJSON_ZONES: dict[str, tuple[Any, str]] = {
+    "not JSON": ("{", "not valid JSON"),
+    "brackets without end": (DEEP, "not valid JSON"),
+    "NaN": (json.dumps(feature("Polygon", [[[8.0, float("nan")], *RING]])), "NaN is no number of JSON"),
+    "infinity": (json.dumps(feature("Point", [8.0, float("inf")], radius_m=9)), "Infinity is no number"),
+    "a list": ("[]", "a GeoJSON object is expected, got list"),
+    "no features": ('{"type": "FeatureCollection"}', "features: a list is expected"),
+    "a feature that is none": ('{"type": "FeatureCollection", "features": [5]}', "features[0]: a Feature is expected"),
+    "a line": (json.dumps(feature("LineString", RING)), 'feature (lake): geometry "LineString": a Polygon'),
+    "no geometry": ('{"type": "Feature", "geometry": null}', "geometry null: a Polygon"),
+    "a geometry of no kind": ('{"type": ["Polygon"]}', 'geometry ["Polygon"]: a Polygon'),
+    "a point alone": (json.dumps(feature("Point", [8.0, 46.0])), "feature (lake): radius_m: missing"),
+    "a ring too deep": (json.dumps(feature("Polygon", [[RING]])), "feature (lake): coordinates: lists of"),
+    "a ring too flat": (json.dumps(feature("Polygon", RING)), "coordinates: lists of [longitude, latitude]"),
+    "a corner of one": (json.dumps(feature("Polygon", [[[8.0]]])), "coordinates: lists of"),
+    "a corner of text": (json.dumps(feature("Polygon", [[["8", "46"]]])), "coordinates: lists of"),
+    "no coordinates": ('{"type": "Polygon"}', "coordinates: lists of"),
+    "a hole outside": (json.dumps(feature("Polygon", [RING, FAR])), "a hole lies outside its outline"),
+    "a key misspelt": (json.dumps(feature("Polygon", [RING], ceiling_m=9)), "feature (lake): ceiling_m: unknown"),
+    "another CRS": (
+        json.dumps({**feature("Polygon", [RING]), "crs": {"properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}}),
+        "crs: coordinates are longitude and latitude on WGS84",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS_OF_GEOJSON_ZONES)
+def test_what_is_no_zone(case: str) -> None:
+    text, wanted = FAULTS_OF_GEOJSON_ZONES[case]
+    with pytest.raises(ScenarioError) as caught:
+        list(geojson_zones(text, "z.geojson"))
+    message = str(caught.value)
+    assert message.startswith("z.geojson: ")
+    assert message.isprintable()
+    assert wanted in message
+
+
+def test_the_older_name_of_degrees_is_taken() -> None:
+    data = {
+        **feature("Polygon", [RING]),
+        "crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:OGC:1.3:CRS84"}},
+    }
+    assert len(list(geojson_zones(json.dumps(data), "z.geojson"))) == 1
+
+
+# ----------------------------------------------------------------------
+# KML: polygons as Google Earth writes them, points with a radius, and what is no zone, in one line.
+
+NAMESPACE = 'xmlns="http://www.opengis.net/kml/2.2"'
+
+
+def ring(*, side: str = "outer", up: float = 0.0, size: float = 0.1, last: float | None = None) -> str:
+    corners = ((8.0, 46.0, up), (8.0 + size, 46.0, up), (8.0 + size, 46.0 + size, up if last is None else last))
+    text = "\n  ".join(f"{lon:.3f},{lat:.3f},{height:g}" for lon, lat, height in corners)
+    return f"<{side}BoundaryIs><LinearRing><coordinates>\n  {text}\n</coordinates></LinearRing></{side}BoundaryIs>"
+
+
+def placemark(inside: str, name: str = "lake") -> str:
+    return f"<Placemark><name>{name}</name>{inside}</Placemark>"
+
+
+def document(*placemarks: str) -> str:
+    head = '<?xml version="1.0" encoding="UTF-8"?>'
+    return f"{head}<kml {NAMESPACE}><Document><Folder>{''.join(placemarks)}</Folder></Document></kml>"
+
+
+def polygon(*, mode: str = "", extrude: bool = False, up: float = 0.0, holes: str = "") -> str:
+    how = f"<extrude>1</extrude>{mode}" if extrude else mode
+    return f"<Polygon>{how}{ring(up=up)}{holes}</Polygon>"
+
+
+def data(**values: object) -> str:
+    entries = "".join(f'<Data name="{key}"><value>{value}</value></Data>' for key, value in values.items())
+    return f"<ExtendedData>{entries}</ExtendedData>"
+
+
+OUTLINE = [[46.0, 8.0], [46.0, 8.1], [46.1, 8.1]]
+ABSOLUTE, RELATIVE = "<altitudeMode>absolute</altitudeMode>", "<altitudeMode>relativeToGround</altitudeMode>"
+
+
+def test_polygons_and_their_heights() -> None:
+    text = document(
+        placemark(polygon()),
+        placemark(polygon(mode="<altitudeMode>clampToGround</altitudeMode>", up=300.0)),
+        placemark(polygon(mode=ABSOLUTE, extrude=True, up=450.0)),
+        placemark(polygon(mode=RELATIVE, extrude=True, up=120.0) + data(kind="inclusion", floor_agl_m=30)),
+        placemark(polygon(mode=RELATIVE, extrude=True, up=120.0) + data(ceiling_amsl_m=900.0)),
+    )
+    found = [entries for _, entries in kml_zones(text, "z.kml")]
+    assert all(entries.pop("name") == "lake" and entries.pop("rings_deg") == [OUTLINE] for entries in found)
+    assert found == [
+        {"kind": "exclusion"},
+        {"kind": "exclusion"},
+        {"kind": "exclusion", "ceiling_amsl_m": 450.0},
+        {"kind": "inclusion", "floor_agl_m": 30.0, "ceiling_agl_m": 120.0},
+        {"kind": "exclusion", "ceiling_amsl_m": 900.0},
+    ]
+
+
+def test_holes_and_parts() -> None:
+    hole = [[46.0, 8.0], [46.0, 8.02], [46.02, 8.02]]
+    text = document(
+        placemark(f"<MultiGeometry>{polygon(holes=ring(side='inner', size=0.02))}{polygon()}</MultiGeometry>")
+    )
+    ((where, entries),) = kml_zones(text, "z.kml")
+    assert where == "Placemark 1 (lake)"
+    assert entries["rings_deg"] == [OUTLINE, hole, OUTLINE]
+
+
+def test_a_point_with_a_radius_by_either_kind_of_data() -> None:
+    point = "<Point><coordinates>8.5,46.5,0</coordinates></Point>"
+    simple = '<ExtendedData><SchemaData><SimpleData name="radius_m">80</SimpleData></SchemaData></ExtendedData>'
+    for stated in (data(radius_m=80), simple):
+        ((_, entries),) = kml_zones(document(placemark(point + stated)), "z.kml")
+        assert entries == {"name": "lake", "kind": "exclusion", "radius_m": 80.0, "lat_deg": 46.5, "lon_deg": 8.5}
+
+
+FAULTS_OF_KML_ZONES = {
+    "not XML": ("<kml>", "not valid XML"),
+    "no KML": ("<gpx/>", "a <kml> element is expected"),
+    "an entity": (
+        '<!DOCTYPE kml [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;&a;">]><kml>&b;</kml>',
+        "a document type is declared: not allowed",
+    ),
+    "a line": (document(placemark("<LineString/>", "road")), "Placemark 1 (road): a Polygon is expected"),
+    "a point alone": (document(placemark("<Point><coordinates>8,46</coordinates></Point>")), "a Polygon is expected"),
+    "a sheet in the air": (
+        document(placemark(polygon(mode=ABSOLUTE, up=300.0))),
+        "altitudeMode absolute without extrude: a sheet in the air holds no airspace",
+    ),
+    "a sloping roof": (
+        document(placemark(f"<Polygon><extrude>1</extrude>{ABSOLUTE}{ring(up=300.0, last=301.0)}</Polygon>")),
+        "its corners have different heights",
+    ),
+    "an altitude mode": (
+        document(placemark(polygon(mode="<altitudeMode>sea</altitudeMode>", extrude=True))),
+        "altitudeMode 'sea': allowed clampToGround, relativeToGround, absolute",
+    ),
+    "parts of different heights": (
+        document(placemark(polygon(mode=ABSOLUTE, extrude=True, up=300.0) + polygon())),
+        "its polygons have different heights",
+    ),
+    "a number that is none": (document(placemark(polygon() + data(floor_agl_m="low"))), "floor_agl_m: 'low': a number"),
+    "a key misspelt": (document(placemark(polygon() + data(ceiling="90"))), "ceiling: unknown; known are kind"),
+    "coordinates of text": (
+        document(placemark(polygon().replace("8.000,46.000,0", "8,north"))),
+        "coordinates '8,north': lon,lat or lon,lat,up is expected",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FAULTS_OF_KML_ZONES)
+def test_what_is_no_zone_of_kml_zones(case: str) -> None:
+    text, wanted = FAULTS_OF_KML_ZONES[case]
+    with pytest.raises(ScenarioError) as caught:
+        list(kml_zones(text, "z.kml"))
+    message = str(caught.value)
+    assert message.startswith("z.kml: ")
+    assert message.isprintable()
+    assert wanted in message
+
+
+# ----------------------------------------------------------------------
+# Files of zones named by a scenario: read beside it, written down with it, refused by their names.
+
 # Near 46 N 8 E, where the small scenario's map has its origin.
-RING = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
+RING_OF_ZONE_FILES = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
 LAKE = {
     "type": "Feature",
     "properties": {"name": "lake", "ceiling_agl_m": 90.0},
-    "geometry": {"type": "Polygon", "coordinates": [RING]},
+    "geometry": {"type": "Polygon", "coordinates": [RING_OF_ZONE_FILES]},
 }
 MAST = """<kml><Placemark><name>mast</name><ExtendedData><Data name="radius_m"><value>80</value></Data></ExtendedData>
 <Point><coordinates>8.0,46.02</coordinates></Point></Placemark></kml>"""
@@ -53,7 +324,7 @@ def test_what_is_written_down_needs_no_file(tmp_path: Path) -> None:
     assert again.to_json() == written
 
 
-FAULTS = {
+FAULTS_OF_ZONE_FILES = {
     "missing.geojson": (None, "no such file"),
     "zones.kmz": (b"PK", "suffix '.kmz': a file of zones is .geojson, .json or .kml"),
     "empty.geojson": (b"", "not valid JSON"),
@@ -81,9 +352,9 @@ FAULTS = {
 }
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", FAULTS_OF_ZONE_FILES)
 def test_a_bad_file_is_refused_by_its_name(name: str, tmp_path: Path) -> None:
-    content, wanted = FAULTS[name]
+    content, wanted = FAULTS_OF_ZONE_FILES[name]
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(PlanflyError) as caught:

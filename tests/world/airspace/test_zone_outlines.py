@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from world.airspace.zone_outlines import level_heights, zone_parts, zone_rings, zone_walls
 from world.airspace.zones import Cylinder, Zone, ZoneLevel, make_polygon
+from world.airspace.zones_on_map import level_heights, zone_parts, zone_rings, zone_walls
 from world.terrain import gridded
 
 SQUARE = [(0.0, 0.0), (900.0, 0.0), (900.0, 900.0), (0.0, 900.0)]

@@ -1,4 +1,4 @@
-// Charts of panels: what `logs.report.charts.chart` describes, as traces and layout of plotly.js.
+// Charts of panels: what `logs.report.charts` describes, as traces and layout of plotly.js.
 
 const PANEL_GAP = 26, PANEL_GAP_OWN_AXIS = 60;
 

@@ -10,10 +10,9 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType, Writer
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.recording.messages import log_messages
-from logs.recording.reader import read_log
+from logs.recording.reader import log_messages, read_log
 from logs.recording.recover import recover_log
 from tests.clients import NODE_MODULES, need
 from tests.logs.log_copies import rewrite, same

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from logs.verdict.measures.leg_fits import LegFit, leg_course, leg_slope
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.slopes import LegFit, leg_course, leg_slope
 from logs.verdict.measures.track_alignment import lay_track
 from tests.synthetic import Profile, bank_radius, fly_path, make_setup
 

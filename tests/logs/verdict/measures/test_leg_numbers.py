@@ -6,9 +6,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.measures.leg_numbers import find_leg_ends, with_legs
+from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
 from tests.logs.made_flight import make_setup, make_track
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.measures.track_alignment import lay_track
 from tests.logs.verdict.judging import judge
 from tests.synthetic import (

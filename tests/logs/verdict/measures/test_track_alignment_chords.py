@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.measures import track_alignment
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.measures.track_alignment import along_across, approaches, lay_track
 from tests.synthetic import fly_path, make_setup, waypoint_stations
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from tests.logs.verdict.judging import bad_plan, judge, leg, of, waypoint

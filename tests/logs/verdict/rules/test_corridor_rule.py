@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of
 from tests.synthetic import bank_radius, bump, edited, fly_path, make_setup, waypoint_stations

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.logs.verdict.judging import judge, of
 from tests.synthetic import (

@@ -11,10 +11,10 @@ from aircraft.envelope import Envelope
 from flight.dynamics.envelope_tables import load_envelope
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.places import FLIGHT
 from logs.verdict.rules.energy_rule import air_angle, predicted_energy
 from tests.logs.verdict.judging import failing, judge, of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flight.mission.items import Command, Frame, MissionItem
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry

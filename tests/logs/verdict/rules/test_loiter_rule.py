@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.rules.loiter_rule import circles
 from tests.logs.verdict.judging import of
 from tests.mission_lines import setup_of, wp

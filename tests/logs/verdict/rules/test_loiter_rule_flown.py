@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.route_demands import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
 from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
 from logs.verdict.places import Place
 from logs.verdict.rules.loiter_rule import Circle, circles, fold_loiters

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from aircraft.envelope import Envelope
-from flight.ardupilot.parameters import default_parameters
-from flight.simulation.flight_setup import FlightSetup
+from flight.autopilots.arduplane.parameters import default_parameters
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.places import FLIGHT
 from logs.verdict.rules.stall_rule import level_stall, planned_bank, stall_findings
 from logs.verdict.tolerances import STALL_TOLERANCE

@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.measures.turns import measure_turn
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint

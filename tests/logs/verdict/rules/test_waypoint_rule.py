@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.ardupilot.parameters import default_parameters
-from flight.simulation.flight_setup import FlightSetup
+from flight.autopilots.arduplane.parameters import default_parameters
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_geometry
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint

@@ -1,20 +1,84 @@
-"""Each flight comes back once, by a worker that flies what the client would."""
+"""Workers of another version or model are refused by name."""
 
+import time
 from contextlib import nullcontext
 from itertools import pairwise
 
 import pytest
 from distributed import KilledWorker
 
-from planfly.campaigns.engine.cluster import Workers, connected
-from planfly.campaigns.engine.fingerprint import WorkerError
-from planfly.campaigns.engine.flight_loop import LOST, Order, Pilots, hired_pilots
-from planfly.campaigns.engine.flight_tasks import CampaignPlugin
+from planfly.campaigns.engine.flight_loop import (
+    LOST,
+    TOLD_EVERY,
+    CampaignPlugin,
+    FlightRate,
+    Order,
+    Pilots,
+    WorkerError,
+    code_hash,
+    fingerprint,
+    hired_pilots,
+    refuse_different,
+)
+from planfly.campaigns.engine.workers import Workers, connected
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import FlightRow, lost_row
-from planfly.campaigns.storage.row_values import same_flight
+from planfly.campaigns.storage.table import same_flight
 from tests.planfly.campaigns.made_campaigns import made_flight
 from world.interruption import Interrupted
+
+
+def test_the_same_is_let_in_and_each_difference_is_named() -> None:
+    mine = fingerprint("aerosonde")
+    refuse_different(mine, dict(mine), "w")
+    for name in ("planfly", "sources", "model", "jsbsim", "numpy"):
+        with pytest.raises(WorkerError, match=f"worker tcp://w:1: {name} other, not"):
+            refuse_different(mine, mine | {name: "other"}, "tcp://w:1")
+
+
+def test_aircraft_differ_and_a_missing_one_is_no_error_here() -> None:
+    assert fingerprint("aerosonde")["model"] != fingerprint("c172x")["model"]
+    assert "none" in fingerprint("nothing")["model"]
+    assert len(code_hash()) == 16
+
+
+# ----------------------------------------------------------------------
+# Flights a second, and when to tell again.
+
+
+def test_flights_that_were_there_before_are_not_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 100.0
+    monkeypatch.setattr(time, "monotonic", lambda: now)
+    rate = FlightRate(40)
+    assert not rate.due()
+    now += 4.0
+    assert rate.a_second(60) == 5.0
+    assert rate.due()
+    assert not rate.due()
+    now += TOLD_EVERY
+    assert rate.due()
+
+
+# ----------------------------------------------------------------------
+# What a worker holds: unpacked once, and nothing of it where the worker flies otherwise.
+
+
+def test_it_is_unpacked_once_with_the_model_of_this_machine(base: CampaignBase) -> None:
+    plugin = CampaignPlugin("c", base, fingerprint("aerosonde"), made_flight)
+    ready, fly = plugin.ready("w")
+    assert ready.world_hash() == base.world_hash()
+    assert fly(ready, 3, None) == made_flight(base, 3)
+    assert plugin.ready("w")[0] is ready
+
+
+def test_another_model_is_refused_by_name(base: CampaignBase) -> None:
+    plugin = CampaignPlugin("c", base, fingerprint("aerosonde") | {"model": "other"}, made_flight)
+    with pytest.raises(WorkerError, match="worker tcp://w:9: model"):
+        plugin.ready("tcp://w:9")
+
+
+# ----------------------------------------------------------------------
+# Each flight comes back once, by a worker that flies what the client would.
 
 
 @pytest.mark.filterwarnings("default")

@@ -9,7 +9,7 @@ from planfly.campaigns.flights.flight_row import fly_one, lost_row
 from planfly.campaigns.fly_campaign import open_store
 from planfly.campaigns.report.summary import CampaignSummary, summarise
 from planfly.campaigns.statistics.decision import Estimator, Goal
-from planfly.campaigns.storage.store import Store
+from planfly.campaigns.storage.stores import Store
 from tests.planfly.campaigns.made_campaigns import made_flight
 
 

@@ -1,4 +1,4 @@
-"""Spread files: what is drawn, and one line for what cannot be."""
+"""What may vary."""
 
 from pathlib import Path
 
@@ -6,8 +6,27 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from planfly.campaigns.spread.quantities import BY_NAME
-from planfly.campaigns.spread.spread_file import SpreadError, Varying, default_spread, parse_spread, read_spread
+from planfly.campaigns.spread.spread_file import (
+    BY_NAME,
+    NAMES,
+    QUANTITIES,
+    SpreadError,
+    Varying,
+    default_spread,
+    parse_spread,
+    read_spread,
+)
+
+
+def test_names_are_unlike_and_nominals_lie_in_their_range() -> None:
+    assert len(set(NAMES)) == len(QUANTITIES)
+    for one in QUANTITIES:
+        assert one.low < one.nominal < one.high
+    assert (BY_NAME["mass"].nominal, BY_NAME["wind_speed"].nominal) == (1.0, 0.0)
+
+
+# ----------------------------------------------------------------------
+# Spread files: what is drawn, and one line for what cannot be.
 
 GOOD = '[mass]\ndistribution = "norm"\nloc = 1.0\nscale = 0.05\nsource = "weighed"\n'
 

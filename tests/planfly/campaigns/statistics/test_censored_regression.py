@@ -1,4 +1,4 @@
-"""The regressions, against made flights whose coefficients are known."""
+"""The links of a binary regression, against scipy's laws."""
 
 from dataclasses import replace
 from itertools import product
@@ -7,13 +7,139 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import quad
 from scipy.optimize import minimize
-from scipy.stats import gumbel_l, lognorm, norm
+from scipy.stats import gamma, gumbel_l, lognorm, norm
 
-from planfly.campaigns.statistics.censored_regression import Outcomes, _Posterior, fit_regression
-from planfly.campaigns.statistics.links import CLOGLOG, PROBIT, BinaryLink
+from planfly.campaigns.statistics.censored_regression import (
+    CLOGLOG,
+    LINKS,
+    PROBIT,
+    BinaryLink,
+    Outcomes,
+    _Posterior,
+    fit_regression,
+    importance_sample,
+)
 
 Floats = NDArray[np.float64]
+
+
+CASES = [(PROBIT, norm), (CLOGLOG, gumbel_l)]
+X = np.linspace(-6.0, 3.0, 37)
+
+
+@pytest.mark.parametrize(("link", "law"), CASES)
+def test_shares_and_density_are_the_laws(link: BinaryLink, law: Any) -> None:
+    assert link.log_cdf(X) == pytest.approx(law.logcdf(X), rel=1e-9)
+    assert link.log_survival(X) == pytest.approx(law.logsf(X), rel=1e-9)
+    assert link.survival(X) == pytest.approx(law.sf(X), rel=1e-9)
+    assert link.density(X) == pytest.approx(law.pdf(X), rel=1e-9)
+    assert link.log_density(X) == pytest.approx(law.logpdf(X), rel=1e-9)
+    assert link.information(X) == pytest.approx(law.pdf(X) ** 2 / (law.cdf(X) * law.sf(X)), rel=1e-8)
+
+
+@pytest.mark.parametrize(("link", "law"), CASES)
+@pytest.mark.parametrize("failed", [True, False])
+def test_derivatives_are_those_of_the_law(link: BinaryLink, law: Any, failed: bool) -> None:
+    logs, h = (law.logcdf if failed else law.logsf), 1e-4
+    first, second = link.derivatives(X, np.full(X.size, failed))
+    assert first == pytest.approx((logs(X + h) - logs(X - h)) / (2.0 * h), rel=1e-5, abs=1e-7)
+    assert second == pytest.approx((logs(X + h) - 2.0 * logs(X) + logs(X - h)) / h**2, rel=1e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize(("link", "law"), CASES)
+def test_derivatives_of_the_density_are_the_laws(link: BinaryLink, law: Any) -> None:
+    h, logs = 1e-4, law.logpdf
+    first, second = link.density_derivatives(X)
+    assert first == pytest.approx((logs(X + h) - logs(X - h)) / (2.0 * h), rel=1e-5, abs=1e-7)
+    assert second == pytest.approx((logs(X + h) - 2.0 * logs(X) + logs(X - h)) / h**2, rel=1e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize(("link", "law"), CASES)
+@pytest.mark.parametrize("width", [0.5, 3.0])
+def test_information_is_the_mean_square_of_the_score(link: BinaryLink, law: Any, width: float) -> None:
+    """Of one that fails, one whose room is told, and one that passes by more: by quadrature."""
+    h = 1e-5
+
+    def score(logs: Any, z: float) -> float:
+        return float(logs(z + h) - logs(z - h)) / (2.0 * h)
+
+    for x in (-4.0, -1.0, 0.0, 1.5):
+        more = x + width
+        ends = law.cdf(x) * score(law.logcdf, x) ** 2 + law.sf(more) * score(law.logsf, more) ** 2
+        between = quad(lambda z: score(law.logpdf, z) ** 2 * law.pdf(z), x, more)[0]
+        assert link.information(np.array([x]), width)[0] == pytest.approx(ends + between, rel=1e-6)
+
+
+@pytest.mark.parametrize("link", LINKS)
+def test_far_from_all_flights_numbers_stay_finite(link: BinaryLink) -> None:
+    """A search may look at winds and draws that its fit has at no chance whatever."""
+    far = np.array([-300.0, -60.0, -35.0, 35.0, 300.0])
+    for failed in (True, False):
+        for values in link.derivatives(far, np.full(far.size, failed)):
+            assert np.isfinite(values).all()
+        assert (link.derivatives(far, np.full(far.size, failed))[1] <= 0.0).all()
+    for width in (0.0, 2.0):
+        assert np.isfinite(link.information(far, width)).all()
+        assert (link.information(far, width) >= 0.0).all()
+    assert np.isfinite(link.log_density(far[:-1])).all()
+    assert np.isfinite(link.density_derivatives(far)).all()
+    assert np.isfinite(link.density(far)).all()
+
+
+# ----------------------------------------------------------------------
+# The sample of a distribution that is known by its density alone, against scipy's distributions.
+
+PARTS = (0.05, 0.16, 0.5, 0.84, 0.95)
+
+
+@pytest.mark.parametrize(("law", "mode"), [(norm(3.0, 2.0), 3.0), (gamma(3.0), 2.0), (gumbel_l(1.0, 2.0), 1.0)])
+@pytest.mark.parametrize("wide", [0.5, 1.0, 2.0])
+def test_quantiles_are_the_laws_wherever_it_was_looked_for(law: Any, mode: float, wide: float) -> None:
+    """About the mode, with half, all or twice the deviation: skewed laws, too, and one that is none below 0."""
+    sample = importance_sample(lambda x: law.logpdf(x[:, 0]), np.array([mode]), wide * law.var() * np.eye(1), 512)
+    assert sample.shape == (512, 1)
+    assert np.quantile(sample[:, 0], PARTS) == pytest.approx(law.ppf(PARTS), abs=0.15 * law.std())
+
+
+def test_a_quantity_that_bends_with_another_is_followed() -> None:
+    """x normal, y normal about x^2: looked for along a straight line."""
+
+    def log_density(points: Floats) -> Floats:
+        x, y = points.T
+        out: Floats = -0.5 * x * x - 2.0 * (y - x * x) ** 2
+        return out
+
+    x, y = importance_sample(log_density, np.zeros(2), np.diag([1.0, 2.0]), 512).T
+    assert np.corrcoef(x * x, y)[0, 1] > 0.85
+    assert [x.mean(), y.mean()] == pytest.approx([0.0, 1.0], abs=0.15)
+
+
+def test_eleven_dimensions_are_as_good() -> None:
+    """Of the t distribution's points few are near the middle there; quantiles hold all the same, and correlations."""
+    size = 11
+    root = np.tril(np.random.default_rng(5).normal(size=(size, size)), -1) / 3.0 + np.eye(size)
+    covariance = root @ root.T
+    inverse = np.linalg.inv(covariance)
+    sample = importance_sample(
+        lambda x: -0.5 * np.einsum("ni,ij,nj->n", x, inverse, x), np.zeros(size), 1.2 * covariance, 512
+    )
+    deviations = np.sqrt(np.diag(covariance))
+    assert sample.mean(axis=0) / deviations == pytest.approx(np.zeros(size), abs=0.15)
+    assert sample.std(axis=0) / deviations == pytest.approx(np.ones(size), abs=0.15)
+    assert np.corrcoef(sample.T)[0] == pytest.approx(covariance[0] / deviations[0] / deviations, abs=0.12)
+
+
+def test_the_same_comes_again_and_in_no_order() -> None:
+    one, other = (importance_sample(lambda x: -0.5 * x[:, 0] ** 2, np.zeros(1), np.eye(1), 256)[:, 0] for _ in range(2))
+    assert (one == other).all()
+    assert abs(np.corrcoef(one, np.arange(256))[0, 1]) < 0.2
+
+
+# ----------------------------------------------------------------------
+# The regressions, against made flights whose coefficients are known.
+
 # Of the constant, of the wind from 10 m/s on, and of two draws.
 TRUTH = np.array([-1.0, 0.6, 1.5, 0.0])
 # Of a flight's room, in scales: one over the room's coefficient.

@@ -1,20 +1,122 @@
-"""The ways of failing that are fitted, against made flights whose coefficients are known."""
+"""The laws of one wind at which flights begin to fail, against scipy's, and what they say of few flights."""
 
 from collections.abc import Hashable
 
 import numpy as np
 import pytest
-from scipy.stats import norm
+from numpy.typing import NDArray
+from scipy.stats import gumbel_l, norm
 
-from planfly.campaigns.statistics.failure_mode import FailureMode
+from planfly.campaigns.statistics.censored_regression import LINKS, PROBIT, BinaryLink, Outcomes, fit_regression
 from planfly.campaigns.statistics.failure_modes import (
+    FailureLaws,
+    FailureMode,
     boundary_slopes,
     boundary_speed,
     failing_share,
+    fit_mode,
     fit_modes,
     regressors,
 )
-from planfly.campaigns.statistics.links import LINKS, PROBIT, BinaryLink
+
+Floats = NDArray[np.float64]
+
+
+PARTS = np.array([0.025, 0.5, 0.975])
+
+
+@pytest.mark.parametrize("speed", [6.0, 12.0, 19.0])
+def test_the_laws_are_scipys(speed: float) -> None:
+    """Means, spreads, probabilities and quantiles of both."""
+    laws = FailureLaws.up_to(20.0)
+    fails, flies = laws.log_shares(speed)
+    assert laws.location.size == 2 * laws.normals
+    for k in range(0, laws.normals, 997):
+        mean, spread = laws.location[k], laws.scale[k]
+        assert fails[k] == pytest.approx(norm(mean, spread).logcdf(speed), rel=1e-9)
+        assert laws.quantile(0.01)[k] == pytest.approx(norm(mean, spread).ppf(0.01))
+        gumbel = gumbel_l(laws.location[k + laws.normals], laws.scale[k + laws.normals])
+        assert gumbel.stats() == pytest.approx((mean, spread**2))
+        assert flies[k + laws.normals] == pytest.approx(gumbel.logsf(speed), rel=1e-9)
+        assert laws.quantile(0.01)[k + laws.normals] == pytest.approx(gumbel.ppf(0.01))
+
+
+def test_a_law_that_flights_follow_is_found() -> None:
+    law = norm(9.0, 1.0)
+    speeds = np.repeat(np.arange(4.0, 14.0, 0.5), 100)
+    flew = speeds < law.rvs(speeds.size, random_state=np.random.default_rng(2))
+    low, middle, high = FailureLaws.up_to(20.0).quantile_at(0.1, speeds, flew, PARTS)
+    assert low < law.ppf(0.1) < high
+    assert middle == pytest.approx(law.ppf(0.1), abs=0.25)
+
+
+def test_the_more_flew_the_further_the_boundary() -> None:
+    laws = FailureLaws.up_to(20.0)
+    few, many = (laws.quantile_at(0.01, np.full(n, 20.0), np.full(n, True), PARTS) for n in (10, 300))
+    assert (many > few).all()
+    # 299 of 299 show a share of 1 % with 95 % confidence: by any law the boundary is beyond, or as good as.
+    assert many[0] > 19.5
+
+
+# ----------------------------------------------------------------------
+# Whether by how little flights passed is taken to tell of failing.
+
+
+def made(count: int, seed: int, *, one_law: bool) -> tuple[Floats, NDArray[np.bool_], Floats]:
+    """Terms, who failed and by how much the others passed.
+
+    One law: a flight fails where its room is below 0.  Two: it fails by its first draw, in a wind that suffices, and
+    the others' room is what gusts leave of it, which no failing follows from.
+    """
+    random = np.random.default_rng(seed)
+    terms = np.column_stack((np.ones(count), random.uniform(-4.0, 4.0, count), random.normal(size=(count, 2))))
+    wind, first, gust = terms[:, 1], terms[:, 2], random.normal(size=count)
+    if one_law:
+        room = 0.6 * (2.0 - 0.4 * wind - 0.8 * first + gust)
+        return terms, room < 0.0, room.clip(0.0, 1.0)
+    room = np.abs(0.8 + 0.2 * gust)
+    return terms, first + 0.2 * gust > 2.0 - 0.2 * wind, room.clip(0.0, 1.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_room_counts_where_failing_is_of_its_law(seed: int) -> None:
+    """By a normal law as the flights were made: 1/0.6 of the room, and 0.4 and 0.8 of the wind and the first draw."""
+    mode = fit_mode(*made(400, seed, one_law=True), PROBIT)
+    assert mode.by_room == pytest.approx(1.0 / 0.6, rel=0.25)
+    assert mode.mean == pytest.approx([-2.0, 0.4, 0.8, 0.0], abs=0.4)
+
+
+@pytest.mark.parametrize("link", LINKS)
+@pytest.mark.parametrize("seed", range(5))
+def test_room_counts_for_nothing_where_failing_is_of_another(link: BinaryLink, seed: int) -> None:
+    """One law would have the first draw, which alone decides, as of little account: it leaves the room as it is."""
+    terms, failed, room = made(400, seed, one_law=False)
+    mode, bare = fit_mode(terms, failed, room, link), fit_mode(terms, failed, np.zeros(400), link)
+    assert mode.by_room == 0.0
+    assert mode.mean == pytest.approx(bare.mean)
+    assert mode.mean[2] > 2.0
+
+
+def test_the_rooms_own_law_says_nothing_for_a_link() -> None:
+    """The links differ in evidence by as much as without the room: to each comes that of the room's own law."""
+    terms, failed, room = made(400, 1, one_law=False)
+    told, bare = (
+        [fit_mode(terms, failed, some, link).log_evidence for link in LINKS] for some in (room, np.zeros(400))
+    )
+    assert told[0] - told[1] == pytest.approx(bare[0] - bare[1])
+    passes = Outcomes(terms, failed, np.where(failed, 0.0, room)).only_room()
+    by_itself = max(fit_regression(passes, link).log_evidence for link in LINKS)
+    assert told[0] == pytest.approx(bare[0] + by_itself)
+
+
+def test_the_depth_of_failing_counts_for_nothing() -> None:
+    terms, failed, room = made(400, 1, one_law=True)
+    deep = np.where(failed, 0.5, room)
+    assert fit_mode(terms, failed, deep, PROBIT).mean == pytest.approx(fit_mode(terms, failed, room, PROBIT).mean)
+
+
+# ----------------------------------------------------------------------
+# The ways of failing that are fitted, against made flights whose coefficients are known.
 
 FIRST, SECOND = np.array([-1.0, 0.6, 1.5, 0.0]), np.array([-1.5, 0.3, -1.0, 0.5])
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from planfly.campaigns.statistics.failure_mode import FailureMode
+from planfly.campaigns.statistics.censored_regression import PROBIT
+from planfly.campaigns.statistics.failure_modes import FailureMode
 from planfly.campaigns.statistics.flight_choice import _Belief, _gains_between, next_flights
-from planfly.campaigns.statistics.links import PROBIT
 from planfly.campaigns.statistics.wind_boundary import Direction, FailureFit
 from tests.planfly.campaigns.statistics.made_directions import above, fly, no_numbers, normal_numbers
 

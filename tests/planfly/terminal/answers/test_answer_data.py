@@ -9,11 +9,11 @@ import planfly.commands.paper
 from logs.recording.example_log import write_example_log
 from logs.recording.reader import read_log
 from planfly.cli import main
-from planfly.paper.seeded_plans import SeededPlan
-from tests.logs.field_logs.written_logs import dataflash
-from tests.planfly.commands.field_logs.field_log_files import example_plan
+from planfly.paper import SeededPlan
+from tests.logs.importers.written_logs import dataflash
+from tests.planfly.commands.field_log_files import example_plan
 from tests.planfly.conftest import FIELD
-from tests.planfly.paper.made_plans import made_plan
+from tests.planfly.made_plans import made_plan
 from tests.planfly.terminal.answers.checked_answers import answered
 
 Output = pytest.CaptureFixture[str]

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
-from logs.verdict.measures.route_demands import route_demands
+from flight.simulation.setup import FlightSetup
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.measures.track_alignment import lay_track
 from tests.synthetic import edited, fly_path, make_setup, waypoint_stations
 

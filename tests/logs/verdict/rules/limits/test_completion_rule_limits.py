@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from tests.logs.verdict.judging import judge, of
 from tests.synthetic import edited, fly_path, make_setup

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from tests.logs.verdict.judging import judge, of
 from tests.synthetic import edited, fly_path, make_setup
 

@@ -4,13 +4,11 @@ import math
 
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.leg_fits import LegFit
-from logs.verdict.measures.route_demands import route_demands
-from logs.verdict.measures.slopes import Ability, SlopeMeasure
-from logs.verdict.measures.tighter_limits import steep_arc
+from logs.verdict.measures.route_requirements import route_demands, steep_arc
+from logs.verdict.measures.slopes import Ability, LegFit, SlopeMeasure
 from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.rules import slope_rule
 from logs.verdict.rules.slope_rule import slope_findings

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flight.simulation.flight_setup import FlightSetup
+from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures import turns
-from logs.verdict.measures.route_demands import route_demands
+from logs.verdict.measures.route_requirements import route_demands
 from logs.verdict.measures.track_alignment import lay_track
 from logs.verdict.measures.turns import TurnMeasure, measure_turn
 from logs.verdict.rules.turn_rule import turn_findings

@@ -1,0 +1,288 @@
+"""ArduPlane's law against ArduPlane itself: both fly the same random plans in the same wind, gust for gust.
+
+``python -m benchmarks.against_arduplane [--plans N] [--from SEED] [--steep] [--json FILE] [--keep FILE]`` plans
+across the ridges near Jacksboro (random ends, winds of 0 to 10 m/s from anywhere, light or moderate turbulence),
+flies each plan with the law and with the program that PLANFLY_ARDUPLANE names (default:
+``../shared/autopilot/arduplane`` beside the checkout), and prints, for all corners that turn enough, how far each
+overshoots, and how much ground clearance each keeps.  --steep plans for climbs that take all the throttle there is;
+plans otherwise leave gusts a share of it.  --keep writes what the program flew, with its missions, as
+`tests.authorities` keeps it.
+"""
+
+import argparse
+import hashlib
+import json
+import math
+import os
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.autopilots.arduplane_sitl.flight import fly_autopilot
+from flight.mission.from_plan import plan_mission
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import make_plan, make_setup
+from planner.evaluation.problem import TURBULENCE_SHARE
+from world.errors import ScenarioError
+from world.scenario import Scenario, from_spec, load_scenario
+
+Floats = NDArray[np.float64]
+
+BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", Path(__file__).parents[2] / "shared" / "autopilot" / "arduplane"))
+# Corners that count: they turn by this much at least (rad), onto a leg of this length at least (m).
+LEAST_TURN, LEAST_LEG = math.radians(10.0), 250.0
+# Of the leg after a corner, how much of it is looked at: the next corner begins on the rest.
+LOOKED_AT = 0.75
+# Of TECS_CLMB_MAX, what plans climb with, and in turbulence what it leaves of that.
+PLANNED_CLIMB = 0.9
+# Distances along the legs at which two tracks are compared, m.
+STEP = 20.0
+RATIO_MEDIAN, RATIO_SPREAD, CLEARANCE = (0.95, 1.05), (0.8, 1.25), 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Corner:
+    """How one corner was flown: its turn (degrees) and how far the flight overshot the leg after it, m."""
+
+    waypoint: int
+    turn_deg: float
+    overshoot: float
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """A flight in figures: least clearance, extremes of height error and cross-track distance to the legs, m."""
+
+    ended: str
+    clearance: float
+    height_error: tuple[float, float]
+    off_legs: float
+    corners: tuple[Corner, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """One plan as both flew it, and how far apart (RMS and most) they flew: across the legs and in height, m."""
+
+    seed: int
+    wind: float
+    turbulence: str
+    law: Flown
+    real: Flown
+    apart_across: tuple[float, float]
+    apart_up: tuple[float, float]
+
+
+def random_setup(seed: int, *, steep: bool = False) -> tuple[FlightSetup, Airframe]:
+    """A plan between random ends in a random wind, for ArduPlane with exact navigation: the first that is feasible.
+
+    The same seed gives the same one.  steep: whether plans may climb as `_climbing` says.
+    """
+    for draw in range(50):
+        rng = np.random.default_rng([seed, draw])
+        spec: dict[str, Any] = load_scenario("jacksboro").to_json()
+        side = 1.0 if rng.random() < 0.5 else -1.0
+        for end, sign in (("start", side), ("destination", -side)):
+            spec[end] = {
+                "east_m": round(float(sign * rng.uniform(5000.0, 10_500.0))),
+                "north_m": round(float(rng.uniform(-7500.0, 7500.0))),
+                "height_m": 150.0,
+            }
+        spec["wind"] = {
+            "speed_mps": round(float(rng.uniform(0.0, 10.0)), 1),
+            "from_deg": round(float(rng.uniform(0.0, 360.0))),
+            "turbulence": ("light", "moderate")[int(rng.integers(2))],
+        }
+        spec["flight"] = {"autopilot": "ardupilot", "nav": "perfect"}
+        try:
+            scenario = from_spec(spec, f"random {seed}")
+            airframe = load_airframe(scenario)
+            plan = make_plan(scenario, _climbing(airframe, scenario) if steep else airframe, seed)
+        except ScenarioError:  # an end within a missile's reach
+            continue
+        if plan.feasible:
+            mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+            return make_setup(scenario, airframe, mission, seed), airframe
+    raise ValueError(f"seed {seed}: no feasible plan")
+
+
+def _climbing(airframe: Airframe, scenario: Scenario) -> Airframe:
+    """An airframe that is planned for climbs as steep as descents: more than is left for ArduPlane in turbulence.
+
+    There the throttle comes to its limit now and then, which is the hardest for its law.
+    """
+    limits, parameters = airframe.limits, airframe.parameters
+    assert limits.tracking is not None
+    assert parameters is not None
+    rate = PLANNED_CLIMB * TURBULENCE_SHARE[scenario.wind.turbulence] * parameters.tecs_climb_max
+    return replace(airframe, limits=replace(limits, tracking=replace(limits.tracking, climb_rate=rate)))
+
+
+def _legs(setup: FlightSetup) -> tuple[Floats, Floats, Floats]:
+    """Starts (l, 2), unit courses (l, 2) and lengths (l,) of a route's legs, m."""
+    points = setup.route.waypoints[:, :2]
+    steps = np.diff(points, axis=0)
+    runs = np.hypot(steps[:, 0], steps[:, 1])
+    return points[:-1], steps / runs[:, np.newaxis], runs
+
+
+def _along_legs(setup: FlightSetup, track: Track) -> tuple[Floats, Floats]:
+    """Distance across (m right) and height at each step along every leg, (n,), of the rows that pass abeam of it."""
+    across, up = [], []
+    begin = 0
+    for start, course, run in zip(*_legs(setup), strict=True):
+        rows = track.position[begin:]
+        along = (rows[:, :2] - start) @ course
+        # The leg begins where the flight is first abeam of its start and ends where it is abeam of its end.
+        first = int(np.argmax(along >= 0.0))
+        last = first + int(np.argmax(along[first:] >= run)) if (along[first:] >= run).any() else len(along) - 1
+        stretch = np.maximum.accumulate(along[first : last + 1])
+        right = (rows[first : last + 1, :2] - start) @ np.array([course[1], -course[0]])
+        at = np.arange(STEP, run - STEP, STEP)
+        if len(stretch) > 1 and len(at):
+            across.append(np.interp(at, stretch, right))
+            up.append(np.interp(at, stretch, rows[first : last + 1, 2]))
+        begin += first
+    return np.concatenate(across), np.concatenate(up)
+
+
+def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
+    starts, courses, runs = _legs(setup)
+    found = []
+    for i in range(1, len(runs)):
+        turn = math.atan2(
+            courses[i - 1, 0] * courses[i, 1] - courses[i - 1, 1] * courses[i, 0], float(courses[i - 1] @ courses[i])
+        )
+        if abs(turn) < LEAST_TURN or runs[i] < LEAST_LEG:
+            continue
+        away = track.position[:, :2] - starts[i]
+        passed = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))
+        along = away[passed:] @ courses[i]
+        left = away[passed:] @ np.array([-courses[i, 1], courses[i, 0]])
+        on_leg = (along > 0.0) & (along < LOOKED_AT * runs[i])
+        # A turn to the left (positive here) overshoots to the right.
+        over = float((-math.copysign(1.0, turn) * left[on_leg]).max()) if on_leg.any() else math.nan
+        found.append(Corner(i, -math.degrees(turn), over))
+    return tuple(found)
+
+
+def flown_figures(setup: FlightSetup, track: Track, ended: str) -> Flown:
+    """Figures of one flight."""
+    across, _ = _along_legs(setup, track)
+    error = track.height_error
+    return Flown(
+        ended,
+        float(np.nanmin(track.clearance)),
+        (float(error.min()), float(error.max())),
+        float(np.abs(across).max()),
+        _corners(setup, track),
+    )
+
+
+def compare(seed: int, *, steep: bool = False) -> tuple[Compared, FlightSetup]:
+    """Fly one random plan with both."""
+    setup, airframe = random_setup(seed, steep=steep)
+    law = simulate(setup, airframe.aircraft)
+    real, _ = fly_autopilot(setup, airframe.aircraft, BINARY)
+    (law_across, law_up), (across, up) = (_along_legs(setup, flown.track) for flown in (law, real))
+    wind = setup.scenario.wind
+    compared = Compared(
+        seed,
+        wind.speed,
+        wind.turbulence,
+        flown_figures(setup, law.track, law.ended),
+        flown_figures(setup, real.track, real.ended),
+        _apart(law_across - across),
+        _apart(law_up - up),
+    )
+    return compared, setup
+
+
+def _apart(values: Floats) -> tuple[float, float]:
+    return math.sqrt(float((values**2).mean())), float(np.abs(values).max())
+
+
+def summary(all_compared: list[Compared]) -> dict[str, Any]:
+    """Ratios of overshoots and differences of clearances, over all plans."""
+    ratios = [
+        law.overshoot / real.overshoot
+        for one in all_compared
+        for law, real in zip(one.law.corners, one.real.corners, strict=True)
+    ]
+    clearance = [one.law.clearance - one.real.clearance for one in all_compared]
+    low, median, high = (float(value) for value in np.nanpercentile(ratios, (5.0, 50.0, 95.0)))
+    return {
+        "plans": len(all_compared),
+        "corners": len(ratios),
+        "overshoot ratio, median": median,
+        "overshoot ratio, 5 to 95 %": (low, high),
+        "least clearance, law less real, m": (min(clearance), max(clearance)),
+        "apart across, RMS and most, m": [max(one.apart_across[k] for one in all_compared) for k in (0, 1)],
+        "apart in height, RMS and most, m": [max(one.apart_up[k] for one in all_compared) for k in (0, 1)],
+        "completed, law and real": [
+            sum(flown.ended == "completed" for flown in (one.law if k else one.real for one in all_compared))
+            for k in (1, 0)
+        ],
+    }
+
+
+def kept_flight(compared: Compared, setup: FlightSetup) -> dict[str, Any]:
+    """What `tests.authorities` keeps of a real flight: who flew, its scenario, its mission, and its figures."""
+    return {
+        "arduplane_sha256": hashlib.sha256(BINARY.read_bytes()).hexdigest(),
+        "seed": setup.seed,
+        "scenario": setup.scenario.to_json(),
+        "mission": setup.mission_text,
+        "real": asdict(compared.real),
+    }
+
+
+def _print(one: Compared, seconds: float) -> None:
+    pairs = zip(one.law.corners, one.real.corners, strict=True)
+    over = " ".join(f"{law.turn_deg:.0f}°:{law.overshoot:.1f}/{real.overshoot:.1f}" for law, real in pairs)
+    (law_low, law_high), (low, high) = one.law.height_error, one.real.height_error
+    print(
+        f"{one.seed:4d} {one.wind:4.1f} {one.turbulence:8s}"
+        f" clearance {one.law.clearance:6.1f} {one.real.clearance:6.1f} {one.law.clearance - one.real.clearance:+.1f}"
+        f" height {law_low:.1f}..{law_high:.1f} {low:.1f}..{high:.1f}"
+        f" apart {one.apart_across[0]:.2f} {one.apart_up[0]:.2f}  {over}  {seconds:.0f} s",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Compare, print, and write what was found."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.against_arduplane")
+    parser.add_argument("--plans", type=int, default=40)
+    parser.add_argument("--from", dest="first", type=int, default=1, help="seed of the first plan")
+    parser.add_argument("--steep", action="store_true", help="plans climb with all the throttle there is")
+    parser.add_argument("--json", default="runs/against-arduplane.json", help="where the figures go")
+    parser.add_argument("--keep", help="where the real flights go, for tests")
+    args = parser.parse_args()
+    found, kept = [], []
+    for seed in range(args.first, args.first + args.plans):
+        begun = time.monotonic()
+        compared, setup = compare(seed, steep=args.steep)
+        _print(compared, time.monotonic() - begun)
+        found.append(compared)
+        kept.append(kept_flight(compared, setup))
+    figures = summary(found)
+    for name, value in figures.items():
+        print(f"{name}: {value}")
+    target = Path(args.json)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    record = {"figures": figures, "flights": [asdict(one) for one in found]}
+    target.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    if args.keep:
+        Path(args.keep).write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,124 @@
+"""Default plans among zones and in a band of heights above ground, flown by ArduPlane's law: what harm comes of it.
+
+``python -m benchmarks.airspace.flights [--plans N] [--from NUMBER]`` plans the random scenarios of
+`benchmarks.airspace.scenarios`, flies each, and prints what plan and flight kept, and in the end how many were
+planned and how many came to harm.
+"""
+
+import argparse
+import math
+import time
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.airspace.scenarios import airspace_scenario, ring_distance
+from flight.mission.from_plan import plan_mission
+from planfly.airframe import load_airframe
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from world.scenario import Scenario
+from world.scenario_tables import ZoneTable
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What positions keep, m: negative where they do not.
+
+    low, high: from the band's lower and upper edge.  zones: from the nearest zone, on the map or in height.
+    """
+
+    low: float
+    high: float
+    zones: float
+
+    @property
+    def least(self) -> float:
+        """The least of them."""
+        return min(self.low, self.high, self.zones)
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """One plan and its flight: what is wrong with it, "" for nothing; what it kept, and how long planning took, s."""
+
+    wrong: str
+    kept: Kept | None
+    seconds: float
+
+
+def kept_by(scenario: Scenario, position: Floats) -> Kept:
+    """What positions (n, 3) keep of a scenario's band and zones, by plain sums on the tables of its file."""
+    terrain, limits = scenario.terrain, scenario.limits
+    assert terrain is not None
+    assert limits.max_height_m is not None
+    over = position[:, 2] - terrain.height(position[:, 0], position[:, 1])
+    zones = [_kept_of(zone, position, over) for zone in scenario.spec.zones or ()]
+    return Kept(
+        float(over.min()) - limits.min_clearance_m,
+        limits.max_height_m - float(over.max()),
+        min(zones, default=math.inf),
+    )
+
+
+def _kept_of(zone: ZoneTable, position: Floats, over: Floats) -> float:
+    """Least distance of positions from one zone, or within it for an inclusion, m."""
+    if zone.radius_m is not None:
+        away = np.hypot(position[:, 0] - zone.east_m, position[:, 1] - zone.north_m) - zone.radius_m
+    else:
+        away = ring_distance(np.array(zone.polygon_m), position[:, :2])
+    if zone.kind == "inclusion":
+        return float(-away.max())
+    if zone.floor_agl_m is not None:
+        away = np.maximum(away, zone.floor_agl_m - over)
+    if zone.ceiling_agl_m is not None:
+        away = np.maximum(away, over - zone.ceiling_agl_m)
+    return float(away.min())
+
+
+def fly(number: int) -> Flown:
+    """Plan and fly the scenario of this number, and print a line about it."""
+    scenario = airspace_scenario(number)
+    airframe = load_airframe(scenario)
+    before = time.perf_counter()
+    plan = make_plan(scenario, airframe, number + 1)
+    seconds = time.perf_counter() - before
+    name = f"{scenario.name:15s} {len(scenario.zones):2d} zones, {len(plan.waypoints)} waypoints, {seconds:4.1f} s"
+    if not plan.safe:
+        print(f"{name}  no plan: {'; '.join(plan.certificate.problems[:3])}", flush=True)
+        return Flown("no plan", None, seconds)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    judged = fly_and_judge(setup, airframe, None)
+    kept = kept_by(scenario, judged.track.position)
+    parts = ["" if judged.ended == "completed" else judged.ended, "" if kept.least >= 0.0 else "not inside"]
+    parts += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]
+    wrong = "; ".join(part for part in parts if part)
+    promised = plan.certificate
+    print(
+        f"{name}  length {plan.objectives[0]:.4f}  above {promised.clearance:5.1f} {kept.low:5.1f}  below"
+        f" {promised.headroom:5.1f} {kept.high:5.1f}  zones {promised.zone_distance:6.1f} {kept.zones:6.1f}  {wrong}",
+        flush=True,
+    )
+    return Flown(wrong, kept, seconds)
+
+
+def main() -> None:
+    """Fly, print, and sum up."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.airspace.flights")
+    parser.add_argument("--plans", type=int, default=30)
+    parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
+    args = parser.parse_args()
+    flown = [fly(number) for number in range(args.first, args.first + args.plans)]
+    made = [one.kept for one in flown if one.kept is not None]
+    print(
+        f"{len(made)} of {len(flown)} planned, {sum(kept.least >= 0.0 for kept in made)} flown inside all,"
+        f" {sum(one.wrong == '' for one in flown)} flyable; least kept {min(kept.least for kept in made):.1f} m;"
+        f" planned in {np.median([one.seconds for one in flown]):.1f} s (median)"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,59 @@
+"""Turning angles and slopes of feasible missions as flown, measured from the track alone, against the plan."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from tests.missions import feasible
+from world.geometry import wrap
+
+Floats = NDArray[np.float64]
+
+# A leg is measured where it is flown straight for at least this far, m, from a second's flight after the arc and blend
+# before it to the next ones.
+STRETCH, SETTLING = 100.0, 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class Angles:
+    """How far the flown angles are from the planned ones, deg: of turns between two measured legs, of measured legs."""
+
+    turns: Floats
+    slopes: Floats
+
+
+def angles(numbers: Iterable[int], margin: float) -> Angles:
+    """Fly the feasible missions of these numbers, inside every limit by ``margin``, and measure them."""
+    turns: list[float] = []
+    slopes: list[float] = []
+    for number in numbers:
+        made = feasible(number, margin)
+        flown = simulate(made.setup, made.airframe.aircraft)
+        if flown.ended != "completed":
+            raise RuntimeError(f"mission {number} {flown.ended}")
+        shape = route_demands(made.setup)
+        courses = []
+        for leg in range(shape.legs):
+            line = _line(shape, flown.track, leg)
+            courses.append(np.arctan2(line[0], line[1]))
+            slopes.append(np.arctan(line[2]) - shape.slopes[leg])
+        turns += [wrap(courses[k] - courses[k - 1]) - float(shape.turns[k]) for k in range(1, shape.legs)]
+    return Angles(*(np.degrees(np.abs([value for value in found if np.isfinite(value)])) for found in (turns, slopes)))
+
+
+def _line(shape: RouteDemands, track: Track, leg: int) -> Floats:
+    """(3,) east, north and up for each m of the way over the ground, by least squares; NaN for a short stretch."""
+    away = track.position - shape.points[leg]
+    along = away[:, :2] @ shape.leg_unit(leg)
+    low = shape.after[leg] + shape.blend[leg] + SETTLING
+    high = shape.runs[leg] - shape.before[leg + 1] - shape.blend[leg + 1]
+    use = (track.leg == leg) & (along >= low) & (along <= high)
+    if not use.any() or np.ptp(along[use]) < STRETCH:
+        return np.full(3, np.nan)
+    step = np.polyfit(along[use], track.position[use], 1)[0]
+    return np.asarray(step / np.hypot(step[0], step[1]))

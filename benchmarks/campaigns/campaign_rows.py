@@ -1,0 +1,116 @@
+"""Flights a minute, what a second worker adds, what a campaign adds to a flight, and how long a proof takes.
+
+``python -m benchmarks campaigns [--flights N] [--long]``.  The mission of the first rows is 13 km over the
+demo's terrain, in its wind.
+"""
+
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.campaigns.client_memory import client_memory
+from benchmarks.campaigns.compare_step_rates import compare_all
+from benchmarks.campaigns.winds_reference import winds_row
+from flight.simulation.simulate import Flight, fly_to_end
+from planfly.campaigns.engine.flight_loop import Order, hired_pilots
+from planfly.campaigns.engine.workers import Workers
+from planfly.campaigns.flights.campaign_base import CampaignBase, open_campaign, vary
+from planfly.campaigns.flights.flight_row import fly_one
+from planfly.campaigns.spread.draws import draw_flight
+from planfly.campaigns.spread.spread_file import default_spread
+from world.scenario import Scenario, load_scenario, with_wind
+
+FLIGHTS, ROUNDS = 90, 3
+# Corners of the 13 km: latitude, longitude.
+_CORNERS = ((36.273, -84.28), (36.273, -84.23), (36.309, -84.23), (36.309, -84.28))
+
+
+def mission_13_km(folder: Path) -> CampaignBase:
+    """Three legs of 4.0 to 4.5 km above the demo's ridges, in its wind."""
+    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.293\t-84.25\t1150\t1"]
+    lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(_CORNERS, 1)]
+    path = folder / "legs.waypoints"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    wind = load_scenario("jacksboro").wind
+
+    def in_its_wind(scenario: Scenario) -> Scenario:
+        return with_wind(scenario, wind.speed, wind.from_course, wind.turbulence)
+
+    return open_campaign(str(path), default_spread(), terrain="jacksboro", seed=1, change=in_its_wind)
+
+
+def flights_a_minute(base: CampaignBase, workers: int, flights: int) -> float:
+    """Flights a minute, from the first that came back of each worker on."""
+    indices = iter(range(flights))
+
+    def following() -> Order | None:
+        index = next(indices, None)
+        return None if index is None else Order(index)
+
+    moments: list[float] = []
+    with hired_pilots(Workers(workers), base) as pilots:
+        moments += [time.perf_counter() for _ in pilots.fly(following)]
+    return 60.0 * (flights - workers) / (moments[-1] - moments[workers - 1])
+
+
+def over_simulate(base: CampaignBase, flights: int = 20) -> float:
+    """CPU time of a flight as a campaign flies it over that of `simulate` alone, the median of as many flights."""
+    fly_one(base, 0)
+    ratios = []
+    for index in range(1, flights + 1):
+        started = time.process_time()
+        fly_one(base, index)
+        between = time.process_time()
+        varied = vary(base, draw_flight(base.spread, base.seed, index))
+        setup_done = time.process_time()
+        how = varied.off_nominal
+        fly_to_end(Flight(varied.setup, varied.airframe.aircraft, how.variation, start_offset=how.start_offset))
+        ratios.append((between - started) / (time.process_time() - setup_done))
+    return statistics.median(ratios)
+
+
+def proof(folder: Path, share: float) -> tuple[int, float]:
+    """Flights and seconds of ``planfly campaign jacksboro --prove SHARE``, planning and report included."""
+    started = time.perf_counter()
+    command = [sys.executable, "-m", "planfly", "campaign", "jacksboro", "--prove", str(share), "--seed", "1"]
+    done = subprocess.run(
+        [*command, "--workers", "2", "--out", str(folder / "proof")], check=True, capture_output=True, text=True
+    )
+    spent = time.perf_counter() - started
+    line = next(line for line in done.stdout.splitlines() if " flights are flyable" in line)
+    return int(line.split(" of ")[1].split()[0]), spent
+
+
+def run(most: int = FLIGHTS, *, whole: bool = False) -> dict[str, Any]:
+    """Measure, print a table, and return it.
+
+    most: flights whose rate is taken; of fewer than 90 the probability that is proved is 0.9.
+    whole: with the rows that take an hour: winds of the demo, the client's memory, both rates of steps.
+    """
+    share = 0.99 if most >= FLIGHTS else 0.9
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        base = mission_13_km(folder)
+        two, one = [], []
+        for _ in range(ROUNDS):
+            two.append(flights_a_minute(base, 2, most))
+            one.append(flights_a_minute(base, 1, max(2, most // 2)))
+        flights, seconds = proof(folder, share)
+        found: dict[str, Any] = {
+            "flights a minute, 13 km, two workers": statistics.median(two),
+            "two workers / one": statistics.median(a / b for a, b in zip(two, one, strict=True)),
+            "a campaign's flight / simulate alone": over_simulate(base, min(20, most)),
+            f"--prove {share} on the demo: flights": flights,
+            f"--prove {share} on the demo: seconds": seconds,
+        }
+        if whole:
+            found["client at 100,000 flights, MB"] = client_memory(100_000)
+            found |= winds_row()
+            found |= compare_all(range(200))
+    for label, value in found.items():
+        print(f"  {label:<52}{value:10.4g}")
+    return found

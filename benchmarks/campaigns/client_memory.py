@@ -1,0 +1,57 @@
+"""Memory of the process that leads a campaign.
+
+``python -m benchmarks.campaigns.client_memory FLIGHTS`` leads a campaign of the demo, but of made-up flights, each row
+as large as a real one's, to its report, and prints its largest resident size in MB.
+"""
+
+import subprocess
+import sys
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from planfly.campaigns.engine.workers import Workers, in_own_process
+from planfly.campaigns.flights.campaign_base import CampaignBase, GivenWind, open_campaign
+from planfly.campaigns.flights.flight_row import STATIONS, FlightRow
+from planfly.campaigns.fly_campaign import fly_campaign, open_store
+from planfly.campaigns.report.files import finish_campaign
+from planfly.campaigns.spread.spread_file import default_spread
+from planfly.campaigns.statistics.decision import Goal
+from tests.planfly.campaigns.made_campaigns import made_flight
+
+# Waypoints whose crossings a row of the demo holds.
+_WAYPOINTS = 14
+
+
+def large_flight(base: CampaignBase, index: int, wind: GivenWind | None = None) -> FlightRow:
+    """A made flight with a shape of a real one's size; of no duration, so that none is flown again for its log."""
+    row = made_flight(base, index, wind)
+    random = np.random.default_rng(index)
+    clearance = random.uniform(50.0, 300.0, STATIONS).astype(np.float32)
+    crossings = random.normal(0.0, 3.0, (_WAYPOINTS, 2)).astype(np.float32)
+    return replace(row, duration=0.0, clearance=clearance.tobytes(), crossings=crossings.tobytes())
+
+
+def lead(flights: int, folder: Path) -> None:
+    """Lead a campaign of so many flights, from its first to its report."""
+    base = in_own_process(open_campaign, "jacksboro", default_spread(), seed=1)
+    goal = Goal(None, False, flights, 0.95)
+    with open_store(base, goal, folder, resume=False) as store:
+        estimate = fly_campaign(base, goal, Workers(1), store, fly=large_flight)
+    finish_campaign(base, goal, estimate, folder, "planfly campaign")
+
+
+def client_memory(flights: int) -> float:
+    """Largest resident size of a client of so many flights, MB."""
+    command = [sys.executable, "-m", "benchmarks.campaigns.client_memory", str(flights)]
+    return float(subprocess.run(command, check=True, capture_output=True, text=True).stdout.split()[-1])
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as name:
+        lead(int(sys.argv[1]), Path(name))
+    # Of this process alone: what getrusage tells is at least what the process that started it had.
+    status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    print(next(int(line.split()[1]) / 1024.0 for line in status if line.startswith("VmHWM")))

@@ -1,0 +1,131 @@
+"""Flights with JSBSim at 60 steps a second against the same flights at 120.
+
+``python -m benchmarks.campaigns.compare_step_rates [--missions N] [--from SEED] [--aircraft NAME]`` flies missions of
+`tests.field_missions`, every other of them close to a limit, at both rates: as they are, with gusts and satellites'
+errors, for the verdict; in calm and in their wind without gusts, navigation exact, for the track.  It prints in how
+many the verdicts differ, and how far apart the tracks are at most, row by row at the same time.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import SimulatedFlight, simulate
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import make_setup
+from tests.field_missions import FieldMission, close_mission, ordinary_mission
+from world.scenario import Scenario
+from world.wind import Wind
+
+# A track may be so far from that at 120 steps a second, m.
+MOST_APART = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class StepRates:
+    """One mission at both rates.
+
+    flyable: at 120 and at 60 steps a second.
+    same: whether the same rules failed at the same places.
+    calm, windy: how far apart the tracks are at most without gusts, m; inf where one ended otherwise.
+    """
+
+    name: str
+    flyable: tuple[bool, bool]
+    same: bool
+    calm: float
+    windy: float
+
+
+def compare(seed: int, aircraft: str = "aerosonde") -> StepRates:
+    """Fly the mission of a seed."""
+    made = mission_of(seed, aircraft)
+    airframe = load_airframe(made.scenario)
+    setup = make_setup(made.scenario, airframe, made.mission, seed=1)
+    judged = [_judged(setup, airframe, hz) for hz in (120, 60)]
+    failed = [{(item.rule, item.place) for item in one.findings if item.ok is False} for one in judged]
+    calm, windy = (_apart(_without_gusts(made, speed), airframe) for speed in (0.0, made.scenario.wind.speed))
+    return StepRates(made.name, (judged[0].flyable, judged[1].flyable), failed[0] == failed[1], calm, windy)
+
+
+def mission_of(seed: int, aircraft: str) -> FieldMission:
+    """Ordinary for an even seed, close to a limit for an odd one."""
+    flight: dict[str, Any] = {} if aircraft == "aerosonde" else {"aircraft": aircraft}
+    if seed % 2 == 0:
+        return ordinary_mission(seed, **flight)
+    return close_mission(seed, energy=_energy, **flight)
+
+
+def _energy(made: FieldMission) -> float:
+    airframe = load_airframe(made.scenario)
+    return float(simulate(make_setup(made.scenario, airframe, made.mission, 1), airframe.aircraft).track.energy[-1])
+
+
+def _judged(setup: FlightSetup, airframe: Airframe, hz: Literal[60, 120]) -> Verdict:
+    flown = simulate(replace(setup, fdm_hz=hz), airframe.aircraft)
+    return judge_flight(setup, flown.track, flown.ended)
+
+
+def _without_gusts(made: FieldMission, speed: float) -> FlightSetup:
+    old = made.scenario.wind
+    wind = Wind(speed, old.from_course, old.gradient if speed else 0.0, "none", None, old.reference_amsl)
+    table = made.scenario.spec.wind.model_copy(update={"speed_mps": speed, "turbulence": "none"})
+    scenario: Scenario = replace(made.scenario, wind=wind, spec=made.scenario.spec.model_copy(update={"wind": table}))
+    setup = make_setup(scenario, load_airframe(scenario), made.mission, seed=1)
+    return replace(setup, nav="perfect")
+
+
+def _apart(setup: FlightSetup, airframe: Airframe) -> float:
+    one, other = (_flown(setup, airframe, hz) for hz in (120, 60))
+    rows = min(len(one.track), len(other.track))
+    # The last tick may come one later.
+    if one.ended != other.ended or abs(len(one.track) - len(other.track)) > 1 or not rows:
+        return float("inf")
+    return float(np.linalg.norm(one.track.position[:rows] - other.track.position[:rows], axis=1).max())
+
+
+def _flown(setup: FlightSetup, airframe: Airframe, hz: int) -> SimulatedFlight:
+    return simulate(replace(setup, fdm_hz=cast("Any", hz)), airframe.aircraft)
+
+
+def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False) -> dict[str, float]:
+    """What all missions come to: figures by name."""
+    found: list[StepRates] = []
+    for one in _each(seeds, aircraft):
+        found.append(one)
+        if loud and (not one.same or max(one.calm, one.windy) > MOST_APART):
+            print(f"{one.name}: flyable {one.flyable}, same findings {one.same}, {one.calm:.3f}, {one.windy:.3f} m")
+    return {
+        "missions": len(found),
+        "flyable at 120 steps a second": sum(one.flyable[0] for one in found),
+        "verdicts that differ": sum(one.flyable[0] != one.flyable[1] for one in found),
+        "missions with other failed findings": sum(not one.same for one in found),
+        "calm: most between the tracks, m": max(one.calm for one in found),
+        "wind without gusts: most between the tracks, m": max(one.windy for one in found),
+    }
+
+
+def _each(seeds: range, aircraft: str) -> Iterator[StepRates]:
+    for seed in seeds:
+        yield compare(seed, aircraft)
+
+
+def main() -> None:
+    """Fly and print."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.campaigns.compare_step_rates")
+    parser.add_argument("--missions", type=int, default=200)
+    parser.add_argument("--from", dest="first", type=int, default=0, help="seed of the first mission")
+    parser.add_argument("--aircraft", default="aerosonde")
+    args = parser.parse_args()
+    for label, value in compare_all(range(args.first, args.first + args.missions), args.aircraft, loud=True).items():
+        print(f"  {label:<52}{value:10.4g}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,140 @@
+"""What the stages cost against each other: bare JSBSim, the closed loop, recording, judging, reading, reporting.
+
+Seconds are CPU seconds, the least of a few rounds, so that other work on the machine counts little.  Flights with and
+without a log are flown in turn, so that a machine that slows down slows them all.
+"""
+
+import resource
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.timing import median_cpu
+from flight.dynamics.fdm import Fdm
+from flight.mission.from_plan import plan_mission
+from flight.simulation.setup import FDM_HZ, FlightSetup
+from flight.simulation.simulate import simulate
+from logs.recording.reader import read_log
+from logs.recording.recorder import Recorder
+from logs.verdict.judge_flight import judge_flight
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import BATCH, make_plan, make_setup
+from world.scenario import load_scenario
+
+ROUNDS = 5
+
+
+def run() -> dict[str, Any]:
+    """Measure, print a table, and return it."""
+    scenario = load_scenario("jacksboro")
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, 1)
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank)
+    setup = make_setup(scenario, airframe, mission, 1, plan=plan)
+    flown = simulate(setup, airframe.aircraft)
+    seconds = float(flown.track.time[-1])
+    steps = round(seconds * FDM_HZ)
+
+    def bare() -> None:
+        fdm = Fdm(airframe.aircraft, rate_hz=FDM_HZ)
+        trim = fdm.start(36.5, -84.2, 600.0, 0.0, airframe.airspeed)
+        fdm.write(np.array(trim.commands()))
+        fdm.step(steps)
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        times = recording(setup, airframe, folder)
+        hour, hours = long_flight(folder)
+        size = hour.stat().st_size / hours / 1e6
+        out = ("--out", str(folder / "report"), "--overwrite")
+        times |= {
+            "bare JSBSim": median_cpu(bare, ROUNDS),
+            "judging": median_cpu(lambda: judge_flight(setup, flown.track, "completed"), ROUNDS),
+            "planning": median_cpu(lambda: make_plan(scenario, airframe, 1), ROUNDS),
+            "whole `planfly run`, new process": in_child("run", "--out", str(folder / "run"), "--overwrite"),
+            "`planfly --help`, new process": in_child("--help"),
+            "reading the long log": median_cpu(lambda: read_log(hour), 3),
+            "`planfly check` of the long log": in_child("check", str(hour)),
+            "`planfly report` of the long log": in_child("report", str(hour), *out),
+        }
+        page = (folder / "report" / "report.html").stat().st_size / 1e6
+
+    flight = times["flight"]
+    ratios = {
+        "closed loop at 60 Hz / bare JSBSim at 120 Hz": flight / times["bare JSBSim"],
+        "recording at 20 Hz / flight": times["flight, recorded at 20 Hz"] / flight - 1.0,
+        "recording at 60 Hz / flight": times["flight, recorded at 60 Hz"] / flight - 1.0,
+        "judging / flight": times["judging"] / flight,
+        "flight time / time to fly it": seconds / flight,
+        "flight time / whole run": seconds / times["whole `planfly run`, new process"],
+    }
+    print(f"jacksboro, seed 1: {seconds:.0f} s of flight, {len(flown.track)} rows; CPU, median of {ROUNDS}")
+    for label, value in times.items():
+        print(f"  {label:<48}{value:9.3f} s")
+    for label, value in ratios.items():
+        print(f"  {label:<48}{value:9.2f}")
+    print(f"  {'the long log, hours of flight':<48}{hours:9.2f}")
+    print(f"  {'its size per flight hour, 60 Hz':<48}{size:9.1f} MB")
+    print(f"  {'its report.html':<48}{page:9.1f} MB")
+    return {"seconds": times, "ratios": ratios, "log_mb_per_hour": size, "long_log_hours": hours, "report_mb": page}
+
+
+def recording(setup: FlightSetup, airframe: Airframe, folder: Path, rounds: int = 2 * ROUNDS) -> dict[str, float]:
+    """The flight without a log, with one at 20 Hz and with one at 60 Hz, flown in turn: CPU s, the least of each.
+
+    The cost of recording is a small difference of these, which medians on a busy machine would bury.
+    """
+    log = folder / "flight.mcap"
+
+    def fly(every: int) -> None:
+        with Recorder(log, setup, every=every, batch=BATCH) as recorder:
+            flown = simulate(setup, airframe.aircraft, sink=recorder.write_rows)
+            recorder.finish(flown.ended, None)
+
+    work: dict[str, Callable[[], object]] = {
+        "flight": lambda: simulate(setup, airframe.aircraft),
+        "flight, recorded at 20 Hz": lambda: fly(3),
+        "flight, recorded at 60 Hz": lambda: fly(1),
+    }
+    spent: dict[str, list[float]] = {label: [] for label in work}
+    for _ in range(rounds):
+        for label, part in work.items():
+            started = time.process_time()
+            part()
+            spent[label].append(time.process_time() - started)
+    return {label: min(found) for label, found in spent.items()}
+
+
+def planfly(*argv: str) -> None:
+    """Run a command in a process of its own."""
+    subprocess.run([sys.executable, "-m", "planfly", *argv], check=True, capture_output=True)
+
+
+def in_child(*argv: str, rounds: int = 2) -> float:
+    """CPU seconds of a command, its start included."""
+    spent = []
+    for _ in range(rounds):
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        planfly(*argv)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
+    return statistics.median(spent)
+
+
+def long_flight(folder: Path, laps: int = 5) -> tuple[Path, float]:
+    """Fly laps of 13 minutes or so above the demo's ridges, in wind and turbulence: the log, and the hours in it."""
+    corners = [(36.273, -84.28), (36.273, -84.22), (36.313, -84.22), (36.313, -84.28)] * laps
+    lines = ["QGC WPL 110", "0\t1\t0\t16\t0\t0\t0\t0\t36.293\t-84.25\t1150\t1"]
+    lines += [f"{k}\t0\t0\t16\t0\t0\t0\t0\t{lat}\t{lon}\t1200\t1" for k, (lat, lon) in enumerate(corners, 1)]
+    mission, log = folder / "laps.waypoints", folder / "laps.mcap"
+    mission.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    weather = ("--wind", "5,250", "--turbulence", "light")
+    planfly("fly", str(mission), "--terrain", "jacksboro", *weather, "--log", str(log))
+    return log, read_log(log).end_time / 3600.0

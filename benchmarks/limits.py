@@ -1,0 +1,210 @@
+"""Limits that the envelope predicts against those that flights show: slopes, and the shortest leg between two turns."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from aircraft.catalog import Aircraft, load_aircraft
+from benchmarks.flight import flown_with
+from flight.dynamics.envelope_tables import load_envelope
+from flight.guidance.gains import load_gains
+from flight.mission.items import Mission
+from flight.mission.route import Route
+from flight.simulation.setup import FlightSetup, make_limits
+from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import route_demands
+from world.scenario import from_spec
+
+Floats = NDArray[np.float64]
+
+COURSE = 0.5
+AMSL = 800.0
+BANK = math.radians(30.0)
+# A slope is held if the airspeed does not fall in a climb or rise in a dive by more than this (m/s, mean of 5 s), and
+# the height stays within this (m).
+SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
+# A leg is long enough if its turns are flown at the bank limit, as they are with this much leg (m) between them: the
+# track within 2 m of the fly-by path (the verdict lets it swing out by 5 m), and the largest mean bank of 2 seconds at
+# most half a degree more than the limit, or than far apart (30.7 degrees on a 30 degree arc in calm air), if that is
+# more, but no more than so much.  Guidance may not slow down for arcs here: that would hold the bank in turns too tight
+# for the airspeed.
+FAR = 4000.0
+CROSS_HELD, BANK_HELD, BANK_MOST = 2.0, math.radians(0.5), BANK + math.radians(1.3)
+_BISECTIONS = 7
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """One limit, predicted and flown.  Slopes in rad, positive in the direction of their name; legs in m.
+
+    same_way: whether both turns of a leg go the same way round.
+
+    optimistic: by how much more was predicted than flown; negative where the prediction is on the safe side.
+    conservative: by which share of the flown limit the prediction stays inside it.
+    """
+
+    kind: str
+    wind: float
+    wind_from: float
+    predicted: float
+    flown: float
+    same_way: bool = True
+
+    @property
+    def optimistic(self) -> float:
+        less = self.flown - self.predicted
+        return less if self.kind == "leg" else -less
+
+    @property
+    def conservative(self) -> float:
+        return -self.optimistic / self.flown
+
+
+def made_setup(points: ArrayLike, aircraft: Aircraft, wind: float, wind_from: float) -> FlightSetup:
+    """A flight through these points at cruise over flat ground, in a steady wind (m/s, rad that it blows from)."""
+    way = np.array(points, dtype=np.float64)
+    low, high = way.min(axis=0) - 3000.0, way.max(axis=0) + 3000.0
+    ends = [dict(zip(("east_m", "north_m", "amsl_m"), map(float, p), strict=True)) for p in (way[0], way[-1])]
+    spec: dict[str, Any] = {
+        "name": "limits",
+        "terrain": {"kind": "flat", "amsl_m": 0.0},
+        "area": {
+            "east_m": [float(low[0]), float(high[0])],
+            "north_m": [float(low[1]), float(high[1])],
+            "ceiling_amsl_m": 9000.0,
+        },
+        "start": ends[0],
+        "destination": ends[1],
+        "flight": {"aircraft": aircraft.name},
+        "wind": {"speed_mps": wind, "from_deg": math.degrees(wind_from)},
+    }
+    count = len(way)
+    speeds = np.full(count - 1, aircraft.airspeed)
+    route = Route(way, speeds, np.zeros(count), np.zeros(count, dtype=bool), np.arange(count), "")
+    battery = aircraft.battery_energy / 3600.0
+    scenario = from_spec(spec, "limits", external=True)
+    return FlightSetup(
+        scenario=scenario,
+        mission=Mission(None, (), source="limits"),
+        mission_text="",
+        route=route,
+        limits=make_limits(scenario, load_envelope(aircraft), aircraft.airspeed, BANK),
+        aircraft=aircraft.name,
+        battery=battery,
+        seed=1,
+    )
+
+
+def bisect(holds: Callable[[float], bool], good: float, bad: float) -> float:
+    """The value between one that holds and one that does not, where that changes.  NaN if it does not change."""
+    if not holds(good) or holds(bad):
+        return math.nan
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (good + bad)
+        good, bad = (middle, bad) if holds(middle) else (good, middle)
+    return 0.5 * (good + bad)
+
+
+def slope_limit(aircraft: Aircraft, direction: float, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
+    """The steepest climb (direction 1) or dive (-1) that is held over 1.2 km, after a level kilometre.
+
+    The prediction is the envelope's at the leg's end that limits it: the top of a climb (thinner air, less power), and
+    the top of a dive (thinner air, less drag).
+    """
+    along = np.array([math.sin(COURSE), math.cos(COURSE), 0.0])
+    low = np.array([0.0, 0.0, AMSL])
+
+    def leg(slope: float) -> Floats:
+        run = 1200.0 * aircraft.airspeed / 25.0
+        first, second = low, low + 0.8 * run * along
+        return np.array([first, second, second + run * (along + np.array([0.0, 0.0, direction * math.tan(slope)]))])
+
+    def holds(slope: float) -> bool:
+        flown = simulate(made_setup(leg(slope), aircraft, wind, wind_from), aircraft)
+        return flown.ended == "completed" and _held(flown.track, aircraft.airspeed, direction)
+
+    setup = made_setup(leg(0.05), aircraft, wind, wind_from)
+
+    def predict(amsl: float) -> float:
+        return setup.limits.slopes(COURSE, amsl)[0 if direction > 0.0 else 1]
+
+    flown = bisect(holds, 0.3 * predict(AMSL), 1.6 * predict(AMSL))
+    ends = leg(flown)[1:, 2] if math.isfinite(flown) else np.array([AMSL])
+    predicted = min(predict(float(amsl)) for amsl in ends)
+    return Limit("climb" if direction > 0.0 else "dive", wind, wind_from, predicted, flown)
+
+
+def _held(track: Track, airspeed: float, direction: float) -> bool:
+    rows = track.leg == 1
+    width = round(5.0 / float(np.median(np.diff(track.time))))
+    speed = track.airspeed[rows].astype(np.float64) - airspeed
+    if speed.size < width:
+        return False
+    mean = np.convolve(speed, np.full(width, 1.0 / width), "valid")
+    return bool((-direction * mean).max() <= SPEED_HELD and np.abs(track.height_error[rows]).max() <= HEIGHT_HELD)
+
+
+def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0, wind_from: float = 0.0) -> Limit:
+    """The shortest leg between two turns (rad each), the same way round or one each, at 30 degrees of bank."""
+    courses = np.array([COURSE, COURSE + turn, COURSE + (2.0 * turn if same_way else 0.0)])
+    ways = np.array([[math.sin(course), math.cos(course), 0.0] for course in courses])
+    straight = 60.0 * aircraft.airspeed
+
+    def points(leg: float) -> Floats:
+        runs = np.array([straight, leg, straight])[:, None]
+        return np.array([0.0, 0.0, AMSL]) + np.vstack([np.zeros(3), np.cumsum(runs * ways, axis=0)])
+
+    def fly(leg: float) -> Track | None:
+        with flown_with(replace(load_gains(aircraft), arc_slowing_max=0.0)):
+            flown = simulate(made_setup(points(leg), aircraft, wind, wind_from), aircraft)
+        return (
+            flown.track.rows(int(np.searchsorted(flown.track.time, 5.0)), len(flown.track))
+            if flown.ended == "completed"
+            else None
+        )
+
+    apart = fly(FAR)
+    if apart is None:
+        return Limit("leg", wind, wind_from, math.nan, math.nan, same_way)
+    bank = min(max(_held_bank(apart), BANK) + BANK_HELD, BANK_MOST)
+
+    def holds(leg: float) -> bool:
+        track = fly(leg)
+        return track is not None and _held_bank(track) <= bank and float(np.abs(track.cross_track).max()) <= CROSS_HELD
+
+    shape = route_demands(made_setup(points(FAR), aircraft, wind, wind_from))
+    predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
+    return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
+
+
+def _held_bank(track: Track) -> float:
+    """Largest mean bank over two seconds, either way, rad."""
+    width = round(2.0 / float(np.median(np.diff(track.time))))
+    bank = track.attitude[:, 0].astype(np.float64)
+    return float(np.abs(np.convolve(bank, np.full(width, 1.0 / width), "valid")).max())
+
+
+def calm_limits(*, whole: bool) -> list[Limit]:
+    """Slopes and shortest legs of the Aerosonde in calm air; fewer of them unless ``whole``."""
+    aircraft = load_aircraft("aerosonde")
+    found = [slope_limit(aircraft, 1.0), slope_limit(aircraft, -1.0)]
+    turns = [(turn, way) for turn in (60.0, 30.0, 45.0, 90.0, 120.0) for way in (False, True)]
+    found += [leg_limit(aircraft, math.radians(turn), way) for turn, way in (turns if whole else turns[:1])]
+    return found
+
+
+def wind_limits(*, whole: bool) -> list[Limit]:
+    """Slopes and shortest legs of the Aerosonde in a wind of 10 m/s: from ahead, behind and the side."""
+    aircraft = load_aircraft("aerosonde")
+    sides = [COURSE + part * math.pi for part in ((0.0, 0.5, 1.0, 1.5) if whole else (1.0,))]
+    found = []
+    for side in sides:
+        found += [slope_limit(aircraft, 1.0, 10.0, side), slope_limit(aircraft, -1.0, 10.0, side)]
+        turns = [(turn, way) for turn in (60.0, 90.0, 120.0) for way in (False, True)] if whole else [(60.0, False)]
+        found += [leg_limit(aircraft, math.radians(turn), way, 10.0, side) for turn, way in turns]
+    return found

@@ -1,0 +1,248 @@
+"""Peers on the same problem and evaluation function: NSGA-II (pymoo), CMA-ES (cmaes), Informed RRT* (ompl)."""
+
+import json
+import math
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from functools import partial
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.task import PROBLEMS, Task, all_known, best_known, is_safe, make_task, scalar, seed_vectors, smooth_axes
+from planner.search.plan_path import plan_path
+
+Floats = NDArray[np.float64]
+
+# Where a straight frame holds no path; of these no best length is known.
+TRAPS = ("trap-u", "trap-valley", "trap-wall", "trap-spiral")
+# A race ends this close to the best known length; seeds of each.
+WITHIN, RACES = 0.02, 5
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What one search by a peer came to.
+
+    path: (w, 3) world m as lists.
+    safe: whether it meets all four constraints, certified again, and no missile reaches it.
+    checks: paths evaluated, or motions checked.
+    callback_share: of the time, what was spent in our evaluation as called from the peer.
+    trace: (seconds, length ratio) each time its best got shorter; of OMPL and ours, certified paths.
+    """
+
+    path: list[list[float]]
+    length_ratio: float
+    safe: bool
+    problems: list[str]
+    seconds: float
+    checks: int
+    callback_share: float
+    trace: list[tuple[float, float]]
+
+
+def found(task: Task, path: Floats, seconds: float, checks: int, inside: float, trace: Any = ()) -> Found:
+    """Certify a peer's path and put its numbers together."""
+    certificate = task.certificate(path)
+    problems = list(certificate.problems)
+    if certificate.kill_distance <= 0.0:
+        problems.append(f"{-certificate.kill_distance:.1f} m inside a missile's sphere")
+    share = inside / seconds if seconds > 0.0 else 0.0
+    return Found(
+        path.tolist(), task.length_ratio(path), is_safe(certificate), problems, seconds, checks, share, list(trace)
+    )
+
+
+def best_path(task: Task, vectors: Floats) -> Floats:
+    """The first certified safe path of vectors (n, d), in the order of their scalar cost; or the first of all."""
+    order = np.argsort(scalar(*task.scores(vectors)), kind="stable")
+    paths = task.encoding.decode(vectors[order])
+    return next((path for path in paths if is_safe(task.certificate(path))), paths[0])
+
+
+def solve_with_cmaes(task: Task, seed: int, evaluations: int, *, seeded: bool = True, sigma: float = 0.05) -> Found:
+    """CMA-ES in the smooth basis, from our best coarse seed or from the straight line; it restarts."""
+    from cmaes import CMA
+
+    started, inside = time.process_time(), 0.0
+    basis, spread = smooth_axes(task)
+    low, high = task.encoding.lower, task.encoding.upper
+    if seeded:
+        home = seed_vectors(task)[0]
+    else:
+        home, sigma = 0.5 * (low + high), 1.0
+        share = np.linspace(0.0, 1.0, task.encoding.waypoints)[1:-1]
+        home[1::3] = 0.0
+        home[2::3] = task.scenario.start[2] + share * (task.scenario.destination[2] - task.scenario.start[2])
+    best, best_cost, kept, trace, done, restarts = home, np.inf, [home], [], 0, 0
+    size = int(4 + 3 * np.log(home.size)) * 2
+    search = CMA(mean=np.zeros(home.size), sigma=sigma, seed=seed, population_size=size)
+    while done < evaluations:
+        asked = np.array([search.ask() for _ in range(size)])
+        vectors = home + np.einsum("nk,dk->nd", asked * spread, basis)
+        clipped = np.clip(vectors, low, high)
+        before = time.process_time()
+        costs = scalar(*task.scores(clipped))
+        inside += time.process_time() - before
+        done += size
+        outside = np.abs((vectors - clipped) / (high - low)).sum(axis=1)
+        with warnings.catch_warnings():
+            # A population of equal costs scales by nothing inside the library.
+            warnings.simplefilter("ignore", RuntimeWarning)
+            search.tell(list(zip(asked, costs + outside, strict=True)))
+        row = int(np.argmin(costs))
+        if costs[row] < best_cost:
+            best, best_cost = clipped[row], costs[row]
+            kept = [*kept[-30:], best]
+            if best_cost < 10.0:
+                trace.append((time.process_time() - started, float(best_cost)))
+        if search.should_stop() or search._sigma < 1e-5:
+            restarts += 1
+            home = best
+            search = CMA(mean=np.zeros(home.size), sigma=0.02, seed=seed + 1000 * restarts, population_size=size)
+    path = best_path(task, np.array(kept))
+    return found(task, path, time.process_time() - started, done, inside, trace)
+
+
+def solve_with_nsga2(task: Task, seed: int, evaluations: int) -> Found:
+    """NSGA-II as pymoo ships it: length and kill exposure, four constraints, the paper's population."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.core.problem import Problem as PymooProblem
+    from pymoo.optimize import minimize
+
+    started = time.process_time()
+    spent = [0.0, 0]
+
+    class Paths(PymooProblem):
+        def _evaluate(self, x: Floats, out: dict[str, Floats], *_args: object, **_more: object) -> None:
+            before = time.process_time()
+            violations, objectives = task.scores(x)
+            spent[0] += time.process_time() - before
+            spent[1] += len(x)
+            out["F"], out["G"] = objectives[:, :2], violations
+
+    problem = Paths(
+        n_var=task.encoding.lower.size, n_obj=2, n_ieq_constr=4, xl=task.encoding.lower, xu=task.encoding.upper
+    )
+    size = task.scenario.planner.population
+    algorithm = NSGA2(pop_size=size, n_offsprings=size // 2)
+    result = minimize(problem, algorithm, ("n_eval", evaluations), seed=seed, verbose=False)
+    vectors = np.atleast_2d(result.X) if result.X is not None else result.pop.get("X")
+    return found(task, best_path(task, vectors), time.process_time() - started, int(spent[1]), spent[0])
+
+
+def solve_with_ompl(task: Task, seed: int, seconds: float, ratio: float = 0.0) -> Found:
+    """Informed RRT* for so many seconds or to this length ratio, in a process of its own: its bindings talk at exit."""
+    command = [sys.executable, "-m", "benchmarks.ompl_peer", task.scenario.name]
+    command += [str(number) for number in (seed, seconds, ratio)]
+    result = subprocess.run(command, check=True, capture_output=True, text=True)
+    return Found(**json.loads(result.stdout.splitlines()[-1]))
+
+
+def measure(seconds: float) -> dict[str, Any]:
+    """Every peer once on each problem, seed 1, the paper's budget; OMPL so many seconds of CPU.  Prints a table."""
+    print("\nPeers on the hard set and traps, seed 1: one problem, evaluation and certificate; one core, CPU s, warm")
+    print(f"  {'problem':<13}{'method':<28}{'safe':>5}{'PLR':>9}{'/ best':>8}{'CPU s':>8}{'checks':>9}{'in ours':>9}")
+    record: dict[str, Any] = {}
+    for problem in (*(f"hard-{number:02d}" for number in PROBLEMS), *TRAPS):
+        task = make_task(problem)
+        known = best_known(task.scenario.name)
+        task.scores(task.encoding.lower[None])
+        rows: dict[str, Callable[[], Found]] = {
+            "planfly, default": partial(solve_with_planfly, task, 1),
+            "cmaes, our seeds and basis": partial(solve_with_cmaes, task, 1, task.evaluations),
+            "cmaes, our basis, no seeds": partial(solve_with_cmaes, task, 1, task.evaluations, seeded=False),
+            "pymoo NSGA-II": partial(solve_with_nsga2, task, 1, task.evaluations),
+            "ompl InformedRRTstar": partial(solve_with_ompl, task, 1, seconds),
+        }
+        if problem in TRAPS:
+            # A straight frame's grids hold no route out of a trap, so that there are no seeds to begin from.
+            del rows["cmaes, our seeds and basis"]
+        for name, work in rows.items():
+            package = name.split()[0].rstrip(",")
+            if package != "planfly" and find_spec(package) is None:
+                print(f"  {task.scenario.name:<13}{name:<28}  not measured: package {package} is missing (make bench)")
+                record[f"{task.scenario.name} {name}"] = "missing package"
+                continue
+            if package != "ompl":
+                work()
+            item = work()
+            _print_row(task.scenario.name, name, item, known)
+            entry = {key: value for key, value in asdict(item).items() if key != "path"}
+            record[f"{task.scenario.name} {name}"] = entry
+    if find_spec("ompl") is not None:
+        record["to_2_percent"] = race(seconds)
+    return record
+
+
+def race(seconds: float) -> dict[str, Any]:
+    """CPU time to a certified path within 2 % of best known, OMPL's Informed RRT* and ours.  Prints a table.
+
+    Ours counts from the call of the planner, scenario and envelope loaded: problem, grids, certificates.  OMPL's counts
+    from its first step, without certificates.  One that does not come there within `seconds` counts as that long.
+    """
+    print(f"\nTo a certified path within {100 * WITHIN:.0f} % of best known, CPU ms; median of seeds 1..{RACES}")
+    print(f"  {'problem':<9}{'ours':>9}{'OMPL':>11}{'ratio':>10}{'in evaluation':>10}{'ratio without it':>19}")
+    record: dict[str, Any] = {}
+    for name in all_known():
+        task, goal = make_task(name), (1.0 + WITHIN) * best_known(name)
+        solve_with_planfly(task, 1)
+        ours = [_time_to(solve_with_planfly(task, seed), goal, math.inf) for seed in range(1, RACES + 1)]
+        searches = [solve_with_ompl(task, seed, seconds, goal) for seed in range(1, RACES + 1)]
+        theirs = [_time_to(item, goal, seconds) for item in searches]
+        mine, other = float(np.median(ours)), float(np.median(theirs))
+        more = ">=" if sum(spent >= seconds for spent in theirs) > RACES // 2 else ""
+        share = float(np.median([item.callback_share for item in searches]))
+        without = other * (1.0 - share) / mine
+        print(
+            f"  {name:<9}{1e3 * mine:>9.1f}{more + f'{1e3 * other:.0f}':>11}{more + f'{other / mine:.1f}':>10}"
+            f"{100 * share:>9.0f}%{more + f'{without:.1f}':>19}"
+        )
+        record[name] = {
+            "ours_s": ours, "ompl_s": theirs, "cap_s": seconds, "ratio": other / mine, "share_in_evaluation": share,
+            "ratio_without_evaluation": without,
+        }  # fmt: skip
+    for key, text in (("ratio", "ratio"), ("ratio_without_evaluation", "ratio without the time in our evaluation")):
+        record[f"median_{key}"] = float(np.median([row[key] for row in record.values() if isinstance(row, dict)]))
+        print(f"  median of the problems, {text}: {record[f'median_{key}']:.1f}")
+    return record
+
+
+def _time_to(item: Found, ratio: float, never: float) -> float:
+    """First time in the trace at which the length ratio is at most this, s."""
+    return next((seconds for seconds, length in item.trace if length <= ratio), never)
+
+
+def _print_row(problem: str, name: str, item: Found, known: float) -> None:
+    print(
+        f"  {problem:<13}{name:<28}{'yes' if item.safe else 'no':>5}{item.length_ratio:>9.4f}"
+        f"{item.length_ratio / known:>8.4f}{item.seconds:>8.2f}{item.checks:>9}{100 * item.callback_share:>8.0f}%"
+    )
+    if not item.safe:
+        print(f"  {'':<13}{'':<28}  not certified: {'; '.join(item.problems)[:100]}")
+
+
+def solve_with_planfly(task: Task, seed: int) -> Found:
+    """The default planner; its trace is of certified paths, and their certificates count."""
+    trace: list[tuple[float, float]] = []
+
+    def see(path: Floats) -> None:
+        length = task.length_ratio(path)
+        if (not trace or length < trace[-1][1]) and is_safe(task.certificate(path)):
+            trace.append((time.process_time() - started, length))
+
+    started = time.process_time()
+    plan = plan_path(task.scenario, task.problem.limits, seed=seed, improved=see)
+    spent = time.process_time() - started
+    return found(task, plan.waypoints, spent, plan.evaluations, 0.0, trace)
+
+
+def as_json(item: Found) -> str:
+    """What was found as one line of JSON."""
+    return json.dumps(asdict(item))

@@ -1,0 +1,74 @@
+"""Default plans on three terrains, flown by ArduPlane's law or by the program itself: what harm comes of it.
+
+``python -m benchmarks.planned_for_ardupilot [--plans N] [--from NUMBER] [--autopilot PATH]`` plans random scenarios
+(`tests.autopilot_plans`: winds of 0 to 10 m/s, none to moderate turbulence, satellites' errors), flies each, and prints
+the margins that the certificate promised and that the flight kept, and in the end how many came to harm.
+"""
+
+import argparse
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from flight.mission.from_plan import plan_mission
+from planfly.airframe import load_airframe
+from planfly.pipeline import fly_and_judge, make_plan, make_setup
+from tests.autopilot_plans import CLEARANCE, Harm, harm_of, plan_scenario
+
+
+@dataclass(frozen=True, slots=True)
+class Flown:
+    """One plan and its flight: what is wrong with it, "" for nothing; and how much longer the reserve made it."""
+
+    wrong: str
+    harm: Harm | None
+    longer: float
+
+
+def fly(number: int, autopilot: Path | None) -> Flown:
+    """Plan and fly the scenario of this number, and print a line about it."""
+    scenario = plan_scenario(number)
+    airframe = load_airframe(scenario)
+    plan = make_plan(scenario, airframe, number + 1)
+    if not plan.safe:
+        print(f"{scenario.name:10s} no plan: {'; '.join(plan.certificate.problems[:2])}", flush=True)
+        return Flown("no plan", None, math.nan)
+    exact = replace(airframe, limits=replace(airframe.limits, tracking=None))
+    longer = float(plan.objectives[0] / make_plan(scenario, exact, number + 1).objectives[0])
+    mission = plan_mission(plan, airframe.airspeed, airframe.max_bank, tracking=airframe.limits.tracking)
+    setup = make_setup(scenario, airframe, mission, number + 1, plan=plan)
+    judged = fly_and_judge(setup, airframe, None, autopilot=autopilot)
+    harm = harm_of(scenario, plan.waypoints, judged.track)
+    parts = [harm.text(scenario), "" if judged.ended == "completed" else judged.ended]
+    parts += [f"{found.rule}: {found.reason}" for found in judged.verdict.findings if found.ok is False]
+    wrong = "; ".join(part for part in parts if part)
+    promised, wind = plan.certificate, scenario.wind
+    print(
+        f"{scenario.name:10s} wind {wind.speed:4.1f} {wind.turbulence:8s} length x {longer:.4f}"
+        f" clearance {promised.clearance:6.1f} {harm.clearance - CLEARANCE:6.1f}"
+        f" spheres {promised.kill_distance:7.1f} {harm.sphere:7.1f} off the legs {harm.aside:5.1f}  {wrong}",
+        flush=True,
+    )
+    return Flown(wrong, harm, longer)
+
+
+def main() -> None:
+    """Fly, print, and sum up."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.planned_for_ardupilot")
+    parser.add_argument("--plans", type=int, default=100)
+    parser.add_argument("--from", dest="first", type=int, default=0, help="number of the first scenario")
+    parser.add_argument("--autopilot", type=Path, help="the program of a real ArduPlane (default: its law)")
+    args = parser.parse_args()
+    flown = [fly(number, args.autopilot) for number in range(args.first, args.first + args.plans)]
+    made = [one for one in flown if one.harm is not None]
+    longer = sorted(one.longer for one in made)
+    print(
+        f"{len(made)} of {len(flown)} planned, {sum(one.wrong != '' for one in made)} came to harm;"
+        f" least clearance margin {min(one.harm.clearance for one in made if one.harm) - CLEARANCE:.1f} m,"
+        f" least distance to a sphere {min(one.harm.sphere for one in made if one.harm):.1f} m;"
+        f" plans longer by the reserve: median {longer[len(longer) // 2]:.4f}, most {longer[-1]:.4f}"
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,129 @@
+"""One planning problem as every optimiser in the benchmarks sees it: a box, one evaluation, one certificate."""
+
+import json
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planfly.airframe import Airframe, load_airframe
+from planner.evaluation.certify import certify
+from planner.evaluation.encoding import ENCODINGS, Encoding, rotated_frame, rotated_vectors
+from planner.evaluation.graded_scores import graded_scores
+from planner.evaluation.problem import Problem, make_problem
+from planner.plan import Certificate
+from planner.seeding.first_samples import bridge_basis, bridge_modes
+from planner.seeding.grids import grid_routes
+from planner.seeding.waypoint_fitting import fit_waypoints
+from world.scenario import Scenario, from_spec, load_scenario
+
+Floats = NDArray[np.float64]
+
+PROBLEMS = (7, 15, 30, 60)
+# Grids that seed a peer: stages of each, and routes from each.
+GRIDS, ROUTES = (36, 66, 130), 2
+BEST_KNOWN = Path(__file__).parents[0] / "authorities" / "best_known.json"
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """A scenario in the form of compiled code, in the rotated encoding."""
+
+    scenario: Scenario
+    airframe: Airframe
+    problem: Problem
+    encoding: Encoding
+
+    @property
+    def evaluations(self) -> int:
+        """The paper's evaluation budget: the first population, then half of it in each generation."""
+        table = self.scenario.planner
+        return table.population + table.generations * (table.population // 2)
+
+    def scores(self, vectors: Floats) -> tuple[Floats, Floats]:
+        """Graded violations (n, 4) and objectives (n, 4): what the default planner's search ranks."""
+        return graded_scores(self.problem.search, np.ascontiguousarray(self.encoding.decode(vectors)))
+
+    def certificate(self, path: Floats) -> Certificate:
+        """The continuous check of a path (w, 3), all four constraints."""
+        return certify(self.problem, np.ascontiguousarray(path))
+
+    def length_ratio(self, path: Floats) -> float:
+        """Length of a path (w, 3) over the straight distance, in three dimensions (eq. 8)."""
+        legs = np.sqrt((np.diff(path, axis=0) ** 2).sum(axis=1)).sum()
+        return float(legs / np.sqrt(((self.scenario.destination - self.scenario.start) ** 2).sum()))
+
+
+def is_safe(certificate: Certificate) -> bool:
+    """Whether all four constraints hold everywhere and no missile reaches the path."""
+    return certificate.ok and certificate.kill_distance > 0.0
+
+
+def exact_airframe(scenario: Scenario) -> Airframe:
+    """A scenario's airframe for plans that leave no room for an autopilot: the best known paths have none either."""
+    airframe = load_airframe(scenario)
+    return replace(airframe, limits=replace(airframe.limits, tracking=None))
+
+
+@cache
+def make_task(name: str) -> Task:
+    """The task of an embedded scenario."""
+    scenario = load_scenario(name)
+    airframe = exact_airframe(scenario)
+    problem = make_problem(scenario, airframe.limits)
+    return Task(scenario, airframe, problem, ENCODINGS["rotated"](problem.space, scenario.planner.waypoints))
+
+
+def best_known(name: str) -> float:
+    """Length ratio of the best certified path that is known, NaN where none is (tests/authorities/best_known.json)."""
+    known = json.loads(BEST_KNOWN.read_text(encoding="utf-8"))
+    return float(known[name]["length_ratio"]) if name in known else float("nan")
+
+
+def all_known() -> list[str]:
+    """The problems of which a best path is known."""
+    return list(json.loads(BEST_KNOWN.read_text(encoding="utf-8")))
+
+
+def with_planner(scenario: Scenario, **changes: object) -> Scenario:
+    """The same scenario with other keys in ``[planner]``."""
+    spec = scenario.spec
+    return from_spec(spec.model_copy(update={"planner": spec.planner.model_copy(update=changes)}), scenario.name)
+
+
+def seed_vectors(task: Task) -> Floats:
+    """Our coarse seeds as vectors (n, d), best first: no violation, then least kill exposure, then the shortest."""
+    low, high = task.encoding.lower, task.encoding.upper
+    span = (float(low[1::3].min()), float(high[1::3].max()))
+    data = task.problem.search
+    frame = rotated_frame(data.start, data.destination)
+    routes = grid_routes(data, frame, span, tuple((stages, ROUTES) for stages in GRIDS))
+    paths = [fit_waypoints(data, frame, route.points, task.encoding.waypoints) for route in routes]
+    vectors = rotated_vectors(task.problem.space, task.encoding, np.array(paths))
+    return np.asarray(vectors[np.argsort(scalar(*task.scores(vectors)), kind="stable")])
+
+
+def scalar(violations: Floats, objectives: Floats) -> Floats:
+    """One number (n,) for optimisers that know no constraints, in the default planner's order.
+
+    Below 100: no violation; below 10: no kill exposure either, and the number is the length ratio.
+    """
+    violated = (violations * np.array([1.0, 1.0, 1.0, 0.01])).sum(axis=1)
+    kill, length = objectives[:, 1], objectives[:, 0]
+    safe = np.where(kill > 0.0, 10.0 + 80.0 * kill / (1.0 + kill), np.minimum(length, 9.9))
+    return np.where((violations > 0.0).any(axis=1), 100.0 + violated, safe)
+
+
+def smooth_axes(task: Task) -> tuple[Floats, Floats]:
+    """Directions (d, d) of the smooth basis and how far paths spread along each (d,), m."""
+    inner = task.encoding.waypoints - 2
+    _, deviations = bridge_modes(inner)
+    low, high = task.encoding.lower.reshape(inner, 3), task.encoding.upper.reshape(inner, 3)
+    spread = np.empty((inner, 3))
+    spread[:, 0] = 0.3 * (high[:, 0] - low[:, 0])
+    grow = np.sqrt((inner + 1) / 2.0)
+    spread[:, 1] = deviations * grow * 0.25 * np.median(high[:, 1] - low[:, 1])
+    spread[:, 2] = deviations * grow * 0.25 * np.median(high[:, 2] - low[:, 2])
+    return bridge_basis(inner), spread.ravel()

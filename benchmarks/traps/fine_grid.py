@@ -1,0 +1,150 @@
+"""Shortest ways on the map by a fine grid of places, many courses and taut strings: what plans out of traps face.
+
+A place is open if some height between floor and ceiling clears the ground there.  Turns, slopes and what an autopilot
+strays are left out, so that the length is one that no flight reaches; a climb adds what it takes by plain sums.
+``python -m benchmarks.traps.fine_grid`` prints the table of the embedded ``trap-*`` scenarios.
+"""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from planfly.airframe import load_airframe
+from planner.search.plan_path import plan_path
+from world.scenario import Scenario, embedded_names, load_scenario
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# Between places, m; the furthest that a step goes, in places; and between samples of the ground on a string, m.
+PITCH, REACH, SAMPLE = 50.0, 5, 10.0
+
+
+def is_open(scenario: Scenario, places: Floats) -> Flags:
+    """Whether some height clears the ground at places (n, 2), outside of every missile's sphere at the ceiling."""
+    terrain = scenario.terrain
+    assert terrain is not None
+    lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
+    found = (lowest <= scenario.ceiling) & (places >= scenario.bounds[:, 0]).all(axis=1)
+    return np.asarray(found & (places <= scenario.bounds[:, 1]).all(axis=1))
+
+
+def string_is_open(scenario: Scenario, a: Floats, b: Floats) -> bool:
+    """Whether all of the line a-b on the map is open."""
+    count = max(2, math.ceil(math.dist(a, b) / SAMPLE) + 1)
+    return bool(is_open(scenario, np.linspace(a, b, count)).all())
+
+
+def shortest_on_map(scenario: Scenario) -> Floats:
+    """Points (k, 2) of a way from start to destination on the map that is about the shortest; (0, 2) for none."""
+    (west, east), (south, north) = scenario.bounds
+    start, destination = scenario.start[:2], scenario.destination[:2]
+    x = np.arange(start[0] - PITCH * math.floor((start[0] - west) / PITCH), east, PITCH)
+    y = np.arange(start[1] - PITCH * math.floor((start[1] - south) / PITCH), north, PITCH)
+    grid = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1)
+    free = is_open(scenario, grid.reshape(-1, 2)).reshape(grid.shape[:2])
+    number = np.arange(free.size).reshape(free.shape)
+    begins, ends, lengths = [], [], []
+    for i in range(-REACH, REACH + 1):
+        for j in range(-REACH, REACH + 1):
+            if math.gcd(i, j) != 1:
+                continue
+            passes = np.ones_like(free)
+            for share in np.linspace(0.0, 1.0, 2 * max(abs(i), abs(j)) + 1):
+                passes &= _shifted(free, round(share * i), round(share * j))
+            begins.append(number[passes])
+            ends.append(_shifted_numbers(number, i, j)[passes])
+            lengths.append(np.full(len(begins[-1]), PITCH * math.hypot(i, j)))
+    table = np.concatenate(lengths), (np.concatenate(begins), np.concatenate(ends))
+    first, last = (int(np.argmin(((grid - end) ** 2).sum(axis=2))) for end in (start, destination))
+    _, before = dijkstra(csr_array(table, shape=(free.size, free.size)), indices=first, return_predecessors=True)
+    if before[last] < 0:
+        return np.empty((0, 2))
+    way = [last]
+    while way[-1] != first:
+        way.append(int(before[way[-1]]))
+    points = grid.reshape(-1, 2)[way[::-1]]
+    points[0], points[-1] = start, destination
+    return _taut(scenario, points)
+
+
+def _shifted(free: Flags, i: int, j: int) -> Flags:
+    """Whether the place i, j further is open; not beyond the map."""
+    out = np.zeros_like(free)
+    rows, columns = free.shape
+    a, b = slice(max(0, -i), min(rows, rows - i)), slice(max(0, -j), min(columns, columns - j))
+    c, d = slice(max(0, i), min(rows, rows + i)), slice(max(0, j), min(columns, columns + j))
+    out[a, b] = free[c, d]
+    return out
+
+
+def _shifted_numbers(number: NDArray[np.int64], i: int, j: int) -> NDArray[np.int64]:
+    return number + i * number.shape[1] + j
+
+
+def _taut(scenario: Scenario, points: Floats) -> Floats:
+    """A way without the points that it need not touch; each step is cut into pieces first, so that corners can move."""
+    for _ in range(3):
+        dense = np.concatenate([np.linspace(a, b, 9)[:-1] for a, b in pairwise(points)] + [points[-1:]])
+        kept, here = [dense[0]], 0
+        while here < len(dense) - 1:
+            to = next(k for k in range(len(dense) - 1, here, -1) if k == here + 1 or _sees(scenario, dense, here, k))
+            kept.append(dense[to])
+            here = to
+        points = np.array(kept)
+    return points
+
+
+def _sees(scenario: Scenario, points: Floats, a: int, b: int) -> bool:
+    return string_is_open(scenario, points[a], points[b])
+
+
+def map_length(points: Floats) -> float:
+    """Length of a way (k, 2) or of a path (k, 3) on the map, m."""
+    steps = np.diff(points[:, :2], axis=0)
+    return float(np.hypot(steps[:, 0], steps[:, 1]).sum())
+
+
+def climbing_length(scenario: Scenario, way: Floats, climb: float) -> float:
+    """Length on the map that a way (k, 2) has at least, if no m of it climbs more than `climb` (a tangent).
+
+    The ground at each place is to be cleared when it is reached; what is missing is gone round for before.
+    """
+    terrain = scenario.terrain
+    assert terrain is not None
+    count = max(2, math.ceil(map_length(way) / SAMPLE))
+    runs = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
+    at = np.linspace(0.0, runs[-1], count)
+    places = np.column_stack([np.interp(at, runs, way[:, axis]) for axis in range(2)])
+    lowest = terrain.height(places[:, 0], places[:, 1]) + scenario.limits.min_clearance_m
+    need = (lowest - scenario.start[2]) / climb
+    return map_length(way) + max(0.0, float((need - at).max()))
+
+
+def measure(seed: int = 1) -> dict[str, float]:
+    """Lengths of default plans of the ``trap-*`` scenarios over those that the grid finds; prints them."""
+    ratios = {}
+    for name in embedded_names():
+        if not name.startswith("trap-"):
+            continue
+        scenario = load_scenario(name)
+        limits = load_airframe(scenario).limits
+        plan = plan_path(scenario, limits, seed=seed)
+        way = shortest_on_map(scenario)
+        level = 0.5 * (scenario.start[2] + scenario.ceiling)
+        climb = max(limits.slopes(course, level)[0] for course in np.linspace(0.0, 2.0 * math.pi, 16))
+        reference = climbing_length(scenario, way, math.tan(climb))
+        ratios[name] = map_length(plan.waypoints) / reference
+        print(
+            f"  {name:<13}{'safe' if plan.safe else 'NOT SAFE':<9}{map_length(plan.waypoints):8.0f} m"
+            f"{reference:8.0f} m  {ratios[name]:.3f}"
+        )
+    return ratios
+
+
+if __name__ == "__main__":
+    measure()

@@ -1,0 +1,304 @@
+"""Choose an aircraft's gains by coordinate search on one set of missions, and report on others.
+
+``python -m benchmarks.tuning.tune_gains [AIRCRAFT] [--rounds N] [--seed N] [--write]`` takes what can be read off
+the linear model from there, searches the rest from round figures (`START`), prints what each round brings and, at the
+end, how the chosen gains fly the standard mission and random missions that the search has not seen.  ``--write`` puts
+the result into ``aircraft/<name>/gains.toml``; limits that are not searched stay as they stand there.  The missions
+come from the seed (`benchmarks.tuning.tuning_missions`); the standard mission is none of them.  Two minutes a round
+on two cores.
+"""
+
+import argparse
+import math
+import multiprocessing
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+
+from aircraft.catalog import Aircraft, load_aircraft
+from benchmarks.flight import Errors, errors_of, flown_with, straight_rms
+from benchmarks.tuning.tuning_missions import Case, cases
+from flight.dynamics.fdm import JSBSIM_VERSION, Fdm
+from flight.dynamics.trim import linearise, straight
+from flight.guidance.gains import Gains, load_gains
+from flight.simulation import simulate as simulation
+from flight.simulation.simulate import SimulatedFlight, simulate
+from tests.setups import MakeSetup, setup_maker, standard
+
+# Where every search starts, at an airspeed of 25 m/s: round figures, of the size that earlier searches of the Aerosonde
+# found.  `start` slows them down for an aircraft that is faster: its turns take longer by as much.
+START = {
+    "cross_track_frequency": 1.0,
+    "cross_track_damping": 0.8,
+    "cross_track_integral": 0.05,
+    "turn_lead": 0.2,
+    "turn_smoothing": 0.2,
+    "aside_frequency": 1.0,
+    "side_gain": 0.5,
+    "side_lag": 0.1,
+    "push_lead": 0.05,
+    "push_smoothing": 0.1,
+    "roll_frequency": 6.0,
+    "roll_gain": 1.0,
+    "roll_rate_gain": 0.1,
+    "roll_disturbance_lag": 0.1,
+    "aileron_lead": 0.03,
+    "yaw_rate_gain": 0.2,
+    "sideslip_gain": 0.5,
+    "height_frequency": 1.0,
+    "height_damping": 1.0,
+    "height_integral": 0.1,
+    "slope_lead": 0.2,
+    "load_lead": 0.1,
+    "pitch_rate_gain": 0.2,
+    "speed_gain": 0.1,
+    "speed_integral": 0.01,
+    "throttle_per_slope": 2.0,
+}
+SEARCHED = tuple(START)
+# Missions that are searched on and reported on, numbered apart under the one seed.
+TRAINED, REPORTED = {"aerosonde": range(16), "c172x": range(8)}, range(1000, 1024)
+# The first factor that a gain is changed by, and the least share of the cost that a change must save.
+FIRST_STEP, WORTH_TAKING = 1.5, 0.001
+# What a figure counts as one: the aims of `benchmarks.flight` in wind, of the cross-track's RMS in calm air; and, of
+# the aircraft that the aims are for, of its largest too.
+SCALES = {"aerosonde": (0.05, 0.4, 0.2, 0.8), "c172x": (0.05, 0.6, 0.2, 0.8)}
+# What the cross-track's RMS on straight legs counts as one, m, and how far from corners, m, at 25 m/s.
+STRAIGHT, CLEAR = 0.02, 250.0
+# What the airspeed's error over second halves of legs counts as one, m/s; the verdict lets a leg be that far off.
+SPEED = 1.0
+# Weights of the surfaces' mean rate as a share of what they can, and of each degree of bank beyond the command's limit.
+EFFORT, BEYOND = 0.5, 0.2
+FAILED = 1000.0
+# Bank that guidance may add in what is searched and reported here, rad; flights have
+# `flight.simulation.simulate.BANK_RESERVE`.
+RESERVE = math.radians(2.7)
+DIGITS = 3
+# No lag or smoothing is shorter than a tick at 60 Hz, s.
+TICK = 0.017
+
+
+def model_gains(aircraft: Aircraft) -> dict[str, float]:
+    """The gains that are the airframe's own, off its linearisation in level cruise at 500 m."""
+    fdm = Fdm(aircraft)
+    level = straight(fdm, aircraft.airspeed, 500.0)
+    if level is None:
+        raise SystemExit(f"{aircraft.name} holds no level flight at cruise")
+    a, b = linearise(fdm, level)
+    speed = aircraft.airspeed
+    _, v, w, p, q, r = range(6)
+    elevator, aileron, rudder = range(3)
+    # Steady yaw rate without sideslip: ailerons and rudder balance its rolling and yawing moments.
+    hold = np.linalg.solve(b[np.ix_([p, r], [aileron, rudder])], -a[[p, r], r])
+    return {
+        "reference_airspeed": speed,
+        "alpha_per_g": -9.80665 / (a[w, w] * speed),
+        "elevator_per_alpha": -a[q, w] * speed / b[q, elevator],
+        "elevator_per_pitch_rate": -a[q, q] / b[q, elevator],
+        "aileron_per_roll_rate": -a[p, p] / b[p, aileron],
+        "aileron_per_roll_acceleration": 1.0 / b[p, aileron],
+        "rudder_per_yaw_rate": -float(hold[1]),
+        "side_per_sideslip": -a[v, v] * speed,
+        "side_per_aileron": b[v, aileron],
+    }
+
+
+def fly(aircraft: Aircraft, gains: Gains, case: Case) -> SimulatedFlight:
+    """Fly a case with these gains, and a little less bank than flights have, not to lean on the last of it."""
+    module: Any = simulation
+    usual = module.BANK_RESERVE
+    module.BANK_RESERVE = RESERVE
+    try:
+        with flown_with(gains):
+            return simulate(case.setup, aircraft, variation=case.variation)
+    finally:
+        module.BANK_RESERVE = usual
+
+
+def cost(aircraft: Aircraft, gains: Gains, case: Case) -> float:
+    """What a flight costs; `FAILED` where it fails.
+
+    Its errors in units of their aims, those on straight legs once more, its airspeed's, its surfaces' rates, and its
+    bank beyond the command's limit.
+    """
+    flown = fly(aircraft, gains, case)
+    if flown.ended != "completed":
+        return FAILED
+    errors = errors_of(flown)
+    values = (errors.cross_rms, errors.cross_max, errors.height_rms, errors.height_max)
+    found = sum(value / scale for value, scale in zip(values, SCALES[aircraft.name], strict=True))
+    if case.straight:
+        found += straight_rms(case.setup, flown, CLEAR * (aircraft.airspeed / 25.0) ** 2) / STRAIGHT
+    found += speed_error(case, flown) / SPEED
+    track = flown.track
+    rates = np.diff(track.commands[:, :3].astype(np.float64), axis=0) / float(track.time[1] - track.time[0])
+    found += EFFORT * math.sqrt(float((rates**2).mean())) / aircraft.surface_rate
+    return found + BEYOND * max(0.0, errors.peak_bank - math.degrees(aircraft.max_bank) - 3.0)
+
+
+def speed_error(case: Case, flown: SimulatedFlight) -> float:
+    """RMS over the legs of how far the mean airspeed of a leg's second half is from the command, m/s."""
+    track, errors = flown.track, []
+    for leg, command in enumerate(case.setup.route.airspeed):
+        airspeed = track.airspeed[track.leg == leg].astype(np.float64)
+        errors.append(float(airspeed[airspeed.size // 2 :].mean()) - command if airspeed.size else 0.0)
+    return math.sqrt(float(np.mean(np.square(errors))))
+
+
+class Trial:
+    """What gains cost on the missions that are searched on, flown by all processors."""
+
+    def __init__(self, aircraft: Aircraft, trained: Sequence[Case]) -> None:
+        """Start the processes.  Each has the missions from the start; a task names one."""
+        self._count = len(trained)
+        self._pool = multiprocessing.Pool(initializer=_begin, initargs=(aircraft, trained))
+
+    def __enter__(self) -> "Trial":
+        """Itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End the processes."""
+        self._pool.terminate()
+
+    def __call__(self, gains: Gains) -> float:
+        """Root of the mean square of what the flights cost: bad ones count more, but no single one decides."""
+        costs = self._pool.map(_cost, [(gains, k) for k in range(self._count)], chunksize=1)
+        return math.sqrt(float(np.mean(np.square(costs))))
+
+
+_missions: list[tuple[Aircraft, Case]] = []
+
+
+def _begin(aircraft: Aircraft, trained: Sequence[Case]) -> None:
+    _missions[:] = [(aircraft, case) for case in trained]
+
+
+def _cost(task: tuple[Gains, int]) -> float:
+    gains, number = task
+    aircraft, case = _missions[number]
+    return cost(aircraft, gains, case)
+
+
+def start(aircraft: Aircraft) -> dict[str, float]:
+    """`START` for this aircraft's airspeed.
+
+    Gains on surfaces are per airspeed's own effect on them, and stay.
+    """
+    ratio = aircraft.airspeed / 25.0
+    powers = {"frequency": -1, "lead": 1, "smoothing": 1, "lag": 1, "cross_track_integral": -3, "height_integral": -3}
+    found = {}
+    for name, value in START.items():
+        power = next((power for end, power in powers.items() if name.endswith(end)), 0)
+        found[name] = value * ratio**power
+    return found
+
+
+def rounded(gains: Gains) -> Gains:
+    """The gains as the file will hold them, lags and smoothing no shorter than a tick."""
+    least = {name: TICK for name in SEARCHED if name.endswith(("lag", "smoothing"))}
+    values = {name: max(least.get(name, 0.0), getattr(gains, name)) for name in SEARCHED}
+    return replace(gains, **{name: float(f"{value:.{DIGITS}g}") for name, value in values.items()})
+
+
+def search(gains: Gains, trial: Callable[[Gains], float], rounds: int, seed: int) -> Gains:
+    """Change one gain at a time, in a seeded order, by a factor that shrinks where neither way helps."""
+    best = rounded(gains)
+    lowest = trial(best)
+    print(f"start: {lowest:.4f}", flush=True)
+    steps = dict.fromkeys(SEARCHED, FIRST_STEP)
+    random = np.random.default_rng([seed, 0, 1])
+    for number in range(rounds):
+        for name in random.permutation(SEARCHED).tolist():
+            for factor in (steps[name], 1.0 / steps[name]):
+                tried = rounded(replace(best, **{name: getattr(best, name) * factor}))
+                found = trial(tried)
+                if found < (1.0 - WORTH_TAKING) * lowest:
+                    best, lowest = tried, found
+                    # The way that helped comes first the next time.
+                    steps[name] = factor
+                    break
+            else:
+                steps[name] = 1.0 + 0.5 * (steps[name] - 1.0)
+        print(f"round {number + 1}: {lowest:.4f}", flush=True)
+    return best
+
+
+def write(aircraft: Aircraft, gains: Gains, rounds: int, seed: int) -> None:
+    """Put the numbers into the aircraft's gains file, at the keys that stand there, and say where they come from."""
+    file = aircraft.folder / "gains.toml"
+    chosen = "# Chosen by "
+    said = (
+        f"{chosen}`python -m benchmarks.tuning.tune_gains {aircraft.name} --rounds {rounds} --seed {seed} --write`"
+        f" with JSBSim {JSBSIM_VERSION}."
+    )
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith(chosen)]
+    names = sorted((item.name for item in fields(Gains)), key=len, reverse=True)
+    out = []
+    for line in lines:
+        key = line.partition(" =")[0]
+        name = next((name for name in names if re.fullmatch(name + r"(_(deg|rad|mps|1|s)[a-z0-9_]*)?", key)), None)
+        if name is None:
+            out.append(line)
+            continue
+        value = getattr(gains, name)
+        value = math.degrees(value) if "_deg" in key.removeprefix(name) else value
+        out.append(f"{key} = {float(f'{value:.4g}')!r}")
+    at = next(k for k, line in enumerate(out) if not line.startswith("#"))
+    file.write_text("\n".join([*out[:at], said, *out[at:]]) + "\n", encoding="utf-8")
+
+
+def print_errors(name: str, found: Sequence[Errors]) -> None:
+    """One line: medians of the RMS, 95th percentiles of the largest."""
+    rms = [float(np.median([getattr(item, key) for item in found])) for key in ("cross_rms", "height_rms")]
+    most = [float(np.percentile([getattr(item, key) for item in found], 95)) for key in ("cross_max", "height_max")]
+    done = sum(item.completed for item in found)
+    print(
+        f"  {name:<28} {done} of {len(found)} complete; cross-track {rms[0]:.3f} / {most[0]:.3f},"
+        f" height {rms[1]:.3f} / {most[1]:.3f} m"
+    )
+
+
+def report(aircraft: Aircraft, make: MakeSetup, gains: Gains, fresh: Sequence[Case]) -> None:
+    """How the gains fly what the search has not seen: the standard mission, and fresh random ones."""
+    way = standard() * np.array([1.0, 1.0, 1.0])
+    way[:, :2] *= (aircraft.airspeed / 25.0) ** 2
+    if aircraft.name != "aerosonde":
+        # Half the slopes: the standard mission's are the Aerosonde's.
+        way[:, 2] = 500.0 + 0.5 * (aircraft.airspeed / 25.0) ** 2 * (way[:, 2] - 500.0)
+    winds: list[dict[str, Any]] = [{}] + [{"wind": (10.0, 45.0 * k), "turbulence": "moderate"} for k in range(8)]
+    known = [Case(make(way, speeds=aircraft.airspeed, **wind), None, True) for wind in winds]
+    print("reported on (median RMS / 95th percentile of the largest):")
+    print_errors("standard mission, calm", [errors_of(fly(aircraft, gains, item)) for item in known[:1]])
+    print_errors("standard mission, windy", [errors_of(fly(aircraft, gains, item)) for item in known[1:]])
+    print_errors("fresh random missions", [errors_of(fly(aircraft, gains, item)) for item in fresh])
+
+
+def main() -> None:
+    """Search, report, and write if asked to."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.tuning.tune_gains")
+    parser.add_argument("aircraft", nargs="?", default="aerosonde", choices=sorted(TRAINED))
+    parser.add_argument("--rounds", type=int, default=6)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--write", action="store_true")
+    args = parser.parse_args()
+    aircraft = load_aircraft(args.aircraft)
+    make = setup_maker(aircraft)
+    own = {name: float(f"{value:.4g}") for name, value in model_gains(aircraft).items()}
+    print("off the model: " + ", ".join(f"{name} {value:.4g}" for name, value in own.items()))
+    gains = replace(load_gains(aircraft), **own, **start(aircraft))
+    trained = cases(aircraft, make, args.seed, TRAINED[aircraft.name])
+    fresh = cases(aircraft, make, args.seed, REPORTED)
+    with Trial(aircraft, trained) as trial:
+        gains = search(gains, trial, args.rounds, args.seed)
+    print(gains)
+    if args.write:
+        write(aircraft, gains, args.rounds, args.seed)
+    report(aircraft, make, gains, fresh)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""The verdict by ArduPlane's law against the verdict on ArduPlane's own flight of the same mission.
+
+``python -m benchmarks.verdict_agreement [--missions N] [--from SEED] [--json FILE]`` makes missions that keep one
+limit by a little, or exceed it (`tests.field_missions.close_mission`), flies each by the law, with satellites'
+errors, and with the program that PLANFLY_ARDUPLANE names, both in the same air, judges both flights by the same rules,
+and counts where the answers differ.  ``--ordinary N`` instead flies ordinary missions by the law alone, and counts
+which of them it calls not flyable.
+"""
+
+import argparse
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.against_arduplane import BINARY
+from flight.autopilots.arduplane_sitl.flight import fly_autopilot
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import simulate
+from logs.verdict.findings import Verdict
+from logs.verdict.judge_flight import judge_flight
+from planfly.airframe import Airframe, load_airframe
+from planfly.pipeline import make_setup
+from tests.field_missions import GROUND, FieldMission, close_mission, ordinary_mission
+
+# By so much at least clearance is lost, or a sphere entered, to count as grave, m.
+GRAVE = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What each of two flights of a mission comes to.
+
+    law, real: the first lines of their verdicts.
+    agree: both flyable or neither.
+    harmed: the law's is flyable, and the program's flight lost clearance or entered a sphere by more than a metre.
+    """
+
+    name: str
+    law: str
+    real: str
+    agree: bool
+    harmed: bool
+
+
+def setup_of(made: FieldMission) -> tuple[FlightSetup, Airframe]:
+    """Setup of a mission, with satellites' errors as a scenario has them."""
+    airframe = load_airframe(made.scenario)
+    return make_setup(made.scenario, airframe, made.mission, seed=1), airframe
+
+
+def by_law(made: FieldMission) -> tuple[Verdict, float]:
+    """Verdict on the law's flight, and the energy it took, Wh."""
+    setup, airframe = setup_of(made)
+    flown = simulate(setup, airframe.aircraft)
+    return judge_flight(setup, flown.track, flown.ended), float(flown.track.energy[-1])
+
+
+def by_program(made: FieldMission) -> tuple[Verdict, bool]:
+    """Verdict on the program's flight, and whether it lost clearance or entered a sphere by more than `GRAVE`."""
+    setup, airframe = setup_of(made)
+    flown, setup = fly_autopilot(setup, airframe.aircraft, BINARY)
+    threats, position = made.scenario.threats, flown.track.position
+    away = np.sqrt(((position[:, None] - threats.position[None]) ** 2).sum(axis=2)) - threats.kill_radius
+    least = made.scenario.limits.min_clearance_m - GRAVE
+    low = float(position[:, 2].min()) - GROUND < least
+    return judge_flight(setup, flown.track, flown.ended), low or bool((away < -GRAVE).any())
+
+
+def compare(seed: int) -> Answer:
+    """Fly the mission of a seed by both."""
+    made = close_mission(seed, energy=lambda ordinary: by_law(ordinary)[1])
+    (law, _), (real, lost) = by_law(made), by_program(made)
+    agree = law.flyable == real.flyable
+    return Answer(made.name, law.headline, real.headline, agree, law.flyable and lost)
+
+
+def main() -> None:
+    """Fly, print, and sum up."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.verdict_agreement")
+    parser.add_argument("--missions", type=int, default=100)
+    parser.add_argument("--from", dest="first", type=int, default=0, help="seed of the first mission")
+    parser.add_argument("--ordinary", type=int, help="so many ordinary missions, by the law alone")
+    parser.add_argument("--json", type=Path, help="also write every answer there")
+    args = parser.parse_args()
+    if args.ordinary is not None:
+        _ordinary(args.first, args.ordinary)
+        return
+    answers = []
+    for seed in range(args.first, args.first + args.missions):
+        answers.append(compare(seed))
+        one = answers[-1]
+        print(f"{one.name:14s} {'same' if one.agree else 'DIFFER'}  law: {one.law}  real: {one.real}", flush=True)
+    print(
+        f"{sum(one.agree for one in answers)} of {len(answers)} agree;"
+        f" {sum(one.harmed for one in answers)} flyable by the law and harmed in truth;"
+        f" not flyable by the program: {sum(not one.real.startswith('flyable') for one in answers)}"
+    )
+    if args.json:
+        args.json.write_text(json.dumps([asdict(one) for one in answers], indent=1) + "\n", encoding="utf-8")
+
+
+def _ordinary(first: int, count: int) -> None:
+    refused = 0
+    for seed in range(first, first + count):
+        made = ordinary_mission(seed)
+        verdict, _ = by_law(made)
+        if not verdict.flyable:
+            refused += 1
+            print(f"{made.name}  {verdict.headline}", flush=True)
+    print(f"{refused} of {count} ordinary missions not flyable by the law")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Autopilots that fly a mission: by their laws in Python, and as programs of their own."""

@@ -1,0 +1,1 @@
+"""ArduPlane by its law: parameters, one compiled tick, and how far it strays from a plan."""

@@ -1,0 +1,574 @@
+"""ArduPlane's law, compiled: L1, when it turns to the next leg, its height demand, TECS, and one tick of it all."""
+
+import math
+
+import numpy as np
+
+from aircraft.envelope import GRAVITY
+from flight.guidance.inner_loops import follow_roll, steer_elevator
+from flight.guidance.lateral import find_on_path
+from flight.guidance.lateral_reference_laws import l1_acceleration, l1_angles, l1_integrate, l1_length
+from flight.guidance.path import Records, profile
+from world.geometry import wrap
+from world.kernels import Record, compiled, record_dtype
+
+# ----------------------------------------------------------------------
+# What ArduPlane's laws keep from tick to tick.
+
+ARDUPILOT_MEMORY = record_dtype(
+    "clock",  # s until the navigation's next turn
+    ("begun", np.bool_),  # whether a tick was flown
+    # Lateral.
+    ("leg", np.int64),  # that is flown, from waypoint `leg` to `leg + 1`
+    "from_east",  # m, where the leg's line begins
+    "from_north",
+    "from_up",  # m, where its slope begins
+    "cross_track_sum",  # rad, L1's integral
+    ("on_circle", np.bool_),  # whether a loiter's circle is followed, not just approached
+    "side_acceleration",  # m/s^2 to the right, as last demanded
+    "roll_demand",  # rad
+    # Height.
+    "height_asked",  # m, of the leg, or as it was when the aircraft could follow it no longer
+    "height_limited",  # m, the same within its rate limits
+    "height_demand",  # m, and after its lag
+    "height_rate",  # m/s, of the height demand
+    "climb_share",  # 0..1, of the greatest rates that are demanded
+    "sink_share",
+    ("held", np.int64),  # 1 with throttle or pitch at its upper limit, -1 at its lower
+    # Airspeed.
+    ("flown", np.bool_),  # whether there is a velocity of before
+    "last_velocity_east",  # m/s, when it navigated last
+    "last_velocity_north",
+    "last_velocity_up",
+    "airspeed_read",  # m/s, smoothed
+    "airspeed",  # m/s, of the measured one and the acceleration
+    "airspeed_drift",  # m/s^2, what the acceleration leaves out
+    "acceleration",  # m/s^2, along the nose, without its mean
+    "acceleration_mean",
+    "airspeed_demand",  # m/s, within its rate limits
+    # Energy.
+    "energy_rate_error",  # m^2/s^3, smoothed
+    "throttle_before",  # 0..1, the last without its integral
+    "throttle_sum",  # 0..1, integral of the total energy that is missing
+    "balance_sum",  # m^2/s^3, integral of what is amiss in the balance
+    "speed_sum",  # m^2/s^3, integral of the kinetic energy that is too much
+    "pitch_demand",  # rad, without the trim
+    "throttle_demand",  # 0..1
+)
+
+
+# ----------------------------------------------------------------------
+# How ArduPlane flies along a mission's legs: the L1 law, when it turns to the next leg, and loiters.
+#
+# The L1 law is that of Park, Deyst and How ("A New Nonlinear Guidance Logic for Trajectory Tracking", AIAA 2004-4900)
+# as
+# ArduPlane's documentation gives its parameters (ardupilot.org, Plane, "Navigation Tuning"), with the formulas of
+# `flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second: what it demands stays until then.
+
+# An acceptance is sent as whole metres in a byte.
+MOST_ACCEPTANCE = 255.0
+# Least that the roll limit is narrowed to by low airspeed, rad.
+_LEAST_ROLL_LIMIT = math.radians(25.0)
+
+
+@compiled
+def turn_distance(
+    acceptance: float, turn: float, radius: float, length: float, air_density_factor: float
+) -> float:  # pragma: no cover - compiled
+    """How far before a waypoint ArduPlane turns to the next leg, m; 0 where it flies on to the waypoint.
+
+    acceptance: that the mission states, m, 0 for none: it is taken as it is, in whole metres.
+    turn: rad, positive.  radius: WP_RADIUS, m.  length: of L1, m.
+    air_density_factor: true by equivalent airspeed; with height a turn takes its square more room.
+    """
+    stated = math.floor(min(MOST_ACCEPTANCE, acceptance))
+    if stated > 0.0:
+        return stated
+    whole: float = min(radius * air_density_factor * air_density_factor, length)
+    return whole * min(1.0, turn / (0.5 * math.pi))
+
+
+@compiled
+def past_line(estimated: Record, from_east: float, from_north: float, b: Record) -> bool:  # pragma: no cover - compiled
+    """Whether the line across the leg at its end is passed; a leg without length is.
+
+    b: the end, a record of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    """
+    leg_e, leg_n = b.east - from_east, b.north - from_north
+    ahead_e, ahead_n = b.east - estimated.east, b.north - estimated.north
+    passed: bool = ahead_e * leg_e + ahead_n * leg_n <= 0.0
+    return passed
+
+
+@compiled
+def navigate_legs(
+    estimated: Record,
+    waypoints: Records,
+    parameters: Record,
+    own: Record,
+    air_density_factor: float,
+    dt: float,
+) -> None:  # pragma: no cover - compiled
+    """Demand a side acceleration for the present leg, and then turn to the next one if its time has come.
+
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    waypoints: (w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    parameters: of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
+    own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
+    air_density_factor: true by equivalent airspeed.
+    dt: s since the last time.
+    """
+    b = waypoints[own.leg + 1]
+    damping = parameters.navl1_damping
+    speed = max(0.1, math.hypot(estimated.velocity_east, estimated.velocity_north))
+    length = l1_length(speed, parameters.navl1_period, damping)
+    if b.circle != 0.0:
+        own.side_acceleration = _around(estimated, b, parameters, own, length, speed)
+        reached = own.on_circle and _past_corner(estimated, b)
+    else:
+        own.on_circle = False
+        angle, aim = l1_angles(estimated, own.from_east, own.from_north, b.east, b.north, length)
+        own.cross_track_sum = l1_integrate(aim, own.cross_track_sum, parameters.navl1_xtrack_i, dt)
+        if not math.isnan(aim):
+            angle += aim + own.cross_track_sum
+        own.side_acceleration = l1_acceleration(angle, speed, length, damping)
+        reached = _reached(estimated, b, parameters, own, length, air_density_factor)
+    if not reached or own.leg + 2 >= waypoints.shape[0]:
+        return
+    own.leg += 1
+    after = waypoints[own.leg + 1]
+    own.from_east, own.from_north, own.from_up = b.east, b.north, b.up
+    if after.circle == 0.0 and past_line(estimated, b.east, b.north, after):
+        own.from_east, own.from_north, own.from_up = estimated.east, estimated.north, estimated.up
+
+
+@compiled
+def _reached(
+    estimated: Record, b: Record, parameters: Record, own: Record, length: float, air_density_factor: float
+) -> bool:  # pragma: no cover - compiled
+    """Whether the leg to b is over: near enough to b, or past the line across it."""
+    distance = math.hypot(b.east - estimated.east, b.north - estimated.north)
+    passed = past_line(estimated, own.from_east, own.from_north, b)
+    if parameters.wp_max_radius > 0.0 and distance > parameters.wp_max_radius:
+        if passed:
+            # Passed too far away: it turns back to the waypoint.
+            own.from_east, own.from_north = estimated.east, estimated.north
+        return False
+    if b.fly_over:
+        return passed
+    reach = turn_distance(b.acceptance, b.turn, parameters.wp_radius, length, air_density_factor)
+    return passed or distance <= reach
+
+
+@compiled
+def _around(
+    estimated: Record, b: Record, parameters: Record, own: Record, length: float, speed: float
+) -> float:  # pragma: no cover - compiled
+    """Side acceleration for a loiter: straight to its centre until its circle asks for more, then around it, m/s^2."""
+    side = math.copysign(1.0, b.circle)
+    radius = abs(b.circle)
+    out_e, out_n = estimated.east - b.centre_east, estimated.north - b.centre_north
+    distance = max(0.1, math.hypot(out_e, out_n))
+    course = math.atan2(estimated.velocity_east, estimated.velocity_north)
+    inward = wrap(course - math.atan2(-out_e, -out_n))
+    capture = l1_acceleration(inward, speed, length, parameters.navl1_damping)
+    # Over the ground: outwards, and around the circle in its direction.
+    outwards = -speed * math.cos(inward)
+    around = -side * speed * math.sin(inward)
+    frequency = 2.0 * math.pi / parameters.navl1_period
+    error = distance - radius
+    back = frequency * (frequency * error + 2.0 * parameters.navl1_damping * outwards)
+    if outwards > 0.0 and around < 0.0:
+        # Flying out and the wrong way round, it turns the way that the circle goes.
+        back = max(back, 0.0)
+    circling = side * (back + around * around / max(0.5 * radius, distance))
+    own.on_circle = not (error > 0.0 and side * capture < side * circling)
+    demanded: float = circling if own.on_circle else capture
+    return demanded
+
+
+@compiled
+def _past_corner(estimated: Record, b: Record) -> bool:  # pragma: no cover - compiled
+    """Whether the aircraft on a circle has passed the corner of the route that stands for this part of it."""
+    corner = math.atan2(b.east - b.centre_east, b.north - b.centre_north)
+    here = math.atan2(estimated.east - b.centre_east, estimated.north - b.centre_north)
+    turned = wrap(here - corner) * math.copysign(1.0, b.circle)
+    return 0.0 <= turned < 0.5 * math.pi
+
+
+@compiled
+def wanted_bank(side_acceleration: float, pitch: float, parameters: Record) -> float:  # pragma: no cover - compiled
+    """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG, rad.  pitch: rad."""
+    level = math.cos(min(math.radians(60.0), max(-math.radians(60.0), pitch)))
+    wanted = math.atan(side_acceleration / (GRAVITY * level))
+    within: float = min(parameters.roll_limit, max(-parameters.roll_limit, wanted))
+    return within
+
+
+@compiled
+def least_airspeed(bank: float, parameters: Record) -> float:  # pragma: no cover - compiled
+    """Least airspeed that is flown in a wanted bank (rad), equivalent, m/s: AIRSPEED_MIN, for the load in the bank.
+
+    A bank of phi takes 1 / sqrt(cos phi) of the least airspeed.
+    """
+    load = math.sqrt(math.cos(min(math.radians(85.0), abs(bank)))) if parameters.stall_prevention > 0.0 else 1.0
+    least: float = parameters.airspeed_min / load
+    return least
+
+
+@compiled
+def roll_demand(
+    side_acceleration: float, pitch: float, airspeed: float, parameters: Record
+) -> float:  # pragma: no cover - compiled
+    """Bank for a side acceleration (m/s^2), within ROLL_LIMIT_DEG and what the airspeed bears without a stall, rad.
+
+    pitch: rad.  airspeed: equivalent, m/s.
+    """
+    wanted = wanted_bank(side_acceleration, pitch, parameters)
+    if parameters.stall_prevention <= 0.0:
+        return wanted
+    spare = max(1.0, airspeed / parameters.airspeed_min)
+    limit = max(_LEAST_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
+    demanded: float = min(limit, max(-limit, wanted))
+    return demanded
+
+
+# ----------------------------------------------------------------------
+# How ArduPlane keeps heights and speeds: the height demand along a leg, and TECS, which weighs energies.
+#
+# TECS (Total Energy Control System) gives the throttle what total energy is missing, and the pitch angle what is
+# amiss in
+# its balance between height and speed; the idea is Lambregts' (AIAA 83-2239).  What its parameters mean is from
+# ArduPilot's documentation (ardupilot.org, Plane, "TECS ... Tuning Guide" and the parameter list); how they combine was
+# found by regression of ArduPlane 4.6's flight logs (messages TECS, TEC2, TEC3), whose pitch demands these formulas
+# give
+# to eight digits.
+#
+# Energies are of a kilogram, m^2/s^2; their rates m^2/s^3.  Speeds are true airspeeds.
+
+# What ArduPlane reads by what is true: its sensor's noise adds to the pressure's mean.  Measured in logs of 20 flights
+# of ArduPlane 4.6 in planfly's physics, in still air as in turbulence: 1.0024 to 1.0030.
+AIRSPEED_READING = 1.0027
+# Of what the sensor reads, so much is taken over ten times a second, and used at the next turn: so ArduPlane's airspeed
+# (CTUN.As) follows the readings (ARSP.Airspeed) in its logs.
+_READING_SHARE = 0.3
+# Of the rate of total energy, for the throttle's damping: smoothed over this long, s.
+_RATE_LAG = 0.5
+# Damping of the filter that makes an airspeed of the measured one and the acceleration.
+_FILTER_DAMPING = 1.414
+# How far beyond the pitch limits the integral may ask, rad, and beyond the throttle's.
+_PITCH_SPARE, _THROTTLE_SPARE = math.radians(5.0), 0.1
+# Of the range of pitch (either way) and of throttle, what the integrals of speed and energy may take.
+_SPEED_SHARE, _THROTTLE_SHARE = 0.25, 0.5
+# Of the greatest rate of energy, what a change of speed may take.
+_SPEED_CHANGE_SHARE = 0.5
+# So near to full throttle the demand touches it now and then, by the noise of airspeed and acceleration that it is made
+# of: three standard deviations.  Climbs that take all the throttle there is hang on this: with 0.003 to 0.005 the least
+# clearances of 20 flights of ArduPlane are met within 1.2 m; without it one of them is 9 m off.
+_NEARLY = 0.003
+# Below this share of AIRSPEED_MIN, with the throttle all but full, speed comes before height.
+_UNDERSPEED, _ALL_BUT_FULL = 0.9, 0.95
+
+
+@compiled
+def demand_height(
+    estimated: Record, b: Record, parameters: Record, own: Record, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Demand the height that the present leg asks for here, within the limits of its rate and with its lag.
+
+    estimated: a record of `flight.guidance.navigation_error.MOTION`.
+    b: the leg's end, of `flight.guidance.lateral_reference_laws.WAYPOINT`.
+    parameters, own: as `flight.autopilots.arduplane.law.navigate_legs` takes them.
+    """
+    target = _leg_height(estimated, b, parameters, own)
+    share = dt / (dt + parameters.tecs_height_demand_time)
+    # What the aircraft cannot follow is not asked of it: the demand waits, and its rate is brought down meanwhile.
+    cannot_climb, cannot_sink = own.held > 0 and own.height_rate > 0.0, own.held < 0 and own.height_rate < 0.0
+    own.climb_share += share * ((0.0 if cannot_climb else 1.0) - own.climb_share)
+    own.sink_share += share * ((0.0 if cannot_sink else 1.0) - own.sink_share)
+    if cannot_climb:
+        target = min(target, own.height_asked)
+    if cannot_sink:
+        target = max(target, own.height_asked)
+    own.height_asked = target
+    climb = parameters.tecs_climb_max * own.climb_share * dt
+    sink = parameters.tecs_sink_max * own.sink_share * dt
+    own.height_limited += min(climb, max(-sink, target - own.height_limited))
+    behind = own.height_limited - own.height_demand
+    own.height_demand += share * behind
+    own.height_rate = behind / max(dt, parameters.tecs_height_demand_time)
+
+
+@compiled
+def _leg_height(estimated: Record, b: Record, parameters: Record, own: Record) -> float:  # pragma: no cover - compiled
+    """Height on the leg's slope at the aircraft's place along it; that of its end where it is flown as a step."""
+    end: float = b.up
+    rise = end - own.from_up
+    leg_e, leg_n = b.east - own.from_east, b.north - own.from_north
+    run = max(1e-6, leg_e * leg_e + leg_n * leg_n)
+    along = ((estimated.east - own.from_east) * leg_e + (estimated.north - own.from_north) * leg_n) / run
+    if abs(rise) < parameters.glide_slope_min or rise == 0.0 or along >= 1.0:
+        return end
+    left = 1.0 - max(0.0, along)
+    height: float = end - rise * left
+    here: float = estimated.up
+    above = parameters.glide_slope_threshold
+    if above <= 0.0 or rise <= 0.0 or here <= height + above:
+        return height
+    # So high above a slope that climbs it is drawn anew, from here to its end.
+    rest = end - here
+    if rest < parameters.glide_slope_min:
+        own.from_up = end
+        return end
+    own.from_up = end - rest / left
+    return here
+
+
+@compiled
+def _estimate_airspeed(
+    state: Record, estimated: Record, parameters: Record, own: Record, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Airspeed and its rate: the acceleration along the nose for what is quick, the measured airspeed for the rest.
+
+    An accelerometer along the nose, with gravity's share taken out, feels how the velocity over the ground changes, up
+    and down too: where a climb begins, that is more than the speed gains.
+    """
+    level = math.cos(state.pitch)
+    gained = (estimated.velocity_east - own.last_velocity_east) * math.sin(state.yaw) * level
+    gained += (estimated.velocity_north - own.last_velocity_north) * math.cos(state.yaw) * level
+    gained += (estimated.velocity_up - own.last_velocity_up) * math.sin(state.pitch)
+    gained = gained / dt if own.flown else 0.0
+    own.flown = True
+    own.last_velocity_east, own.last_velocity_north = estimated.velocity_east, estimated.velocity_north
+    own.last_velocity_up = estimated.velocity_up
+    frequency = parameters.tecs_speed_frequency
+    error = own.airspeed_read - own.airspeed
+    own.airspeed_read += _READING_SHARE * (AIRSPEED_READING * state.airspeed - own.airspeed_read)
+    own.airspeed_drift += error * frequency * frequency * dt
+    own.airspeed = max(3.0, own.airspeed + (gained + own.airspeed_drift + error * frequency * _FILTER_DAMPING) * dt)
+    own.acceleration_mean += (gained - own.acceleration_mean) * dt / (dt + parameters.tecs_time)
+    own.acceleration = gained - own.acceleration_mean
+
+
+@compiled
+def weigh_energies(
+    state: Record, estimated: Record, parameters: Record, own: Record, airspeed: float, factor: float, dt: float
+) -> None:  # pragma: no cover - compiled
+    """Throttle and pitch demands for the height demand and an airspeed (m/s, true), into `own`.
+
+    state: a record of `flight.dynamics.state.STATE`.  factor: true by equivalent airspeed.  The others are as
+    `demand_height` takes them.
+    """
+    _estimate_airspeed(state, estimated, parameters, own, dt)
+    speed = own.airspeed
+    slowest = least_airspeed(wanted_bank(own.side_acceleration, state.pitch, parameters), parameters) * factor
+    # What it cannot climb now, full throttle does not give.
+    most = GRAVITY * parameters.tecs_climb_max * own.climb_share
+    least = -GRAVITY * parameters.tecs_sink_min
+    full = own.throttle_demand >= _ALL_BUT_FULL * parameters.throttle_max
+    under = speed < _UNDERSPEED * slowest and full
+    wanted = slowest if under else max(slowest, airspeed)
+    change = wanted - own.airspeed_demand
+    most_change = _SPEED_CHANGE_SHARE * most / speed * dt
+    least_change = _SPEED_CHANGE_SHARE * least / speed * dt
+    own.airspeed_demand = max(slowest, own.airspeed_demand + min(most_change, max(least_change, change)))
+    high = GRAVITY * (own.height_demand - estimated.up)
+    fast = 0.5 * (own.airspeed_demand * own.airspeed_demand - speed * speed)
+    slack = max(0.0, 0.5 * (speed * speed - slowest * slowest))
+    fastest = parameters.airspeed_max * factor
+    room = min(0.0, 0.5 * (speed * speed - fastest * fastest))
+    climbing, gaining = GRAVITY * estimated.velocity_up, speed * own.acceleration
+    limited = min(slack, max(room, high))
+    _set_throttle(state, parameters, own, high, limited + fast, climbing + gaining, most, least, dt)
+    if under:
+        own.throttle_demand = parameters.throttle_max
+    _set_pitch(state, parameters, own, high, fast, climbing, gaining, under, dt)
+
+
+@compiled
+def _set_throttle(
+    state: Record, parameters: Record, own: Record, high: float, missing: float, rate: float, most: float,
+    least: float, dt: float,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Throttle for the total energy that is missing (m^2/s^2), which changes at a rate (m^2/s^3).
+
+    high: potential energy that is missing.  most, least: rates of energy at full and at least throttle.
+    """
+    lowest, highest = max(0.0, parameters.throttle_min), parameters.throttle_max
+    per_throttle = (most - least) / (highest - parameters.throttle_min)
+    wanted = min(most, max(least, high / parameters.tecs_time))
+    own.energy_rate_error += (wanted - rate - own.energy_rate_error) * dt / (dt + _RATE_LAG)
+    tilt = math.sin(state.roll) * math.cos(state.pitch)
+    drag = parameters.tecs_roll_to_throttle * (1.0 / max(0.1, 1.0 - tilt * tilt) - 1.0)
+    throttle = parameters.throttle_cruise + (wanted + drag) / per_throttle
+    gain = 1.0 / (parameters.tecs_time * per_throttle)
+    throttle += gain * (missing + parameters.tecs_throttle_damping * own.energy_rate_error)
+    amplitude = _THROTTLE_SHARE * (highest - lowest)
+    high_end = min(amplitude, max(-amplitude, highest - throttle + _THROTTLE_SPARE))
+    low_end = min(amplitude, max(-amplitude, parameters.throttle_min - throttle - _THROTTLE_SPARE))
+    own.throttle_sum += gain * parameters.tecs_integral * missing * dt
+    own.throttle_sum = min(high_end, max(low_end, own.throttle_sum))
+    if parameters.throttle_slew > 0.0:
+        step = parameters.throttle_slew * (highest - lowest) * dt
+        throttle = min(own.throttle_before + step, max(own.throttle_before - step, throttle))
+    own.throttle_before = throttle
+    throttle += own.throttle_sum
+    own.throttle_demand = min(highest, max(lowest, throttle))
+    own.held = 1 if throttle >= highest - _NEARLY else (-1 if throttle <= parameters.throttle_min else 0)
+
+
+@compiled
+def _set_pitch(
+    state: Record, parameters: Record, own: Record, high: float, fast: float, climbing: float, gaining: float,
+    under: bool, dt: float,
+) -> None:  # pragma: no cover - compiled  # fmt: skip
+    """Pitch angle for the balance between potential energy and speed's.
+
+    high, fast: potential and kinetic energy that are missing.  climbing, gaining: their rates.
+    """
+    speed_weight = 1.0 if under else min(1.0, parameters.tecs_speed_weight)
+    height_weight = 0.0 if under else min(1.0, 2.0 - parameters.tecs_speed_weight)
+    top = parameters.pitch_limit_max
+    if parameters.tecs_pitch_max > 0.0:
+        top = min(top, parameters.tecs_pitch_max)
+    bottom = parameters.pitch_limit_min
+    if parameters.tecs_pitch_min < 0.0:
+        bottom = max(bottom, parameters.tecs_pitch_min)
+    per_angle = own.airspeed * GRAVITY
+    wanted = height_weight * (high / parameters.tecs_time + GRAVITY * own.height_rate)
+    wanted -= speed_weight * fast / parameters.tecs_time
+    asked = wanted
+    wanted = min(GRAVITY * parameters.tecs_climb_max, max(-GRAVITY * parameters.tecs_sink_max, asked))
+    amiss = wanted - (height_weight * climbing - speed_weight * gaining)
+    total = wanted + parameters.tecs_pitch_damping * amiss
+    own.speed_sum -= speed_weight * fast / parameters.tecs_time * dt
+    most = _SPEED_SHARE * (top - bottom) * per_angle
+    own.speed_sum = min(most, max(-most, own.speed_sum))
+    own.balance_sum += parameters.tecs_integral * amiss * dt
+    highest = (top + _PITCH_SPARE) * per_angle - total - own.speed_sum
+    lowest = (bottom - _PITCH_SPARE) * per_angle - total - own.speed_sum
+    own.balance_sum = min(highest, max(lowest, own.balance_sum))
+    pitch = (total + own.balance_sum + own.speed_sum) / per_angle
+    if pitch > top or asked > wanted:
+        own.held = 1
+    elif pitch < bottom or asked < wanted:
+        own.held = -1
+    pitch = min(top, max(bottom, pitch))
+    step = parameters.tecs_vertical_acceleration / own.airspeed * dt
+    own.pitch_demand = min(own.pitch_demand + step, max(own.pitch_demand - step, pitch))
+
+
+# ----------------------------------------------------------------------
+# One tick of ArduPlane: ten times a second it navigates and weighs energies, and at each tick follows its attitude.
+#
+# Attitudes are followed through planfly's inner loops (`flight.guidance.inner_loops`), as late as ArduPlane's
+# controllers
+# follow them, whose gains are tuned to the aircraft and are no part of the law.
+
+# ArduPlane navigates and updates its height and speed law so often, s (its scheduler's table: 10 Hz).
+NAVIGATION_TICK = 0.1
+# A bank follows its demand so much later than RLL2SRV_TCONST says, as a share of it; and a pitch angle.
+ROLL_LAG = 0.84
+PITCH_LAG = 1.1
+# TECS's two integrals of the pitch balance each other, and no steady flight tells how large they are; what came before
+# the first waypoint has left this in the one of speed, m^2/s^3 (12 to 39, 27 on average, in 18 flights of ArduPlane).
+SPEED_SUM = 27.0
+# The international standard atmosphere below 11 km: temperature falls by this share of sea level's a metre, and density
+# with that power of the temperature.
+_LAPSE, _DENSITY_POWER = 2.25577e-5, 4.25588
+# Highest that the ratio is worked out for, m.
+_HIGHEST = 11_000.0
+_FASTEST_PITCH = math.radians(40.0)
+
+
+@compiled
+def true_by_equivalent(amsl: float) -> float:  # pragma: no cover - compiled
+    """True airspeed by equivalent airspeed in the standard atmosphere at a height, m; 1.05 at 1,000 m."""
+    ratio: float = (1.0 - _LAPSE * min(_HIGHEST, amsl)) ** (-0.5 * _DENSITY_POWER)
+    return ratio
+
+
+@compiled
+def fly_as_ardupilot(
+    state: Record,
+    estimated: Record,
+    pieces: Records,
+    nodes: Records,
+    waypoints: Records,
+    gains: Record,
+    memory: Record,
+    parameters: Record,
+    own: Record,
+    commands: Record,
+    dt: float,
+) -> None:  # pragma: no cover - compiled
+    """One tick of ``dt`` seconds: fill the commands, and the memories for the next one.
+
+    parameters: a record of `flight.autopilots.arduplane.parameters.ARDUPILOT_PARAMETERS`.
+    own: of `flight.autopilots.arduplane.law.ARDUPILOT_MEMORY`.
+    The others are as `flight.guidance.lateral.guide` takes them; the path is what the track is measured against, and no
+    part of the law.
+    """
+    find_on_path(estimated, pieces, memory)
+    memory.height_error = estimated.up - profile(nodes, memory.distance)[0]
+    factor = true_by_equivalent(estimated.up)
+    if not own.begun:
+        _begin(state, estimated, waypoints, memory, parameters, own)
+    own.clock -= dt
+    if own.clock < 0.5 * dt:
+        own.clock += NAVIGATION_TICK
+        navigate_legs(estimated, waypoints, parameters, own, factor, NAVIGATION_TICK)
+        demand_height(estimated, waypoints[own.leg + 1], parameters, own, NAVIGATION_TICK)
+        wanted = min(parameters.airspeed_max, max(parameters.airspeed_min, waypoints[own.leg].airspeed))
+        memory.speed_command = wanted * factor
+        weigh_energies(state, estimated, parameters, own, wanted * factor, factor, NAVIGATION_TICK)
+    _follow(state, estimated, gains, memory, parameters, own, factor, commands, dt)
+
+
+@compiled
+def _begin(
+    state: Record, estimated: Record, waypoints: Records, memory: Record, parameters: Record, own: Record
+) -> None:  # pragma: no cover - compiled
+    """Take over in steady flight at the first waypoint."""
+    own.begun = True
+    own.from_east, own.from_north, own.from_up = waypoints[0].east, waypoints[0].north, waypoints[0].up
+    own.height_asked = estimated.up
+    own.height_limited = estimated.up
+    own.height_demand = estimated.up
+    own.climb_share, own.sink_share = 1.0, 1.0
+    own.airspeed_read = state.airspeed
+    own.airspeed = state.airspeed
+    own.airspeed_demand = state.airspeed
+    # As it has flown before: what level flight here takes is known.
+    own.pitch_demand = state.alpha - parameters.pitch_trim
+    own.speed_sum = SPEED_SUM
+    own.balance_sum = own.pitch_demand * state.airspeed * GRAVITY - SPEED_SUM
+    own.throttle_demand = memory.trim_throttle
+    own.throttle_before = parameters.throttle_cruise
+    own.throttle_sum = memory.trim_throttle - parameters.throttle_cruise
+
+
+@compiled
+def _follow(
+    state: Record,
+    estimated: Record,
+    gains: Record,
+    memory: Record,
+    parameters: Record,
+    own: Record,
+    factor: float,
+    commands: Record,
+    dt: float,
+) -> None:  # pragma: no cover - compiled
+    """Roll and pitch to their demands, each with the lag of ArduPlane's controllers; throttle as it is demanded."""
+    own.roll_demand = roll_demand(own.side_acceleration, state.pitch, state.airspeed / factor, parameters)
+    before = memory.bank_rate
+    rate = (own.roll_demand - memory.bank) / (ROLL_LAG * parameters.roll_time)
+    rate = min(gains.roll_rate_max, max(-gains.roll_rate_max, rate))
+    most = gains.roll_acceleration_max * dt
+    rate = before + min(most, max(-most, rate - before))
+    follow_roll(state, gains, memory, commands, memory.bank + rate * dt, rate, (rate - before) / dt, dt)
+    pitch_rate = (own.pitch_demand + parameters.pitch_trim - state.pitch) / (PITCH_LAG * parameters.pitch_time)
+    pitch_rate = min(_FASTEST_PITCH, max(-_FASTEST_PITCH, pitch_rate))
+    steer_elevator(state, gains, memory, commands, estimated.velocity_up, state.airspeed * pitch_rate)
+    commands.throttle = own.throttle_demand

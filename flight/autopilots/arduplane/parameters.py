@@ -1,0 +1,454 @@
+"""ArduPlane's parameters that decide how it flies a mission, in SI units and radians.
+
+Names, units, ranges and defaults are those of ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6);
+an older name stands beside the present one with what takes its value to the present unit.  Of three sources the first
+that states a parameter counts: the file that a person gives, the file `ardupilot.parm` of the aircraft, ArduPlane.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.catalog import Aircraft
+from world.errors import ParameterError
+from world.files import TextLine, read_small_file, utf8_text
+from world.kernels import Record, record_dtype
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Files of ArduPilot parameters, in the forms that ground stations write.
+#
+# QGroundControl writes five columns with tabs between: vehicle, component, name, value, type.  MAVProxy and ArduPilot's
+# own default files have a name and a value with blanks between, Mission Planner has a comma.  In all of them a `#`
+# begins
+# a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File Format").
+
+# A vehicle has some 1,500 parameters in lines of 40 bytes.
+MOST_BYTES = 4 * 2**20
+# ArduPilot's names have at most sixteen characters (MAVLink, PARAM_VALUE).
+_NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+# A line of QGroundControl's: vehicle, component, name, value, type.
+_QGC_FIELDS = 5
+_WHOLE = re.compile(r"[0-9]{1,5}")
+_BETWEEN = re.compile(r"[\s,=]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """One parameter of a file.
+
+    where: file and line, for messages.
+    """
+
+    name: str
+    value: float
+    where: TextLine
+
+
+def read_parameter_file(path: Path) -> dict[str, Entry]:
+    """Read a file of parameters, by name in the order of the file.
+
+    Raises ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
+    """
+    data = read_small_file(path, MOST_BYTES, "parameter", ParameterError)
+    return parse_parameters(utf8_text(data, path, ParameterError), str(path))
+
+
+def parse_parameters(text: str, source: str) -> dict[str, Entry]:
+    r"""Read the text of a parameter file, in any of the forms; ``source`` names it in messages.
+
+    Raises ParameterError with file, line, field, value and what is allowed, for a line that is none, a value that is no
+    finite number, a name that comes twice, and a file without a parameter.
+
+    >>> found = parse_parameters("# Vehicle 1\n1\t1\tWP_RADIUS\t90.0\t9\n", "qgc.params")
+    >>> found["WP_RADIUS"].value, str(found["WP_RADIUS"].where)
+    (90.0, 'qgc.params:2')
+    >>> list(parse_parameters("WP_RADIUS 90  # m\nTHR_MAX,100\n", "any.parm"))
+    ['WP_RADIUS', 'THR_MAX']
+    """
+    found: dict[str, Entry] = {}
+    for number, whole in enumerate(re.split(r"\r\n|\n|\r", text), 1):
+        line = whole.partition("#")[0].strip()
+        if not line:
+            continue
+        entry = _entry(line, TextLine(source, number))
+        if entry.name in found:
+            first = found[entry.name].where.number
+            allowed = "each name is expected once"
+            raise ParameterError(
+                f"{entry.where}: {entry.name}: already on line {first}: {allowed}",
+                file=source, field=entry.name, value=entry.value, allowed=allowed,
+            )  # fmt: skip
+        found[entry.name] = entry
+    if not found:
+        raise ParameterError(f"{source}: no parameter: lines of a name and a value are expected", file=source)
+    return found
+
+
+def _entry(line: str, where: TextLine) -> Entry:
+    fields = line.split("\t")
+    if len(fields) == _QGC_FIELDS and _WHOLE.fullmatch(fields[0].strip()):
+        name, text = fields[2].strip(), fields[3].strip()
+    else:
+        fields = _BETWEEN.split(line)
+        if len(fields) != 2:
+            allowed = "a name and a value are expected, or QGroundControl's five columns"
+            message = f"{where}: {_shown(line)}: {allowed}"
+            raise ParameterError(message, file=where.file, value=line, allowed=allowed)
+        name, text = fields
+    if not _NAME.fullmatch(name):
+        allowed = "up to 16 capitals, digits and _ are expected"
+        message = f"{where}: name {_shown(name)}: {allowed}"
+        raise ParameterError(message, file=where.file, field="name", value=name, allowed=allowed)
+    value = float(text) if _NUMBER.fullmatch(text) else math.nan
+    if not math.isfinite(value):
+        allowed = "a finite number is expected"
+        raise ParameterError(
+            f"{where}: {name}: {_shown(text)}: {allowed}", file=where.file, field=name, value=text, allowed=allowed
+        )
+    return Entry(name, value, where)
+
+
+def _shown(text: str) -> str:
+    return repr(text if len(text) <= 40 else text[:37] + "...")
+
+
+Origin = Literal["file", "aircraft", "default"]
+
+# Of an aircraft, beside its model: what ArduPlane has to be told of it.
+AIRCRAFT_FILE = "ardupilot.parm"
+
+_DEGREE = math.pi / 180.0
+_PERCENT = 0.01
+_CENTI = 0.01
+
+
+class Definition(NamedTuple):
+    """One parameter.
+
+    name: ArduPlane's.
+    default: ArduPlane's, in its unit.
+    low, high: what is taken, in that unit.
+    to_si: factor to SI and radians.
+    old: an older name, and the factor from its unit to that of the present name.
+    """
+
+    name: str
+    default: float
+    low: float
+    high: float
+    to_si: float = 1.0
+    old: tuple[str, float] | None = None
+
+
+# By the field of `ArduPilotParameters`.
+DEFINITIONS = {
+    "navl1_period": Definition("NAVL1_PERIOD", 17.0, 1.0, 60.0),
+    "navl1_damping": Definition("NAVL1_DAMPING", 0.75, 0.3, 2.0),
+    "navl1_xtrack_i": Definition("NAVL1_XTRACK_I", 0.02, 0.0, 1.0),
+    "wp_radius": Definition("WP_RADIUS", 90.0, 0.0, 32767.0),
+    "wp_max_radius": Definition("WP_MAX_RADIUS", 0.0, 0.0, 32767.0),
+    "wp_loiter_rad": Definition("WP_LOITER_RAD", 60.0, -32767.0, 32767.0),
+    "roll_limit": Definition("ROLL_LIMIT_DEG", 45.0, 5.0, 90.0, _DEGREE, ("LIM_ROLL_CD", _CENTI)),
+    "pitch_limit_max": Definition("PTCH_LIM_MAX_DEG", 20.0, 0.0, 90.0, _DEGREE, ("LIM_PITCH_MAX", _CENTI)),
+    "pitch_limit_min": Definition("PTCH_LIM_MIN_DEG", -25.0, -90.0, 0.0, _DEGREE, ("LIM_PITCH_MIN", _CENTI)),
+    "pitch_trim": Definition("PTCH_TRIM_DEG", 0.0, -45.0, 45.0, _DEGREE, ("TRIM_PITCH_CD", _CENTI)),
+    "roll_time": Definition("RLL2SRV_TCONST", 0.5, 0.05, 10.0),
+    "pitch_time": Definition("PTCH2SRV_TCONST", 0.5, 0.05, 10.0),
+    "airspeed_cruise": Definition("AIRSPEED_CRUISE", 12.0, 1.0, 500.0, 1.0, ("TRIM_ARSPD_CM", _CENTI)),
+    "airspeed_min": Definition("AIRSPEED_MIN", 9.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MIN", 1.0)),
+    "airspeed_max": Definition("AIRSPEED_MAX", 22.0, 1.0, 500.0, 1.0, ("ARSPD_FBW_MAX", 1.0)),
+    "stall_prevention": Definition("STALL_PREVENTION", 1.0, 0.0, 1.0),
+    "throttle_min": Definition("THR_MIN", 0.0, -100.0, 100.0, _PERCENT),
+    "throttle_max": Definition("THR_MAX", 100.0, 1.0, 100.0, _PERCENT),
+    "throttle_cruise": Definition("TRIM_THROTTLE", 45.0, 0.0, 100.0, _PERCENT),
+    "throttle_slew": Definition("THR_SLEWRATE", 100.0, 0.0, 500.0, _PERCENT),
+    "glide_slope_min": Definition("GLIDE_SLOPE_MIN", 15.0, 0.0, 1000.0),
+    "glide_slope_threshold": Definition("GLIDE_SLOPE_THR", 5.0, 0.0, 100.0),
+    "tecs_climb_max": Definition("TECS_CLMB_MAX", 5.0, 0.1, 100.0),
+    "tecs_sink_min": Definition("TECS_SINK_MIN", 2.0, 0.1, 100.0),
+    "tecs_sink_max": Definition("TECS_SINK_MAX", 5.0, 0.0, 100.0),
+    "tecs_time": Definition("TECS_TIME_CONST", 5.0, 1.0, 20.0),
+    "tecs_throttle_damping": Definition("TECS_THR_DAMP", 0.5, 0.0, 5.0),
+    "tecs_integral": Definition("TECS_INTEG_GAIN", 0.3, 0.0, 2.0),
+    "tecs_vertical_acceleration": Definition("TECS_VERT_ACC", 7.0, 1.0, 50.0),
+    "tecs_speed_frequency": Definition("TECS_SPD_OMEGA", 2.0, 0.1, 10.0),
+    "tecs_roll_to_throttle": Definition("TECS_RLL2THR", 10.0, 0.0, 100.0),
+    "tecs_speed_weight": Definition("TECS_SPDWEIGHT", 1.0, 0.0, 2.0),
+    "tecs_pitch_damping": Definition("TECS_PTCH_DAMP", 0.3, 0.0, 5.0),
+    "tecs_pitch_max": Definition("TECS_PITCH_MAX", 15.0, 0.0, 90.0, _DEGREE),
+    "tecs_pitch_min": Definition("TECS_PITCH_MIN", 0.0, -90.0, 0.0, _DEGREE),
+    "tecs_height_demand_time": Definition("TECS_HDEM_TCONST", 3.0, 0.0, 20.0),
+    "rtl_altitude": Definition("RTL_ALTITUDE", 100.0, -1.0, 9000.0, 1.0, ("ALT_HOLD_RTL", _CENTI)),
+    "rtl_radius": Definition("RTL_RADIUS", 0.0, -32767.0, 32767.0),
+}
+# Read, and no flight of ours shows them: a return is flown as a leg to home at the last height, and ends the flight.
+NOT_FLOWN = ("RTL_ALTITUDE", "RTL_RADIUS")
+ARDUPILOT_PARAMETERS = record_dtype(*DEFINITIONS)
+
+
+class ParameterValue(NamedTuple):
+    """A parameter's value in ArduPlane's unit, and who states it."""
+
+    name: str
+    value: float
+    origin: Origin
+
+
+@dataclass(frozen=True, slots=True)
+class ArduPilotParameters:
+    """What ArduPlane flies with; all but the first three are those of `DEFINITIONS`, made of ``values``.
+
+    values: every parameter that the law knows, in the order of `DEFINITIONS`.
+    unused: names that the file states and the law has no use for.
+    source: the file that a person gave, "" for none.
+    navl1_period: s.  navl1_xtrack_i: 1/s.
+    wp_radius: m, turns begin this far before a right angle.  wp_max_radius: m, 0 for none.
+    wp_loiter_rad: m, of a loiter that states none, negative to the left.
+    roll_limit, pitch_limit_max, pitch_limit_min, pitch_trim: rad.
+    roll_time, pitch_time: s, in which an attitude is to follow its demand.
+    airspeed_cruise, airspeed_min, airspeed_max: m/s, equivalent airspeeds.
+    stall_prevention: 1 where a bank is narrowed, and the least airspeed raised, for the load in it; 0 where not.
+    throttle_min, throttle_max, throttle_cruise: 0..1.  throttle_slew: of the throttle's range, 1/s, 0 for no limit.
+    glide_slope_min: m, a leg that climbs or sinks less is flown as a step.
+    glide_slope_threshold: m, so far above a climbing slope it is drawn anew, 0 for never.
+    tecs_climb_max, tecs_sink_min, tecs_sink_max: m/s.
+    tecs_time: s.  tecs_vertical_acceleration: m/s^2.  tecs_speed_frequency: rad/s.
+    tecs_roll_to_throttle: m/s climb that a bank of 45 degrees takes.
+    tecs_pitch_max, tecs_pitch_min: rad, 0 for the pitch limits.
+    tecs_height_demand_time: s, of the height demand's lag.
+    rtl_altitude: m over home, negative for the present height.  rtl_radius: m, 0 for that of a loiter.
+    """
+
+    values: tuple[ParameterValue, ...]
+    unused: tuple[str, ...] = ()
+    source: str = ""
+    navl1_period: float = field(init=False)
+    navl1_damping: float = field(init=False)
+    navl1_xtrack_i: float = field(init=False)
+    wp_radius: float = field(init=False)
+    wp_max_radius: float = field(init=False)
+    wp_loiter_rad: float = field(init=False)
+    roll_limit: float = field(init=False)
+    pitch_limit_max: float = field(init=False)
+    pitch_limit_min: float = field(init=False)
+    pitch_trim: float = field(init=False)
+    roll_time: float = field(init=False)
+    pitch_time: float = field(init=False)
+    airspeed_cruise: float = field(init=False)
+    airspeed_min: float = field(init=False)
+    airspeed_max: float = field(init=False)
+    stall_prevention: float = field(init=False)
+    throttle_min: float = field(init=False)
+    throttle_max: float = field(init=False)
+    throttle_cruise: float = field(init=False)
+    throttle_slew: float = field(init=False)
+    glide_slope_min: float = field(init=False)
+    glide_slope_threshold: float = field(init=False)
+    tecs_climb_max: float = field(init=False)
+    tecs_sink_min: float = field(init=False)
+    tecs_sink_max: float = field(init=False)
+    tecs_time: float = field(init=False)
+    tecs_throttle_damping: float = field(init=False)
+    tecs_integral: float = field(init=False)
+    tecs_vertical_acceleration: float = field(init=False)
+    tecs_speed_frequency: float = field(init=False)
+    tecs_roll_to_throttle: float = field(init=False)
+    tecs_speed_weight: float = field(init=False)
+    tecs_pitch_damping: float = field(init=False)
+    tecs_pitch_max: float = field(init=False)
+    tecs_pitch_min: float = field(init=False)
+    tecs_height_demand_time: float = field(init=False)
+    rtl_altitude: float = field(init=False)
+    rtl_radius: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Take the values to SI."""
+        for (name, definition), parameter in zip(DEFINITIONS.items(), self.values, strict=True):
+            object.__setattr__(self, name, parameter.value * definition.to_si)
+
+    def changed(self, **values: float) -> "ArduPilotParameters":
+        """The same parameters but for these, by ArduPlane's names and in its units.
+
+        >>> default_parameters().changed(ROLL_LIMIT_DEG=30.0).roll_limit == math.radians(30.0)
+        True
+        """
+        kept = {parameter.name for parameter in self.values}
+        if unknown := sorted(set(values) - kept):
+            raise ValueError(f"{unknown[0]}: not a parameter of the law")
+        made = tuple(
+            parameter._replace(value=values[parameter.name], origin="file") if parameter.name in values else parameter
+            for parameter in self.values
+        )
+        return ArduPilotParameters(made, self.unused, self.source)
+
+    def by_origin(self, origin: Origin) -> dict[str, float]:
+        """The values (in ArduPlane's units) that one source states, by name."""
+        return {name: value for name, value, stated in self.values if stated == origin}
+
+    def record(self) -> Record:
+        """The parameters for compiled code, as a record of `ARDUPILOT_PARAMETERS`."""
+        record: Record = np.zeros(1, ARDUPILOT_PARAMETERS)[0]
+        for name in DEFINITIONS:
+            setattr(record, name, getattr(self, name))
+        return record
+
+
+def default_parameters() -> ArduPilotParameters:
+    """ArduPlane's own values, whatever it flies.
+
+    >>> default_parameters().wp_radius, default_parameters().tecs_height_demand_time
+    (90.0, 3.0)
+    """
+    return _parameters([], "", ())
+
+
+def load_parameters(aircraft: Aircraft, path: Path | str | None = None) -> ArduPilotParameters:
+    """The parameters that an aircraft is flown with: of a file, of the aircraft, and ArduPlane's defaults.
+
+    Raises ParameterError, in one line, for a file that cannot be read or states what is not allowed.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> load_parameters(load_aircraft("aerosonde")).wp_radius
+    90.0
+    """
+    stated: list[tuple[Origin, dict[str, float]]] = []
+    unused: tuple[str, ...] = ()
+    if path is not None:
+        values, unused = _known(read_parameter_file(Path(path)))
+        stated.append(("file", values))
+    own = aircraft.folder / AIRCRAFT_FILE
+    if own.exists():
+        stated.append(("aircraft", _known(read_parameter_file(own))[0]))
+    return _parameters(stated, "" if path is None else str(path), unused)
+
+
+def parameters_of(text: str, source: str) -> ArduPilotParameters:
+    r"""The parameters of a file's text alone, with ArduPlane's defaults.  Raises ParameterError.
+
+    >>> parameters_of("LIM_ROLL_CD 3000\nFOO 1\n", "old.parm").unused
+    ('FOO',)
+    """
+    values, unused = _known(parse_parameters(text, source))
+    return _parameters([("file", values)], source, unused)
+
+
+def stored_parameters(
+    values: Iterable[tuple[str, float, Origin]], unused: tuple[str, ...], source: str
+) -> ArduPilotParameters:
+    """Parameters that were recorded, by their present names; those that were not yet known have their defaults.
+
+    Raises ParameterError for a value that is not allowed.
+
+    >>> stored_parameters([("WP_RADIUS", 50.0, "file")], (), "a.parm").wp_radius
+    50.0
+    """
+    origins: dict[Origin, dict[str, float]] = {"file": {}, "aircraft": {}, "default": {}}
+    for name, value, origin in values:
+        if name in _BY_NAME:
+            definition, _ = _BY_NAME[name]
+            if not definition.low <= value <= definition.high:
+                raise _refused(source, name, value, f"allowed {definition.low:g}..{definition.high:g}")
+            origins[origin][name] = value
+    return _parameters(list(origins.items()), source, unused)
+
+
+def _parameters(
+    stated: list[tuple[Origin, dict[str, float]]], source: str, unused: tuple[str, ...]
+) -> ArduPilotParameters:
+    """Parameters of the first source that states each, and ArduPlane's default where none does."""
+
+    def found(definition: Definition) -> ParameterValue:
+        for origin, values in stated:
+            if definition.name in values:
+                return ParameterValue(definition.name, values[definition.name], origin)
+        return ParameterValue(definition.name, definition.default, "default")
+
+    made = ArduPilotParameters(tuple(map(found, DEFINITIONS.values())), unused, source)
+    if stated:
+        _check_order(made, source or AIRCRAFT_FILE)
+    return made
+
+
+def _check_order(made: ArduPilotParameters, source: str) -> None:
+    """Refuse a least that is not below its most."""
+    values = {name: value for name, value, _ in made.values}
+    for least, most in (("THR_MIN", "THR_MAX"), ("AIRSPEED_MIN", "AIRSPEED_MAX")):
+        if values[least] >= values[most]:
+            value, allowed = values[least], f"must be below {most} {values[most]:g}"
+            message = f"{source}: {least} {value:g}: {allowed}"
+            raise ParameterError(message, file=source, field=least, value=value, allowed=allowed)
+
+
+# Definition and factor to its unit, by each name that a file may have.
+_BY_NAME = {definition.name: (definition, 1.0) for definition in DEFINITIONS.values()} | {
+    definition.old[0]: (definition, definition.old[1]) for definition in DEFINITIONS.values() if definition.old
+}
+
+
+def _known(entries: Mapping[str, Entry]) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Values by their present names and in their present units, and the names that the law has no use for."""
+    values: dict[str, float] = {}
+    unused = []
+    for name, entry in entries.items():
+        if name not in _BY_NAME:
+            unused.append(name)
+            continue
+        definition, factor = _BY_NAME[name]
+        value = entry.value * factor
+        if not definition.low <= value <= definition.high:
+            raise _refused(
+                entry.where, name, entry.value, f"allowed {definition.low / factor:g}..{definition.high / factor:g}"
+            )
+        if values.setdefault(definition.name, value) != value:
+            raise _refused(entry.where, name, entry.value, "the same parameter has another value under its other name")
+    return values, tuple(unused)
+
+
+def _refused(where: TextLine | str, name: str, value: float, allowed: str) -> ParameterError:
+    """The error of a value.  where: its line; of one that was recorded, the source, which the message does not name."""
+    at, file = (f"{where}: ", where.file) if isinstance(where, TextLine) else ("", where)
+    return ParameterError(f"{at}{name}: {value:g}: {allowed}", file=file, field=name, value=value, allowed=allowed)
+
+
+# ----------------------------------------------------------------------
+# Which of a mission's airspeeds ArduPlane takes up.
+
+
+def takes_speed(airspeed: float, parameters: ArduPilotParameters) -> bool:
+    """Whether ArduPlane takes a commanded airspeed (m/s, equivalent): from AIRSPEED_MIN to AIRSPEED_MAX.
+
+    A command of another speed changes nothing: told to fly at 17 m/s with AIRSPEED_MIN at 18, ArduPlane 4.6 flew on at
+    its 25.
+
+    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> takes_speed(22.0, default_parameters()), takes_speed(22.1, default_parameters())
+    (True, False)
+    """
+    return parameters.airspeed_min <= airspeed <= parameters.airspeed_max
+
+
+def speeds_flown(commanded: Floats, cruise: float, parameters: ArduPilotParameters) -> Floats:
+    """Airspeeds (l,) that ArduPlane flies on each leg, of those commanded (l,); m/s, equivalent.
+
+    cruise: its airspeed until it takes up the first.
+
+    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> speeds_flown(np.array([8.0, 15.0, 30.0, 10.0]), 12.0, default_parameters()).tolist()
+    [12.0, 15.0, 15.0, 10.0]
+    """
+    flown = []
+    speed = cruise
+    for wanted in commanded.tolist():
+        speed = wanted if takes_speed(wanted, parameters) else speed
+        flown.append(speed)
+    return np.array(flown)

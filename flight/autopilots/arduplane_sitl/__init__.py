@@ -1,0 +1,1 @@
+"""ArduPlane itself: its program in lockstep with our physics."""

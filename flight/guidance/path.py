@@ -1,0 +1,319 @@
+"""The path that a fixed wing can fly: straight legs joined by fly-by arcs, slopes joined by parabolas.
+
+A fly-by arc has the bank-limited radius for the highest ground speed on its way, and the corners of a loiter that of
+its circle.  Where the legs are too short for their turns, arcs are drawn tighter than the bank limit so that the path
+stays whole: the flight will then leave it, and the verdict says so.  A fly-over waypoint is passed through: its corner
+stays sharp, as do U-turns.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import BLEND_ACCELERATION, Limits
+from flight.guidance.lateral_reference_laws import WAYPOINT
+from flight.mission.route import Route
+from world.geometry import leg_courses, leg_runs, signed_turns, tangent_length, wrap
+from world.kernels import Record, compiled, record_dtype
+
+Records = NDArray[np.record]
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Where on a `flight.guidance.path.FlyByPath` one is, its curvature, its height: for the compiled loop.
+
+
+# A straight piece or an arc of the path.
+PIECE = record_dtype(
+    "start",  # m along the path
+    "length",  # m
+    "east",  # m, of its start
+    "north",
+    "course",  # rad, at its start
+    "curvature",  # 1/m, positive to the right
+    ("leg", np.int64),  # of its start
+    "leg_change",  # m along the path where the next leg begins; infinite where it does not
+)
+# A corner of the height profile and the parabola that blends it.
+NODE = record_dtype(
+    "distance",  # m along the path
+    "height",  # m
+    "slope",  # tangent, after it
+    "half_length",  # m, of its parabola
+)
+
+
+@compiled
+def project(piece: Record, east: float, north: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Distance along a piece (m), cross-track error to the right (m) and the path's course there (rad)."""
+    course, curvature = piece.course, piece.curvature
+    de, dn = east - piece.east, north - piece.north
+    if curvature == 0.0:
+        return (
+            de * math.sin(course) + dn * math.cos(course),
+            de * math.cos(course) - dn * math.sin(course),
+            course,
+        )
+    # From the centre, which lies right of the start by 1 / curvature.
+    ve = de - math.cos(course) / curvature
+    vn = dn + math.sin(course) / curvature
+    side = math.copysign(1.0, curvature)
+    here = math.atan2(side * vn, -side * ve)
+    turned = wrap(here - course) * side
+    if turned < -0.5 * math.pi:
+        turned += 2.0 * math.pi
+    return turned / abs(curvature), side * (1.0 / abs(curvature) - math.hypot(ve, vn)), here
+
+
+@compiled
+def mean_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+    """Mean curvature of the path between two distances, both at or after piece ``k``, 1/m."""
+    total = 0.0
+    for i in range(k, pieces.shape[0]):
+        piece = pieces[i]
+        low = max(start, piece.start)
+        high = min(end, piece.start + piece.length)
+        if high > low:
+            total += piece.curvature * (high - low)
+        if piece.start > end:
+            break
+    return total / (end - start)
+
+
+@compiled
+def most_curvature(pieces: Records, k: int, start: float, end: float) -> float:  # pragma: no cover - compiled
+    """Sharpest curvature of the path between two distances, both at or after piece ``k``, 1/m, positive."""
+    most = 0.0
+    for i in range(k, pieces.shape[0]):
+        piece = pieces[i]
+        if piece.start > end:
+            break
+        if piece.start + piece.length > start:
+            most = max(most, abs(piece.curvature))
+    return most
+
+
+@compiled
+def profile(nodes: Records, s: float) -> tuple[float, float, float]:  # pragma: no cover - compiled
+    """Height (m), slope (tangent) and its change per metre of the height profile at distance ``s``."""
+    k = 0
+    while k + 1 < nodes.shape[0] and nodes[k + 1].distance <= s:
+        k += 1
+    for i in range(k, min(k + 2, nodes.shape[0])):
+        node = nodes[i]
+        half = node.half_length
+        if half > 0.0 and abs(s - node.distance) < half:
+            before = nodes[max(i - 1, 0)].slope
+            bend = (node.slope - before) / (2.0 * half)
+            x = s - node.distance + half
+            return node.height + before * (x - half) + 0.5 * bend * x * x, before + bend * x, bend
+    node = nodes[k]
+    return node.height + node.slope * (s - node.distance), node.slope, 0.0
+
+
+# Where the legs are too short for a turn sharper than this, its corner stays: a tighter arc would cut the waypoint off
+# by most of the legs, and a U-turn has no arc at all.
+SHARPEST = math.radians(150.0)
+# Chords of an arc turn by at most this, rad.
+CHORD = math.radians(5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class FlyByPath:
+    """A path by distance along it.
+
+    pieces: (p,) of `flight.guidance.path.PIECE`, straight pieces and arcs.
+    nodes: (k,) of `flight.guidance.path.NODE`, the corners of the height profile.
+    length: m.
+    """
+
+    pieces: Records
+    nodes: Records
+    length: float
+
+    def __post_init__(self) -> None:
+        """Lock the arrays."""
+        self.pieces.setflags(write=False)
+        self.nodes.setflags(write=False)
+
+
+def fly_by_path(route: Route, limits: Limits) -> FlyByPath:
+    """Join the legs of a route.  The route has at least one leg, and no leg without horizontal length.
+
+    A right angle, flown with 0.5 rad of bank at 25 m/s in calm air, is an arc of 117 m:
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from flight.simulation.setup import make_limits
+    >>> from world.scenario import load_scenario
+    >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
+    >>> way = np.array([[0.0, 0.0, 500.0], [0.0, 1000.0, 500.0], [1000.0, 1000.0, 520.0]])
+    >>> no = np.zeros(3, dtype=bool)
+    >>> path = fly_by_path(Route(way, np.full(2, 25.0), np.zeros(3), no, np.arange(3), ""), limits)
+    >>> path.pieces["length"].round().tolist(), round(1.0 / path.pieces["curvature"][1])
+    ([883.0, 183.0, 883.0], 117)
+    """
+    points = route.waypoints
+    courses, runs, turns = leg_courses(points), leg_runs(points), signed_turns(points)
+    tangents, radii = _arcs(route, limits, courses, runs, turns)
+    pieces: list[tuple[float, ...]] = []
+    nodes: list[tuple[float, float]] = [(0.0, float(points[0, 2]))]
+    slopes = np.diff(points[:, 2]) / runs
+    at = 0.0
+    begin = points[0, :2].copy()
+    for leg in range(route.legs):
+        straight = runs[leg] - tangents[leg] - tangents[leg + 1]
+        course = float(courses[leg])
+        if straight > 1e-6 or not pieces:
+            pieces.append((at, straight, *begin, course, 0.0, leg, math.inf))
+            at += straight
+        corner = points[leg + 1]
+        begin = corner[:2] - tangents[leg + 1] * np.array([math.sin(course), math.cos(course)])
+        entry = float(corner[2] - slopes[leg] * tangents[leg + 1])
+        nodes.append((at, entry))
+        if leg + 1 == route.legs or tangents[leg + 1] == 0.0:
+            continue
+        turn = float(turns[leg])
+        length = radii[leg + 1] * abs(turn)
+        pieces.append((at, length, *begin, course, math.copysign(1.0 / radii[leg + 1], turn), leg, at + length / 2))
+        at += length
+        after = float(courses[leg + 1])
+        begin = corner[:2] + tangents[leg + 1] * np.array([math.sin(after), math.cos(after)])
+        nodes.append((at, float(corner[2] + slopes[leg + 1] * tangents[leg + 1])))
+    return FlyByPath(np.array(pieces, PIECE), _profile(nodes, limits, route), float(at))
+
+
+def _arcs(route: Route, limits: Limits, courses: Floats, runs: Floats, turns: Floats) -> tuple[Floats, Floats]:
+    """Tangent lengths and radii at each waypoint, (w,) m, shrunk where a leg is too short for them."""
+    count = len(route.waypoints)
+    tangents, radii = np.zeros(count), np.zeros(count)
+    for i in range(1, count - 1):
+        turn = abs(float(turns[i - 1]))
+        if route.fly_over[i] or turn < 1e-6:
+            continue
+        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
+        radius = float(route.arcs[i]) or limits.turn_radius(
+            float(courses[i - 1]), float(courses[i]), float(route.waypoints[i, 2]), speed
+        )
+        tangents[i] = tangent_length(turn, radius)
+    sharp = np.concatenate([[False], np.abs(turns) > SHARPEST, [False]])
+    short = tangents[:-1] + tangents[1:] > runs
+    tangents[sharp & (np.append(short, False) | np.append(False, short))] = 0.0
+    # Where the wind leaves no way along a leg there is no radius; the longest that fits is drawn.
+    tangents[1:-1] = np.minimum(tangents[1:-1], np.minimum(runs[:-1], runs[1:]))
+    wanted = tangents.copy()
+    for leg in range(len(runs)):
+        both = wanted[leg] + wanted[leg + 1]
+        if both > runs[leg]:
+            share = runs[leg] / both
+            tangents[leg] = min(tangents[leg], wanted[leg] * share)
+            tangents[leg + 1] = min(tangents[leg + 1], wanted[leg + 1] * share)
+    drawn = np.flatnonzero(tangents)
+    radii[drawn] = tangents[drawn] / np.tan(np.abs(turns[drawn - 1]) / 2)
+    return tangents, radii
+
+
+def _profile(corners: list[tuple[float, float]], limits: Limits, route: Route) -> Records:
+    """Corners of the height profile with the parabola that blends each."""
+    at, up = np.array(corners).T
+    keep = np.concatenate([[True], np.diff(at) > 1e-3])
+    # Of two corners at one distance the later one is on the leg that follows.
+    at, up = at[keep], up[keep]
+    slopes = np.diff(up) / np.diff(at)
+    after = np.concatenate([slopes, slopes[-1:]])
+    change = np.concatenate([[0.0], np.diff(slopes), [0.0]])
+    speed = float(route.airspeed.max()) + limits.wind.strongest(route.waypoints[:, 2])
+    half = np.abs(change) * speed**2 / (2.0 * BLEND_ACCELERATION)
+    gaps = np.diff(at)
+    available = 0.5 * np.minimum(np.concatenate([[np.inf], gaps]), np.concatenate([gaps, [np.inf]]))
+    nodes: Records = np.empty(at.size, NODE)
+    nodes["distance"], nodes["height"], nodes["slope"] = at, up, after
+    nodes["half_length"] = np.minimum(half, available)
+    return nodes
+
+
+def waypoint_records(route: Route) -> Records:
+    """(w,) of `flight.guidance.lateral_reference_laws.WAYPOINT`; the last one has its leg's airspeed before it."""
+    waypoints: Records = np.zeros(len(route.waypoints), WAYPOINT)
+    waypoints["east"], waypoints["north"] = route.waypoints[:, 0], route.waypoints[:, 1]
+    waypoints["turn"][1:-1] = np.abs(signed_turns(route.waypoints))
+    # A stated radius is what switches legs; only where there is none is a fly-over waypoint passed through.
+    waypoints["fly_over"], waypoints["acceptance"] = route.fly_over & (route.acceptance == 0.0), route.acceptance
+    waypoints["airspeed"] = np.append(route.airspeed, route.airspeed[-1])
+    waypoints["up"] = route.waypoints[:, 2]
+    _set_circles(waypoints[1:-1], route)
+    return waypoints
+
+
+def _set_circles(corners: Records, route: Route) -> None:
+    """Radius and centre of the loiter that each of a route's corners belongs to."""
+    turns, courses = signed_turns(route.waypoints), leg_courses(route.waypoints)
+    corners["circle"] = np.where(np.abs(turns) < 1e-6, 0.0, np.copysign(route.arcs[1:-1], turns))
+    # The centre is square to the course in the middle of the turn.
+    middle = courses[:-1] + 0.5 * turns
+    out = corners["circle"] / np.cos(0.5 * turns)
+    corners["centre_east"] = corners["east"] + out * np.cos(middle)
+    corners["centre_north"] = corners["north"] - out * np.sin(middle)
+    # A loiter's height is that of its item, which the last of its corners has.
+    items = route.items[1:-1]
+    for i in range(len(corners) - 2, -1, -1):
+        if corners[i].circle != 0.0 and corners[i + 1].circle != 0.0 and items[i] == items[i + 1]:
+            corners[i].up = corners[i + 1].up
+
+
+def _piece_index(path: FlyByPath, distances: Floats) -> NDArray[np.intp]:
+    return np.maximum(0, np.searchsorted(path.pieces["start"], distances, side="right") - 1)
+
+
+def _point_at(path: FlyByPath, s: float) -> tuple[float, float, float]:
+    piece: Record = path.pieces[_piece_index(path, np.asarray(s))]
+    east, north = arc_point(piece, s - piece.start)
+    return east, north, float(profile(path.nodes, s)[0])
+
+
+def path_polyline(path: FlyByPath) -> tuple[Floats, NDArray[np.int64]]:
+    """The path as a chain of points (n, 3), and the leg of each of its n - 1 segments.
+
+    Chords of arcs turn by at most `CHORD`; on a 160 m radius they leave the arc by 0.15 m.
+
+    >>> level = np.array([(0.0, 500.0, 0.0, 0.0), (900.0, 500.0, 0.0, 0.0)], NODE)
+    >>> north = np.array([(0.0, 900.0, 0.0, 0.0, 0.0, 0.0, 0, math.inf)], PIECE)
+    >>> points, legs = path_polyline(FlyByPath(north, level, 900.0))
+    >>> points.tolist(), legs.tolist()
+    ([[0.0, 0.0, 500.0], [0.0, 900.0, 500.0]], [0])
+    """
+    stops = [0.0, path.length]
+    for piece in path.pieces:
+        parts = max(1, math.ceil(abs(piece.curvature) * piece.length / CHORD))
+        stops += [piece.start + piece.length * k / parts for k in range(parts + 1)]
+        if math.isfinite(piece.leg_change):
+            stops.append(piece.leg_change)
+    for node in path.nodes:
+        stops += [node.distance + node.half_length * share for share in (-1.0, -0.5, 0.0, 0.5, 1.0)]
+    inside = np.clip(np.array(stops), 0.0, path.length)
+    distances = np.unique(np.round(inside, 6))
+    points = np.array([_point_at(path, float(s)) for s in distances])
+    middles = 0.5 * (distances[1:] + distances[:-1])
+    pieces = path.pieces[_piece_index(path, middles)]
+    return points, (pieces["leg"] + (middles > pieces["leg_change"])).astype(np.int64)
+
+
+def arc_point(piece: Record, along: float) -> tuple[float, float]:
+    """East and north (m) on a piece, a record of `flight.guidance.path.PIECE`, ``along`` m from its start.
+
+    >>> quarter = np.array([(0.0, 157.0, 0.0, 0.0, 0.0, 0.01, 0, math.inf)], PIECE)[0]
+    >>> east, north = arc_point(quarter, 50.0 * math.pi)
+    >>> round(float(east), 6), round(float(north), 6)
+    (100.0, 100.0)
+    """
+    course, curvature = piece.course, piece.curvature
+    if curvature == 0.0:
+        return piece.east + along * math.sin(course), piece.north + along * math.cos(course)
+    turned = course + curvature * along
+    return (
+        piece.east + (math.cos(course) - math.cos(turned)) / curvature,
+        piece.north + (math.sin(turned) - math.sin(course)) / curvature,
+    )

@@ -1,0 +1,279 @@
+"""Everything that decides a flight, fixed before it starts."""
+
+import copy
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from aircraft.envelope import Envelope
+from aircraft.path_limits import Limits
+from aircraft.tracking import corridor_half_width
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.guidance.path import FlyByPath, fly_by_path
+from flight.mission.items import Mission
+from flight.mission.route import Route
+from planner.plan import Plan
+from world.scenario import Scenario
+from world.scenario_tables import Guidance, Navigation
+
+# ----------------------------------------------------------------------
+# The real autopilot that flew a flight, as a program of its own: what it is, and what it was set to.
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotProgram:
+    """Which program steered a flight.
+
+    version: what it calls itself.
+    sha256: of its file, hex.
+    parameters: by name, what it was given over its own defaults, as it had them.
+    changed: those of them that a person's file stated otherwise than the aircraft's.
+    unused: names in the person's file that it does not know, or that belong to other hardware.
+    """
+
+    version: str
+    sha256: str
+    parameters: Mapping[str, float]
+    changed: Mapping[str, float]
+    unused: tuple[str, ...] = ()
+
+
+# ----------------------------------------------------------------------
+# Where a flight is from that was not flown by planfly: a log of the field, and what that log can carry.
+
+# "amsl": above mean sea level as the vehicle has it.  "ellipsoid": above WGS 84's.  "pressure": above the level of
+# 1013.25 hPa.  "unstated": the log does not say.
+VerticalDatum = Literal["amsl", "ellipsoid", "pressure", "unstated"]
+
+# What rules ask for beside a time and a place.
+Quantity = Literal["attitude", "airspeed", "wind", "battery", "throttle", "heights", "velocity"]
+
+# Why a stretch ended: another mode was set, the log ends, the aircraft had landed.
+StretchEnd = Literal["mode", "log", "landed"]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionStretch:
+    """A stretch flown along the mission.
+
+    start, end: s of the log's clock.
+    mode: the vehicle's name for it, "" of a log that knows no modes.
+    ended: why it ended.
+    next_mode: the mode that was set, "" where none was.
+    """
+
+    start: float
+    end: float
+    mode: str
+    ended: StretchEnd
+    next_mode: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class HeightOffset:
+    """How much higher another height of the log was than the one taken, m, at the start of what is judged."""
+
+    name: str
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
+class Heights:
+    """Which of a log's heights was taken.
+
+    source: the message and field.  datum: vertical datum.
+    offsets: of the log's other heights.
+    """
+
+    source: str
+    datum: VerticalDatum
+    offsets: tuple[HeightOffset, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """What of a file could not be read.
+
+    places: how many stretches of it.  size: their bytes.  cut: it ends within a message.  unreadable: messages that
+    were whole and held no numbers that could be used.
+    """
+
+    places: int = 0
+    size: int = 0
+    cut: bool = False
+    unreadable: int = 0
+
+    @property
+    def lossy(self) -> bool:
+        """Whether anything but the file's end is lost."""
+        return self.places > 0 or self.unreadable > 0
+
+
+@dataclass(frozen=True, slots=True)
+class RowFaults:
+    """What was wrong with a log's rows, and how often.
+
+    doubled: rows that came twice.  unordered: rows out of the order of their times.  unusable: rows without a place.
+    glitches: places that the aircraft cannot have been at.  clock_jumps: times (s) at which the clock jumped.
+    """
+
+    doubled: int = 0
+    unordered: int = 0
+    unusable: int = 0
+    glitches: int = 0
+    clock_jumps: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A pause (s) between two rows."""
+
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSource:
+    """A log of the field as the source of a flight.
+
+    file: its name.  sha256: of its bytes.
+    format: for people.  program: what flew, "" where the log does not say.
+    utc_start: s since 1970 at time 0; NaN where it is not known.
+    holds: what the log holds beside times and places, and the plan of heights.
+    stretches: what is judged; the rest is shown.
+    heights: which was taken.
+    wind: where the wind is from: "XKF2", "" for none.
+    mission: where the mission is from: "CMD of the log, at 22.4 s", or a file.
+    plan_heights: whether the mission states heights.
+    aircraft_known: whether the aircraft was named; if not, none of its limits count.
+    gaps: pauses between rows, over the whole of what was imported.
+    faults: of its rows.  damage: of the file.
+    notes: what else a person should know, in sentences.
+
+    >>> FieldSource("a.BIN", "", "ArduPilot dataflash log", "ArduPlane V4.6.0", holds=("attitude",)).holds
+    ('attitude',)
+    """
+
+    file: str
+    sha256: str
+    format: str
+    program: str = ""
+    utc_start: float = math.nan
+    holds: tuple[Quantity, ...] = ()
+    stretches: tuple[MissionStretch, ...] = ()
+    heights: Heights = field(default_factory=lambda: Heights("", "unstated"))
+    wind: str = ""
+    mission: str = ""
+    plan_heights: bool = True
+    aircraft_known: bool = False
+    gaps: tuple[Gap, ...] = ()
+    faults: RowFaults = field(default_factory=RowFaults)
+    damage: Damage = field(default_factory=Damage)
+    notes: tuple[str, ...] = ()
+
+
+# Steps of JSBSim a second, but for campaigns.
+FDM_HZ: Literal[120] = 120
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSetup:
+    """What is flown, by what, in which world; the log carries all of it.
+
+    scenario: the world, and what it asks of the flight.
+    mission: its items, as read or exported.
+    mission_text: the same as a .waypoints file, as flown.
+    route: the waypoints that the mission comes to.
+    limits: of scenario and aircraft together, made where the aircraft is loaded.
+    aircraft: its name in the catalog, or its folder.
+    battery: energy carried, Wh.
+    seed: of the flight; the turbulence's stream comes from it unless the scenario's wind has its own.
+    plan: None for a mission that a person brought.
+    guidance: the law that steers where ``parameters`` is None.
+    nav: how well it knows where it is, a key of `flight.guidance.navigation_error.ERRORS`.
+    guidance_hz: how often it steers, and how many rows the track has a second.
+    fdm_hz: steps of JSBSim a second.
+    parameters: of the ArduPlane that flies; None where planfly's guidance does.
+    program: the real autopilot that flies; None where planfly's guidance or its law of ArduPlane does.
+    source: the log of the field that the flight is from; None for a flight of planfly's own.
+    path: that is to be followed, of route and limits.
+    """
+
+    scenario: Scenario
+    mission: Mission
+    mission_text: str
+    route: Route
+    limits: Limits
+    aircraft: str
+    battery: float
+    seed: int
+    plan: Plan | None = None
+    guidance: Guidance = "path"
+    nav: Navigation = "perfect"
+    guidance_hz: Literal[30, 60] = 60
+    fdm_hz: Literal[60, 120] = FDM_HZ
+    parameters: ArduPilotParameters | None = None
+    program: AutopilotProgram | None = None
+    source: FieldSource | None = None
+    path: FlyByPath = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Draw the path here, where it cannot differ from route and limits."""
+        object.__setattr__(self, "path", fly_by_path(self.route, self.limits))
+
+    @property
+    def envelope(self) -> Envelope:
+        """Table of the aircraft's climbs, descents, speeds and powers."""
+        return self.limits.envelope
+
+    @property
+    def corridor(self) -> float:
+        """Half width of the corridor about the legs that the flight has to stay in, m."""
+        radius = None if self.parameters is None else self.parameters.wp_radius
+        return corridor_half_width(self.scenario.limits.corridor_m, radius)
+
+    @property
+    def airspeed(self) -> float:
+        """Airspeed until the mission sets another, m/s."""
+        return self.limits.airspeed
+
+    @property
+    def max_bank(self) -> float:
+        """Steepest bank in turns, rad."""
+        return self.limits.max_bank
+
+    def in_scenario(self, scenario: Scenario) -> "FlightSetup":
+        """Set the same flight in another scenario; route, limits and path stay as they are."""
+        moved = copy.copy(self)
+        object.__setattr__(moved, "scenario", scenario)
+        return moved
+
+
+def make_limits(scenario: Scenario, envelope: Envelope, airspeed: float, max_bank: float) -> Limits:
+    """Limits of a path: the scenario's, with the aircraft's where the scenario leaves them to it.
+
+    airspeed: m/s.  max_bank: rad; the envelope's is used where it is less.
+
+    >>> from aircraft.catalog import load_aircraft
+    >>> from flight.dynamics.envelope_tables import load_envelope
+    >>> from world.scenario import load_scenario
+    >>> limits = make_limits(load_scenario("tight"), load_envelope(load_aircraft("aerosonde")), 25.0, 0.5)
+    >>> limits.min_clearance, limits.max_bank, limits.max_turn is None
+    (60.0, 0.5, False)
+    """
+
+    def number(value: float | str) -> float | None:
+        return None if isinstance(value, str) else math.radians(value)
+
+    table = scenario.limits
+    return Limits(
+        max_turn=number(table.max_turn_deg),
+        max_climb=number(table.max_climb_deg),
+        max_dive=number(table.max_dive_deg),
+        min_clearance=table.min_clearance_m,
+        envelope=envelope,
+        airspeed=airspeed,
+        max_bank=min(max_bank, envelope.max_bank),
+        wind=scenario.wind,
+    )

@@ -1,0 +1,411 @@
+"""A flight in other programs' forms: a table (`.csv`, `.parquet`), a telemetry log (`.tlog`), a log of PX4 (`.ulg`)."""
+
+import csv
+import io
+import struct
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from flight.live.mission_server import listed, to_message
+from flight.live.telemetry import (
+    ACTIVE,
+    AUTO,
+    COMPLETE,
+    CRITICAL,
+    INFO,
+    PERIODS,
+    WARNING,
+    SnapshotMaker,
+    Status,
+    status_texts,
+    telemetry_message,
+)
+from flight.mission.items import OVER_HOME, Home
+from flight.simulation.airborne import LocalMap
+from flight.simulation.track import PITCH, ROLL, THROTTLE, YAW, track_rows
+from logs.recording.reader import FlightLog
+from logs.recording.state_channel import EPOCH_NS, FIELDS
+from world.errors import PlanflyError
+from world.frames import to_geo
+
+Floats = NDArray[np.float64]
+Columns = NDArray[Any]
+
+
+# ----------------------------------------------------------------------
+# The flown rows as a table for spreadsheets and data frames: `.csv`, and `.parquet` where pyarrow is installed.
+
+
+def flight_columns(log: FlightLog) -> dict[str, NDArray[Any]]:
+    """Columns (t,) by name: those of a log's `/state` messages, and after the time where on Earth the aircraft was.
+
+    Each name ends with its unit; courses and the axes east and north are the map's about the scenario's origin.
+
+    >>> from logs.recording.example_log import example_log
+    >>> columns = flight_columns(example_log())
+    >>> list(columns)[:6], len(columns["time_s"])
+    (['time_s', 'latitude_deg', 'longitude_deg', 'east_m', 'north_m', 'up_amsl_m'], 366)
+    """
+    track = log.track
+    lat, lon = to_geo(log.setup.scenario.origin, track.position[:, 0], track.position[:, 1])
+    columns: dict[str, NDArray[Any]] = {}
+    for field in FIELDS:
+        columns[field.name] = field.of(getattr(track, field.source))
+        if field.name == "time_s":
+            columns["latitude_deg"], columns["longitude_deg"] = np.asarray(lat), np.asarray(lon)
+    return columns
+
+
+def csv_text(log: FlightLog) -> str:
+    """The table as CSV: a line of names, then a line a row; each number as short as reads back to the same one.
+
+    >>> from logs.recording.example_log import example_log
+    >>> csv_text(example_log()).splitlines()[1].split(",")[:6]
+    ['0.0', '45.99999981773182', '7.993545330437746', '-500.0', '0.0', '200.0']
+    """
+    columns = flight_columns(log)
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(columns)
+    # A float32's own shortest digits: as a double it would have sixteen.
+    writer.writerows(zip(*(column.astype(np.str_).tolist() for column in columns.values()), strict=True))
+    return out.getvalue()
+
+
+def parquet_bytes(log: FlightLog) -> bytes:
+    """The table as a Parquet file, in the types of the log, with the scenario's name and origin as metadata.
+
+    Raises PlanflyError where pyarrow is not installed.
+
+    >>> from logs.recording.example_log import example_log
+    >>> parquet_bytes(example_log())[:4]
+    b'PAR1'
+    """
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        allowed = "the package pyarrow is not installed (extra: planfly[tables])"
+        raise PlanflyError(f".parquet: {allowed}", field="suffix", value=".parquet", allowed=allowed) from error
+    scenario = log.setup.scenario
+    about = {
+        "planfly.scenario": scenario.name,
+        "planfly.origin_lat_deg": repr(scenario.origin.lat_deg),
+        "planfly.origin_lon_deg": repr(scenario.origin.lon_deg),
+        "planfly.ended": log.ended or "",
+    }
+    table = pa.table(flight_columns(log)).replace_schema_metadata(about)
+    sink = io.BytesIO()
+    parquet.write_table(table, sink, compression="zstd")
+    return sink.getvalue()
+
+
+# ----------------------------------------------------------------------
+# A flight as the telemetry log (`.tlog`) that a ground station would have kept of it.
+#
+# The form is Mission Planner's, MAVProxy's and pymavlink's: before each MAVLink frame the time that it came at, eight
+# bytes, microseconds since 1970, the highest first.  Frames are those of the live vehicle, at its rates; the clock is
+# the
+# log's own, which begins with the year 2000.
+
+_STAMP = struct.Struct(">Q")
+_HEARTBEATS = 1.0  # s
+_SEVERITY = {"debug": INFO, "info": INFO, "warning": WARNING, "error": CRITICAL, "fatal": CRITICAL}
+_VEHICLE, _STATION = (1, mavlink.MAV_COMP_ID_AUTOPILOT1), (255, mavlink.MAV_COMP_ID_MISSIONPLANNER)
+
+
+def telemetry_bytes(log: FlightLog) -> bytes:
+    """Bytes of the `.tlog`: the mission as it was uploaded, then telemetry, waypoints reached, and events as texts.
+
+    >>> from logs.recording.example_log import example_log
+    >>> data = telemetry_bytes(example_log())
+    >>> struct.unpack(">Q", data[:8])[0] == EPOCH_NS // 1000, data[8] == 0xFD  # the first frame is of MAVLink 2
+    (True, True)
+    """
+    senders = {ends: mavlink.MAVLink(None, *ends) for ends in (_VEHICLE, _STATION)}
+    out = bytearray()
+    for time, ends, message in _frames(log):
+        sender = senders[ends]
+        out += _STAMP.pack(EPOCH_NS // 1000 + round(time * 1e6)) + message.pack(sender)
+        sender.seq = (sender.seq + 1) % 256
+    return bytes(out)
+
+
+def _frames(log: FlightLog) -> Iterator[tuple[float, tuple[int, int], Any]]:
+    """Messages in order: when (s of the flight), from whom, and what."""
+    for message in _upload(log):
+        yield 0.0, _STATION, message
+    for time, message in _told(log):
+        yield time, _VEHICLE, message
+
+
+def _upload(log: FlightLog) -> Iterator[Any]:
+    items, _, _ = listed(log.setup.mission)
+    yield mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+    yield mavlink.MAVLink_mission_count_message(1, 1, len(items), 0)
+    for item in items:
+        yield to_message(item)
+
+
+def _told(log: FlightLog) -> Iterator[tuple[float, Any]]:
+    setup, track = log.setup, log.track
+    snapshots = SnapshotMaker(setup, LocalMap.around(setup))
+    start = snapshots.before_start(setup)
+    home = setup.mission.home or Home(start.lat_deg, start.lon_deg, start.amsl)
+    status = Status(start, home, battery=setup.battery, mode=AUTO, armed=True, flying=True, mission_state=ACTIVE)
+    status.total, items = len(setup.mission.items), setup.route.items
+    numbers = {item.seq: k for k, item in enumerate(setup.mission.items, 1)}
+    due = {"HEARTBEAT": 0.0, **dict.fromkeys(PERIODS, 0.0)}
+    events, texts, leg = list(log.events), 0, -1
+    rows = track_rows(track)
+    for row, time in zip(rows, track.time.tolist(), strict=True):
+        while events and events[0].time <= time:
+            texts += 1
+            event = events.pop(0)
+            for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
+                yield time, piece
+        now = [name for name, at in due.items() if time >= at - 1e-6]
+        if not now and int(row.leg) == leg:
+            continue
+        snapshot = snapshots.snapshot(row)
+        if not snapshot.finite:
+            continue
+        status.snapshot, status.boot, status.wall = snapshot, time, EPOCH_NS / 1e9 + time
+        if int(row.leg) != leg:
+            passed = items[max(0, leg + 1) : int(row.leg) + 1]
+            leg = int(row.leg)
+            for item in passed[passed >= 0].tolist():
+                yield time, mavlink.MAVLink_mission_item_reached_message(numbers[item])
+            ahead = items[leg + 1 :]
+            status.current = numbers[int(ahead[ahead >= 0][0])] if np.any(ahead >= 0) else status.current
+            yield time, telemetry_message("MISSION_CURRENT", status)
+        for name in now:
+            due[name] += max(PERIODS.get(name, _HEARTBEATS), 1e-3)
+            yield time, telemetry_message(name, status)
+    end = float(track.time[-1]) if len(track) else 0.0
+    for event in events:
+        texts += 1
+        for piece in status_texts(event.text, _SEVERITY.get(event.level, INFO), texts):
+            yield end, piece
+    status.armed = status.flying = False
+    status.mission_state = COMPLETE if log.ended == "completed" else ACTIVE
+    for name in ("HEARTBEAT", "MISSION_CURRENT"):
+        yield end, telemetry_message(name, status)
+
+
+# ----------------------------------------------------------------------
+# A flight as a log of PX4 (`.ulg`): its topics and fields, by PX4's "ULog File Format", which pyulog cannot make anew.
+#
+# World axes of a local position are north, east and down about the scenario's origin, as PX4 has them about its own;
+# the
+# attitude turns from there to forward, right and down.  Timestamps are microseconds since the flight's start.
+
+
+_MAGIC = b"ULog\x01\x12\x35\x01"
+_FLAG_BITS = 40  # bytes of the flags' message
+_TYPES = {"<u8": "uint64_t", "<f8": "double", "<f4": "float", "u1": "uint8_t", "<u2": "uint16_t", "?": "bool"}
+# Letters of log levels, of syslog: error, warning, info, debug.
+_LEVELS = {"debug": b"7", "info": b"6", "warning": b"4", "error": b"3", "fatal": b"2"}
+# vehicle_status: armed, in a mission, a fixed wing.
+_ARMED, _MISSION, _FIXED_WING = 2, 3, 2
+# Seconds between messages of a topic; the fast ones have every row.
+_FAST, _SLOW, _SECOND = 0.0, 0.1, 1.0
+# The standard atmosphere: air density over that at sea level is (1 - _LAPSE h) to this power.
+_LAPSE, _POWER = 2.25577e-5, 4.2559
+
+
+class _Topic(NamedTuple):
+    """A topic: its fields after the timestamp, numpy type and shape, and a value for each of the log's good rows."""
+
+    name: str
+    period: float
+    fields: list[tuple[Any, ...]]
+    values: dict[str, Columns]
+
+
+def px4_log_bytes(log: FlightLog) -> bytes:
+    r"""Bytes of the `.ulg`; rows without a position are left out.
+
+    >>> from logs.recording.example_log import example_log
+    >>> px4_log_bytes(example_log())[:7]
+    b'ULog\x01\x125'
+    """
+    good = np.isfinite(log.track.position).all(axis=1) & np.isfinite(log.track.attitude).all(axis=1)
+    topics = [topic for topic in _topics(log, np.flatnonzero(good)) if len(topic.values["timestamp"])]
+    head = bytearray(_MAGIC + struct.pack("<Q", 0) + _message(b"B", bytes(_FLAG_BITS)))
+    for topic in topics:
+        head += _message(b"F", f"{topic.name}:{_format(topic)}".encode())
+    for key, value in (("sys_name", "planfly"), ("ver_hw", "SITL"), ("sys_uuid", "planfly")):
+        name = f"char[{len(value)}] {key}".encode()
+        head += _message(b"I", bytes([len(name)]) + name + value.encode())
+    for parameter in () if log.setup.parameters is None else log.setup.parameters.values:
+        name = f"float {parameter.name}".encode()
+        head += _message(b"P", bytes([len(name)]) + name + struct.pack("<f", parameter.value))
+    for number, topic in enumerate(topics):
+        head += _message(b"A", struct.pack("<BH", 0, number) + topic.name.encode())
+    stamps, pieces = [], []
+    for number, topic in enumerate(topics):
+        times, records = _records(number, topic)
+        stamps += times
+        pieces += records
+    for event in log.events:
+        stamp = round(event.time * 1e6)
+        body = _LEVELS.get(event.level, b"6") + struct.pack("<Q", stamp) + event.text.encode()
+        stamps.append(stamp)
+        pieces.append(_message(b"L", body))
+    order = np.argsort(np.array(stamps, dtype=np.int64), kind="stable")
+    return bytes(head) + b"".join(pieces[k] for k in order.tolist())
+
+
+def _message(letter: bytes, body: bytes) -> bytes:
+    return struct.pack("<H", len(body)) + letter + body
+
+
+def _format(topic: _Topic) -> str:
+    """The fields as ULog describes them."""
+    return "".join(
+        f"{_TYPES[kind]}{f'[{shape[0]}]' if shape else ''} {name};"
+        for name, kind, *shape in [("timestamp", "<u8"), *topic.fields]
+    )
+
+
+def _records(number: int, topic: _Topic) -> tuple[list[int], list[bytes]]:
+    """Timestamps and data messages of a topic at its rate."""
+    stamps = topic.values["timestamp"]
+    if topic.period:
+        slots = np.floor(stamps * 1e-6 / topic.period + 1e-9)
+        kept = np.flatnonzero(np.diff(slots, prepend=-1.0) > 0.0)
+    else:
+        kept = np.arange(len(stamps))
+    shapes = [(name, kind, *([(shape[0],)] if shape else [])) for name, kind, *shape in topic.fields]
+    body = np.dtype([("timestamp", "<u8"), *shapes])
+    record = np.zeros(len(kept), np.dtype([("size", "<u2"), ("letter", "S1"), ("number", "<u2"), ("body", body)]))
+    record["size"], record["letter"], record["number"] = body.itemsize + 2, b"D", number
+    for name in body.names or ():
+        record["body"][name] = topic.values[name][kept]
+    data, size = record.tobytes(), record.dtype.itemsize
+    return stamps[kept].tolist(), [data[at : at + size] for at in range(0, len(data), size)]
+
+
+def _topics(log: FlightLog, rows: NDArray[np.int64]) -> list[_Topic]:
+    track, origin = log.track, log.setup.scenario.origin
+    stamp = np.rint(track.time[rows] * 1e6).astype(np.uint64)
+    east, north, up = track.position[rows].T
+    lat, lon = (np.asarray(values) for values in to_geo(origin, east, north))
+    v_east, v_north, v_up = track.velocity[rows].T
+    one, ground = np.ones(len(rows), dtype=bool), up[0] if len(rows) else 0.0
+    true, height = track.airspeed[rows].astype(np.float64), track.clearance[rows]
+    calibrated = true * np.sqrt(np.maximum(1.0 - _LAPSE * up, 0.0) ** _POWER)
+    wind, battery = track.wind[rows], _battery(log, rows)
+
+    def topic(name: str, period: float, fields: list[tuple[Any, ...]], **values: Any) -> _Topic:
+        return _Topic(name, period, fields, {"timestamp": stamp, **values})
+
+    found = [
+        topic("vehicle_attitude", _FAST, [("q", "<f4", 4)], q=attitude_quaternion(track.attitude[rows])),
+        topic("vehicle_angular_velocity", _FAST, [("xyz", "<f4", 3)], xyz=track.rates[rows]),
+        topic(
+            "vehicle_local_position", _SLOW,
+            [*((name, "<f4") for name in ("x", "y", "z", "vx", "vy", "vz", "heading", "ref_alt", "dist_bottom")),
+             ("ref_lat", "<f8"), ("ref_lon", "<f8"), ("ref_timestamp", "<u8"),
+             *((name, "?") for name in ("xy_valid", "z_valid", "v_xy_valid", "v_z_valid", "xy_global", "z_global",
+                                        "dist_bottom_valid"))],
+            x=north, y=east, z=ground - up, vx=v_north, vy=v_east, vz=-v_up, heading=track.attitude[rows, YAW],
+            ref_alt=np.full(len(rows), ground), dist_bottom=height, ref_lat=np.full(len(rows), origin.lat_deg),
+            ref_lon=np.full(len(rows), origin.lon_deg), ref_timestamp=np.zeros(len(rows)), xy_valid=one, z_valid=one,
+            v_xy_valid=one, v_z_valid=one, xy_global=one, z_global=one, dist_bottom_valid=np.isfinite(height),
+        ),
+        topic(
+            "vehicle_global_position", _SLOW,
+            [("lat", "<f8"), ("lon", "<f8"), ("alt", "<f4"), ("terrain_alt", "<f4"), ("terrain_alt_valid", "?")],
+            lat=lat, lon=lon, alt=up, terrain_alt=up - height, terrain_alt_valid=np.isfinite(height),
+        ),
+        topic(
+            "airspeed_validated", _SLOW,
+            [(f"{name}_airspeed_m_s", "<f4") for name in ("indicated", "calibrated", "true")],
+            indicated_airspeed_m_s=calibrated, calibrated_airspeed_m_s=calibrated, true_airspeed_m_s=true,
+        ),
+        topic(
+            "wind", _SLOW, [("windspeed_north", "<f4"), ("windspeed_east", "<f4")],
+            windspeed_north=wind[:, 1], windspeed_east=wind[:, 0],
+        ),
+        topic(
+            "vehicle_thrust_setpoint", _SLOW, [("xyz", "<f4", 3)],
+            xyz=track.commands[rows][:, [THROTTLE]] * np.array([1.0, 0.0, 0.0]),
+        ),
+        topic("battery_status", _SLOW, [(name, "<f4") for name in battery], **battery),
+        topic(
+            "vehicle_status", _SECOND, [(name, "u1") for name in ("arming_state", "nav_state", "vehicle_type")],
+            arming_state=_ARMED * one, nav_state=_MISSION * one, vehicle_type=_FIXED_WING * one,
+        ),
+    ]  # fmt: skip
+    return [*found, _items(log, rows)]
+
+
+def _battery(log: FlightLog, rows: NDArray[np.int64]) -> dict[str, Columns]:
+    """Values of battery_status by field; its voltage is the flight's mean, which the log's energy and current give."""
+    time, current = log.track.time[rows], log.track.current[rows].astype(np.float64)
+    energy = log.track.energy[rows].astype(np.float64)
+    charge = np.concatenate([[0.0], np.cumsum(np.diff(time) * current[1:])])[: len(rows)]  # As
+    whole = float(charge[-1]) if len(rows) else 0.0
+    volts = float(energy[-1] - energy[0]) * 3600.0 / whole if whole > 0.0 else np.nan
+    return {
+        "voltage_v": np.full(len(rows), volts),
+        "current_a": current,
+        "discharged_mah": charge / 3.6,
+        "remaining": np.clip(1.0 - energy / log.setup.battery, 0.0, 1.0),
+    }
+
+
+def _items(log: FlightLog, rows: NDArray[np.int64]) -> _Topic:
+    """navigator_mission_item: each item when it becomes the one that is flown to, and first the one at the start."""
+    track, items = log.track, {item.seq: item for item in log.setup.mission.items}
+    legs, firsts = np.unique(track.leg[rows], return_index=True)
+    told = [(0.0, int(log.setup.route.items[0]))]
+    told += [
+        (float(track.time[rows[first]]), int(log.setup.route.items[leg + 1]))
+        for leg, first in zip(legs.tolist(), firsts.tolist(), strict=True)
+        if 0 <= leg < len(log.setup.route.items) - 1
+    ]
+    flown = [(time, items[seq]) for time, seq in told if seq in items and items[seq].has_position] if len(rows) else []
+    radii = [item.params[1] for _, item in flown]
+    kinds = {
+        "sequence_current": "<u2", "nav_cmd": "<u2", "acceptance_radius": "<f4", "latitude": "<f8", "longitude": "<f8",
+        "altitude": "<f4", "altitude_is_relative": "u1",
+    }  # fmt: skip
+    values = {
+        "timestamp": np.array([round(time * 1e6) for time, _ in flown], dtype=np.uint64),
+        "sequence_current": np.array([item.seq for _, item in flown]),
+        "nav_cmd": np.array([item.command for _, item in flown]),
+        "acceptance_radius": np.nan_to_num(np.array(radii)),
+        "latitude": np.array([item.lat_deg for _, item in flown]),
+        "longitude": np.array([item.lon_deg for _, item in flown]),
+        "altitude": np.array([item.alt for _, item in flown]),
+        "altitude_is_relative": np.array([item.frame in OVER_HOME for _, item in flown]),
+    }
+    return _Topic("navigator_mission_item", _FAST, list(kinds.items()), values)
+
+
+def attitude_quaternion(attitude: Any) -> Floats:
+    """(n, 4) w, x, y, z of the rotation from forward, right, down to north, east, down.
+
+    attitude: (n, 3) roll, pitch, yaw in rad.
+
+    >>> attitude_quaternion(np.array([[0.0, 0.0, np.pi]])).round(6).tolist()
+    [[0.0, 0.0, 0.0, 1.0]]
+    """
+    half = 0.5 * np.asarray(attitude, dtype=np.float64)
+    (cr, cp, cy), (sr, sp, sy) = ((f(half[:, ROLL]), f(half[:, PITCH]), f(half[:, YAW])) for f in (np.cos, np.sin))
+    return np.stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ],
+        axis=-1,
+    )

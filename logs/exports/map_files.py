@@ -1,0 +1,219 @@
+"""Plan and track for maps: KML (OGC 12-007) and GPX 1.1.
+
+GPX is made with gpxpy (Apache-2.0).  KML is written with the standard library: the Python packages that write it are
+LGPL (simplekml, fastkml) or no longer kept up.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from xml.etree import ElementTree
+
+import gpxpy.gpx
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import with_fence_zones
+from world.airspace.zones_on_map import zone_parts
+from world.frames import to_geo
+
+Floats = NDArray[np.float64]
+
+KML = "http://www.opengis.net/kml/2.2"
+# Seconds between points of a track in a map file.
+EVERY = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class MapLine:
+    """A line on the map.
+
+    name: of the line.
+    lat_deg, lon_deg: (n,).
+    amsl: (n,) m above mean sea level.
+    marks: a name for each point, or none.
+    """
+
+    name: str
+    lat_deg: Floats
+    lon_deg: Floats
+    amsl: Floats
+    marks: tuple[str, ...] = ()
+
+
+def plan_line(setup: FlightSetup) -> MapLine:
+    """Route of a setup, its waypoints named by number and mission item as in a verdict.
+
+    >>> from logs.recording.example_log import example_log
+    >>> line = plan_line(example_log().setup)
+    >>> line.name, line.marks
+    ('example plan', ('0 (item 1)', '1 (item 2)', '2 (item 3)'))
+    """
+    points, items = setup.route.waypoints, setup.route.items
+    lat, lon = to_geo(setup.scenario.origin, points[:, 0], points[:, 1])
+    marks = tuple(f"{k} (item {item})" if item >= 0 else str(k) for k, item in enumerate(items))
+    return MapLine(f"{setup.scenario.name} plan", np.asarray(lat), np.asarray(lon), points[:, 2], marks)
+
+
+def track_line(setup: FlightSetup, track: Track) -> MapLine:
+    """Flown track, thinned to a point each `EVERY` seconds and the last, rows without a position left out.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> line = track_line(log.setup, log.track)
+    >>> line.name, line.amsl.size, float(line.amsl[0])
+    ('example flown', 74, 200.0)
+    """
+    good = np.flatnonzero(np.isfinite(track.position).all(axis=1) & np.isfinite(track.time))
+    slots = np.floor(track.time[good] / EVERY + 1e-9)
+    keep = np.concatenate([[True], np.diff(slots) > 0.0])[: good.size]
+    keep[-1:] = True
+    position = track.position[good[keep]]
+    lat, lon = to_geo(setup.scenario.origin, position[:, 0], position[:, 1])
+    return MapLine(f"{setup.scenario.name} flown", np.asarray(lat), np.asarray(lon), position[:, 2])
+
+
+@dataclass(frozen=True, slots=True)
+class MapZone:
+    """A zone on the map.
+
+    name: of the zone, with what it is.
+    parts: (k, 2) latitude and longitude in degrees of the outline of each part, and then of its holes, closed.
+    height: m of its ceiling, None where it has none.
+    above_ground: whether that is above the ground, not above mean sea level.
+    """
+
+    name: str
+    parts: tuple[tuple[Floats, ...], ...]
+    height: float | None
+    above_ground: bool
+
+
+def map_zones(setup: FlightSetup) -> list[MapZone]:
+    """Zones of a setup's scenario, and its mission's own fence.
+
+    >>> from logs.recording.example_log import example_log
+    >>> map_zones(example_log().setup)
+    []
+    """
+    made = []
+    for zone in with_fence_zones(setup).scenario.zones:
+        parts = tuple(tuple(_geographic(setup, ring) for ring in part) for part in zone_parts(zone))
+        top = zone.ceiling
+        name = f"{zone.name} ({'keep out' if zone.kind == 'exclusion' else 'stay in'})"
+        height = None if top is None else top.height
+        made.append(MapZone(name, parts, height, top is not None and top.datum == "ground"))
+    return made
+
+
+def _geographic(setup: FlightSetup, ring: Floats) -> Floats:
+    return np.stack(to_geo(setup.scenario.origin, ring[:, 0], ring[:, 1]), axis=-1)
+
+
+def kml_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
+    """KML document: a folder for each line, heights absolute, and a placemark for each named point and each zone.
+
+    A zone is an outline on the ground, or a body up to its ceiling.
+
+    >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
+    >>> text = kml_text("one leg", [line])
+    >>> "<coordinates>8.00000000,46.00000000,500.000 8.00000000,46.01000000,520.000</coordinates>" in text
+    True
+    """
+    ElementTree.register_namespace("", KML)
+    root = ElementTree.Element(f"{{{KML}}}kml")
+    document = _add(root, "Document")
+    _add(document, "name", title)
+    for line in lines:
+        folder = _add(document, "Folder")
+        _add(folder, "name", line.name)
+        mark = _add(folder, "Placemark")
+        _add(mark, "name", line.name)
+        string = _add(mark, "LineString")
+        _add(string, "altitudeMode", "absolute")
+        _add(string, "coordinates", " ".join(_coordinates(line, k) for k in range(len(line.lat_deg))))
+        for k, name in enumerate(line.marks):
+            mark = _add(folder, "Placemark")
+            _add(mark, "name", name)
+            point = _add(mark, "Point")
+            _add(point, "altitudeMode", "absolute")
+            _add(point, "coordinates", _coordinates(line, k))
+    _add_zones(document, zones)
+    ElementTree.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _add_zones(document: ElementTree.Element, zones: Sequence[MapZone]) -> None:
+    if not zones:
+        return
+    folder = _add(document, "Folder")
+    _add(folder, "name", "zones")
+    for zone in zones:
+        mark = _add(folder, "Placemark")
+        _add(mark, "name", zone.name)
+        several = _add(mark, "MultiGeometry")
+        for outline, *holes in zone.parts:
+            polygon = _add(several, "Polygon")
+            if zone.height is not None:
+                _add(polygon, "extrude", "1")
+                _add(polygon, "altitudeMode", "relativeToGround" if zone.above_ground else "absolute")
+            _add_ring(polygon, "outerBoundaryIs", outline, zone)
+            for hole in holes:
+                _add_ring(polygon, "innerBoundaryIs", hole, zone)
+
+
+def _add_ring(polygon: ElementTree.Element, kind: str, ring: Floats, zone: MapZone) -> None:
+    line = _add(_add(polygon, kind), "LinearRing")
+    up = 0.0 if zone.height is None else zone.height
+    _add(line, "coordinates", " ".join(f"{lon:.8f},{lat:.8f},{up:.3f}" for lat, lon in ring))
+
+
+def _add(parent: ElementTree.Element, name: str, text: str = "") -> ElementTree.Element:
+    element = ElementTree.SubElement(parent, f"{{{KML}}}{name}")
+    element.text = "".join(ch for ch in text if ch.isprintable() or ch == " ") if text else None
+    return element
+
+
+def _coordinates(line: MapLine, k: int) -> str:
+    return f"{line.lon_deg[k]:.8f},{line.lat_deg[k]:.8f},{line.amsl[k]:.3f}"
+
+
+def gpx_text(title: str, lines: list[MapLine], zones: Sequence[MapZone] = ()) -> str:
+    """GPX document: a line with named points is a route, any other a track, and so are a zone's outlines and holes.
+
+    >>> line = MapLine("leg", np.array([46.0, 46.01]), np.array([8.0, 8.0]), np.array([500.0, 520.0]))
+    >>> '<trkpt lat="46.01" lon="8.0">' in gpx_text("one leg", [line])
+    True
+    """
+    gpx = gpxpy.gpx.GPX()
+    gpx.creator = "planfly"
+    gpx.name = "".join(ch for ch in title if ch.isprintable())
+    for line in lines:
+        rows = [
+            (round(float(lat), 8), round(float(lon), 8), round(float(up), 3))
+            for lat, lon, up in zip(line.lat_deg, line.lon_deg, line.amsl, strict=True)
+            if math.isfinite(lat + lon + up)
+        ]
+        if line.marks:
+            route = gpxpy.gpx.GPXRoute(name=line.name)
+            route.points = [
+                gpxpy.gpx.GPXRoutePoint(lat, lon, elevation=up, name=name)
+                for (lat, lon, up), name in zip(rows, line.marks, strict=True)
+            ]
+            gpx.routes.append(route)
+        else:
+            track = gpxpy.gpx.GPXTrack(name=line.name)
+            track.segments.append(
+                gpxpy.gpx.GPXTrackSegment([gpxpy.gpx.GPXTrackPoint(a, b, elevation=c) for a, b, c in rows])
+            )
+            gpx.tracks.append(track)
+    for zone in zones:
+        track = gpxpy.gpx.GPXTrack(name="".join(ch for ch in zone.name if ch.isprintable()))
+        for ring in itertools.chain.from_iterable(zone.parts):
+            points = [gpxpy.gpx.GPXTrackPoint(round(float(lat), 8), round(float(lon), 8)) for lat, lon in ring]
+            track.segments.append(gpxpy.gpx.GPXTrackSegment(points))
+        gpx.tracks.append(track)
+    return str(gpx.to_xml(version="1.1")) + "\n"

@@ -1,1 +1,0 @@
-"""What figures share: style, panels, labels, legends, and how threats, ground and failures are drawn."""

@@ -1,0 +1,1 @@
+"""Flight logs of other programs, read into one form."""

@@ -1,0 +1,307 @@
+"""The messages of an ArduPilot dataflash log: where each begins, and its fields as columns.
+
+A message is 0xA3, 0x95, its type, and a body whose length and fields the log itself states in messages named FMT
+(ArduPilot, libraries/AP_Logger/LogStructure.h).  There are no checksums: a message counts where the next one, or the
+file's end, begins right behind it.  pymavlink's `DFFormat` says what the letters of a format stand for.
+"""
+
+import contextlib
+import io
+import mmap
+import struct
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pymavlink.DFReader import DFFormat, null_term
+
+from flight.simulation.setup import Damage
+from world.kernels import compiled
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+# ----------------------------------------------------------------------
+# The bytes of a log without its size in memory: mapped, and let go of again piece by piece.
+
+
+# Bytes that are looked at before they are let go of.
+PIECE = 16 * 2**20
+
+
+class MappedFile:
+    """A file's bytes as an array.
+
+    data: (n,) of them.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = Path(folder) / "a.BIN"
+    ...     count = path.write_bytes(b"abc")
+    ...     bytes(MappedFile(path).data)
+    b'abc'
+    """
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as file:
+            self._map = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        self.data: Bytes = np.frombuffer(self._map, np.uint8)
+
+    def let_go(self) -> None:
+        """Give back what the system holds of the file in memory; it is read anew where it is looked at again."""
+        # Windows has no such call, and counts mapped pages otherwise.
+        if hasattr(self._map, "madvise"):
+            self._map.madvise(mmap.MADV_DONTNEED)
+
+
+def pieces(size: int, let_go: Callable[[], None]) -> Iterator[int]:
+    """Ends of pieces of so many bytes, the last of them all; after each the file is let go of.
+
+    >>> list(pieces(3, lambda: None)), list(pieces(PIECE + 1, lambda: None)) == [PIECE, PIECE + 1]
+    ([3], True)
+    """
+    end = 0
+    while end < size:
+        end = min(size, end + PIECE)
+        yield end
+        let_go()
+
+
+HEADER = 3
+FMT = 128
+_FMT_LENGTH = 89
+# Block-wise storage fills its last page with what was there before: so many bytes at the end are no damage.
+TRAILING = 528
+_STRINGS = frozenset("anNZ")
+
+
+@dataclass(frozen=True, slots=True)
+class Messages:
+    """All messages of one name, in the order of the file.
+
+    at: (n,) where each begins.
+    rows: (n,) of the format's fields, as stored.
+    scales: factor of each field that has one.
+    """
+
+    at: Ints
+    rows: NDArray[np.void]
+    scales: dict[str, float]
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.at)
+
+    def has(self, *names: str) -> bool:
+        """Whether there are messages with all these fields."""
+        return len(self.at) > 0 and set(names) <= set(self.rows.dtype.names or ())
+
+    def column(self, name: str) -> Floats:
+        """A field of numbers, in the format's unit."""
+        values = self.rows[name].astype(np.float64)
+        # Divided where the factor is a power of ten, so that a number is the nearest to its decimal digits.
+        factor = self.scales.get(name)
+        return values if factor is None else np.asarray(values / round(1.0 / factor))
+
+    def texts(self, name: str) -> list[str]:
+        """A field of text."""
+        return [str(null_term(value)) for value in self.rows[name].tolist()]
+
+    def only(self, keep: NDArray[np.bool_]) -> "Messages":
+        """Some of them."""
+        return Messages(self.at[keep], self.rows[keep], self.scales)
+
+
+@dataclass(frozen=True, slots=True)
+class Dataflash:
+    """An indexed log.
+
+    data: its bytes.
+    starts: for each type of message, where its messages begin.
+    formats: of each type.
+    names: of the messages that the log holds.
+    damage: what could not be read.
+    """
+
+    data: Bytes
+    starts: dict[int, Ints]
+    formats: dict[int, DFFormat]
+    names: tuple[str, ...]
+    damage: Damage
+    let_go: Callable[[], None] = lambda: None
+
+    def messages(self, name: str) -> Messages:
+        """All messages of a name; none for one that the log does not hold."""
+        for number, known in self.formats.items():
+            if known.name == name and number in self.starts:
+                return _columns(self.data, self.starts[number], known, self.let_go)
+        return Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
+
+
+def index_dataflash(data: Bytes, names: Collection[str], let_go: Callable[[], None] = lambda: None) -> Dataflash:
+    """Find the messages of some names in a log (n,) of bytes.
+
+    let_go: called now and then, to give back the memory of what was looked at.
+
+    Twice through the log: for the formats, and for the messages of those names, so that what is kept of a large log is
+    small.
+    """
+    only_formats = np.zeros(256, np.bool_)
+    only_formats[FMT] = True
+    first = _find_messages(data, only_formats, let_go)
+    formats: dict[int, DFFormat] = {}
+    unreadable = 0
+    for start in first.at.tolist():
+        found = _format(bytes(data[start + HEADER : start + _FMT_LENGTH]))
+        if found is None:
+            unreadable += 1
+        else:
+            formats.setdefault(found.type, found)
+    wanted = np.zeros(256, np.bool_)
+    wanted[[number for number, known in formats.items() if known.name in names]] = True
+    second = _find_messages(data, wanted, let_go)
+    order = np.argsort(second.kinds, kind="stable")
+    numbers, firsts = np.unique(second.kinds[order], return_index=True)
+    # Of no messages numpy makes one empty part.
+    starts = {
+        int(number): found for number, found in zip(numbers, np.split(second.at[order], firsts[1:]), strict=False)
+    }
+    held = tuple(known.name for number, known in formats.items() if second.counts[number])
+    damage = Damage(int(second.places), int(second.size), bool(second.cut), unreadable)
+    return Dataflash(data, starts, formats, held, damage, let_go)
+
+
+class _Found(NamedTuple):
+    """Where the wanted messages begin and of which type each is; how many there are of each type; what is lost."""
+
+    at: Ints
+    kinds: Bytes
+    counts: Ints
+    places: int
+    size: int
+    cut: bool
+
+
+def _find_messages(data: Bytes, wanted: NDArray[np.bool_], let_go: Callable[[], None]) -> _Found:
+    state, lengths, counts = np.zeros(6, np.int64), np.zeros(256, np.int64), np.zeros(256, np.int64)
+    state[_READING], lengths[FMT] = 1, _FMT_LENGTH
+    at, kinds = [np.zeros(0, np.int64)], [np.zeros(0, np.uint8)]
+    for until in pieces(data.size, let_go):
+        found = _walk_messages(data, until, state, lengths, counts, HEADER, FMT, TRAILING, wanted)
+        at.append(found[0])
+        kinds.append(found[1])
+    places, size, behind = int(state[_PLACES]), int(state[_LOST]), int(state[_BEHIND])
+    if not state[_READING] and behind and data.size - behind < TRAILING:
+        # The rest of the last page.
+        places -= 1
+        size -= min(size, data.size - HEADER + 1 - behind)
+    return _Found(np.concatenate(at), np.concatenate(kinds), counts, places, size, bool(state[_CUT]))
+
+
+def _format(body: bytes) -> DFFormat | None:
+    """The format that a FMT message states; None for one that cannot be one."""
+    if len(body) < _FMT_LENGTH - HEADER:
+        return None
+    number, length, name, letters, columns = struct.unpack("<BB4s16s64s", body)
+    try:
+        # It complains on the terminal.
+        with contextlib.redirect_stdout(io.StringIO()):
+            made = DFFormat(number, null_term(name), length, null_term(letters), null_term(columns))
+    except Exception:  # of whatever kind: the library raises the plain class
+        return None
+    fits = struct.calcsize(made.msg_struct) + HEADER == length and len(made.columns) == len(made.msg_fmts)
+    return made if fits and len(set(made.columns)) == len(made.columns) else None
+
+
+def _columns(data: Bytes, starts: Ints, known: DFFormat, let_go: Callable[[], None]) -> Messages:
+    starts = starts[starts + known.len <= len(data)]
+    kinds = []
+    for letter, one in zip(known.msg_fmts, _struct_codes(known), strict=True):
+        kinds.append(one if letter not in _STRINGS else f"S{int(one[:-1])}")
+    dtype = np.dtype([(name, f"<{kind}") for name, kind in zip(known.columns, kinds, strict=True)])
+    rows = np.zeros(0, dtype)
+    if len(starts) and dtype.itemsize:
+        windows = np.lib.stride_tricks.sliding_window_view(data, dtype.itemsize)
+        rows = np.empty(len(starts), dtype)
+        first = 0
+        for until in pieces(data.size, let_go):
+            last = int(np.searchsorted(starts, until))
+            rows[first:last] = windows[starts[first:last] + HEADER].view(dtype)[:, 0]
+            first = last
+    scales = {name: one for name, one in zip(known.columns, known.msg_mults, strict=True) if one is not None}
+    return Messages(starts, rows, scales)
+
+
+_CODES = {"b": "i1", "B": "u1", "h": "i2", "H": "u2", "i": "i4", "I": "u4", "f": "f4", "d": "f8", "q": "i8", "Q": "u8"}
+_CODES |= {"e": "f2"}
+
+
+def _struct_codes(known: DFFormat) -> list[str]:
+    """Each field's code in the `struct` string, texts with their length: "i4", "16s"."""
+    codes, digits = [], ""
+    for letter in known.msg_struct[1:]:
+        if letter.isdigit():
+            digits += letter
+        else:
+            codes.append(digits + letter if digits else _CODES[letter])
+            digits = ""
+    return codes
+
+
+# Of a walk: the next byte, places where no message begins, their bytes, the end of the last message, whether it was
+# one, and whether it is cut.
+_AT, _PLACES, _LOST, _BEHIND, _READING, _CUT = range(6)
+
+
+@compiled
+def _walk_messages(
+    data: Bytes,
+    until: int,
+    state: Ints,
+    lengths: Ints,
+    counts: Ints,
+    header: int,
+    fmt: int,
+    trailing: int,
+    wanted: NDArray[np.bool_],
+) -> tuple[Ints, Bytes]:  # pragma: no cover - compiled
+    """Wanted messages that begin before a byte, and their types; the walk goes on from its state."""
+    at, kinds = np.empty(1024, np.int64), np.empty(1024, np.uint8)
+    count, end = 0, data.size
+    places, size, k, behind = state[_PLACES], state[_LOST], state[_AT], state[_BEHIND]
+    reading, cut = state[_READING] == 1, state[_CUT] == 1
+    while k + header <= end and k < until:
+        length = 0
+        if data[k] == 0xA3 and data[k + 1] == 0x95:
+            length = lengths[data[k + 2]]
+        after = k + length
+        # What follows has to be a message, too, unless the file ends there.
+        follows = after >= end - 1 or (data[after] == 0xA3 and data[after + 1] == 0x95) or end - after < trailing
+        if length == 0 or not follows:
+            places += reading
+            reading = False
+            size += 1
+            k += 1
+            continue
+        kind = data[k + 2]
+        counts[kind] += 1
+        if wanted[kind]:
+            if count == at.size:
+                more_at, more_kinds = np.empty(2 * count, np.int64), np.empty(2 * count, np.uint8)
+                more_at[:count], more_kinds[:count] = at, kinds
+                at, kinds = more_at, more_kinds
+            at[count], kinds[count] = k, kind
+            count += 1
+        if kind == fmt and after <= end:
+            lengths[data[k + header]] = data[k + header + 1]
+        k = behind = after
+        cut = after > end
+        reading = True
+    state[_PLACES], state[_LOST], state[_AT], state[_BEHIND] = places, size, k, behind
+    state[_READING], state[_CUT] = reading, cut
+    return at[:count], kinds[:count]

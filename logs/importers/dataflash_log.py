@@ -1,0 +1,354 @@
+"""ArduPilot's dataflash logs (`.BIN`): the messages that say where the vehicle was, what it felt, and what it was told.
+
+Names of messages and fields are those of ArduPilot's log documentation; of older releases those that stood there then.
+"""
+
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.autopilots.arduplane.law import true_by_equivalent
+from flight.mission.items import Home, MissionItem, on_grid
+from logs.importers.clean_places import steady_clock
+from logs.importers.dataflash_frames import Dataflash, MappedFile, Messages, index_dataflash
+from logs.importers.logged_missions import Item, gather_items, logged_mission, plane_mode
+from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.errors import LogError
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Missions of ArduPilot's dataflash logs: the messages CMD, and home from ORGN where they hold none.
+
+
+_NUMBERS = ("CNum", "CId", "Prm1", "Prm2", "Prm3", "Prm4", "Lat", "Lng", "Alt")
+# ORGN.Type of home; the other is where the estimator's map has its origin.
+_HOME = 1
+
+
+def dataflash_missions(commands: Messages, time: Floats, origins: Messages, source: str) -> Iterator[LoggedMission]:
+    """Missions in the order in which they were logged: each whole, items that are flown again left out.
+
+    commands: CMD.  time: (n,) s, of each.  origins: ORGN.  source: the log's name.
+
+    >>> none = Messages(np.zeros(0, np.int64), np.zeros(0, np.dtype([])), {})
+    >>> list(dataflash_missions(none, np.zeros(0), none, "a.BIN"))
+    []
+    """
+    if not commands.has(*_NUMBERS):
+        return
+    framed = commands.has("Frame")
+    table = [commands.column(name).tolist() for name in _NUMBERS]
+    frames = commands.column("Frame").tolist() if framed else [3.0] * len(commands)
+    totals = commands.column("CTot").tolist() if commands.has("CTot") else [0.0] * len(commands)
+    rows = []
+    for row, (stamp, total, frame) in enumerate(zip(time.tolist(), totals, frames, strict=True)):
+        number, command, p1, p2, p3, p4, lat, lon, up = (column[row] for column in table)
+        # A float32 has seven digits; a mission file has six behind the point.
+        place = (on_grid(lat), on_grid(lon), round(up, 6))
+        item = MissionItem(int(number), int(command), int(frame), (p1, p2, p3, p4), *place)
+        rows.append(Item(stamp, int(total), item))
+    for start, items in gather_items(rows):
+        made = logged_mission(items, f"{source}: CMD")
+        if made is not None:
+            made = made if made.home is not None else replace(made, home=_home(origins))
+            notes = () if framed else ("the log states no frames: heights are taken as above home",)
+            yield LoggedMission(start, replace(made, warnings=(*made.warnings, *notes)), "CMD")
+
+
+def _home(origins: Messages) -> Home | None:
+    """Home as the vehicle last had it."""
+    if not origins.has("Type", "Lat", "Lng", "Alt"):
+        return None
+    homes = origins.only(origins.column("Type") == _HOME)
+    if not len(homes):
+        return None
+    lat, lon, up = (float(homes.column(name)[-1]) for name in ("Lat", "Lng", "Alt"))
+    known = np.isfinite([lat, lon, up]).all() and abs(lat) <= 90.0 and abs(lon) <= 180.0 and (lat, lon) != (0.0, 0.0)
+    return Home(on_grid(lat), on_grid(lon), up) if known else None
+
+
+FORMAT = "ArduPilot dataflash log"
+# VER.BT: which vehicle the program was built for.
+_BUILDS: dict[int, VehicleKind] = {
+    1: "rover", 2: "copter", 3: "plane", 4: "tracker", 7: "submarine", 12: "blimp", 13: "copter"
+}  # fmt: skip
+_PROGRAMS: dict[str, VehicleKind] = {
+    "ArduPlane": "plane",
+    "ArduCopter": "copter",
+    "Rover": "rover",
+    "ArduRover": "rover",
+    "APMrover2": "rover",
+    "ArduSub": "submarine",
+    "AntennaTracker": "tracker",
+    "Blimp": "blimp",
+    # As they were named until 2018.
+    "APM:Plane": "plane",
+    "APM:Copter": "copter",
+    "APM:Rover": "rover",
+}
+_PROGRAM = re.compile(rf"^({'|'.join(_PROGRAMS)})\b")
+# Days from 1970 to GPS's beginning, s, and leap seconds since, as they have stood since 2017.
+_GPS_EPOCH, _LEAP = 315_964_800.0, 18.0
+_WEEK = 604_800.0
+
+
+def read_dataflash(path: Path) -> RawLog:
+    """Read a log.  Raises LogError for one without a message that says where the vehicle was."""
+    file = MappedFile(path)
+    index = index_dataflash(file.data, _READ, file.let_go)
+    return _Reader(index, str(path)).read()
+
+
+class _Reader:
+    """One log; the parts of it that `RawLog` has."""
+
+    def __init__(self, index: Dataflash, source: str) -> None:
+        self._index, self._source = index, source
+        self._cache: dict[str, Messages] = {}
+        self._clock = self._steady()
+
+    def read(self) -> RawLog:
+        series = {name: found for name, found in self._series() if found is not None and len(found.time)}
+        program, vehicle = self._program()
+        if "position" not in series:
+            names = ", ".join(sorted(self._index.names)[:12])
+            raise LogError(
+                f"{self._source}: no POS, AHR2 or GPS message: nothing says where it flew (it has {names or 'none'})",
+                file=self._source,
+            )
+        return RawLog(
+            source=self._source,
+            format=FORMAT,
+            program=program,
+            vehicle=vehicle,
+            series=series,
+            heights=tuple(self._heights()),
+            datum="amsl",
+            modes=tuple(self._modes()),
+            missions=tuple(self._missions()),
+            parameters=self._parameters(),
+            events=tuple(self._events()),
+            utc_start=self._utc_start(),
+            clock_jumps=self._clock[2],
+            damage=self._index.damage,
+        )
+
+    def _messages(self, name: str) -> Messages:
+        """Messages of a name, of the first instance where there are several."""
+        if name not in self._cache:
+            found = self._index.messages(name)
+            for column in ("I", "C", "Inst", "Instance"):
+                # Earlier releases have a mode's number or a count under these names; those are no instances.
+                if name in _WITH_INSTANCES and found.has(column) and found.rows.dtype[column].kind in "ui":
+                    number = found.rows[column]
+                    found = found.only(number == number.min())
+            self._cache[name] = found
+        return self._cache[name]
+
+    def _steady(self) -> tuple[NDArray[np.int64], Floats, tuple[float, ...]]:
+        """Where the log's clock has to be moved: from which byte on, by how much (s), and when."""
+        times, at = [], []
+        for name in ("POS", "ATT", "GPS", "MODE"):
+            found = self._messages(name)
+            if found.has("TimeUS") or found.has("TimeMS"):
+                times.append(_raw_time(found))
+                at.append(found.at)
+        if not times:
+            return np.zeros(0, np.int64), np.zeros(0), ()
+        order = np.argsort(np.concatenate(at), kind="stable")
+        places, raw = np.concatenate(at)[order], np.concatenate(times)[order]
+        good = np.isfinite(raw)
+        steady = steady_clock(raw[good])
+        return places[good], steady.time - raw[good], steady.jumps
+
+    def _time(self, found: Messages) -> Floats:
+        places, moved, jumps = self._clock
+        raw = _raw_time(found)
+        if not jumps:
+            return raw
+        return np.asarray(raw + moved[np.clip(np.searchsorted(places, found.at), 0, len(moved) - 1)])
+
+    def _table(self, name: str, columns: Iterable[str], scale: float = 1.0) -> LogSeries | None:
+        columns = tuple(columns)
+        found = self._messages(name)
+        if not found.has(*columns) or not (found.has("TimeUS") or found.has("TimeMS")):
+            return None
+        values = np.stack([found.column(column) for column in columns], axis=1)
+        return LogSeries(name, self._time(found), values * scale)
+
+    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+        yield "position", self._position()
+        yield "velocity", self._velocity()
+        yield "attitude", self._first((("ATT", ("Roll", "Pitch", "Yaw")), ("AHR2", ("Roll", "Pitch", "Yaw"))), _DEGREE)
+        yield "wind", self._wind()
+        yield "airspeed", self._airspeed()
+        yield "battery", self._battery()
+        yield "throttle", self._throttle()
+
+    def _first(self, choices: Iterable[tuple[str, tuple[str, ...]]], scale: float = 1.0) -> LogSeries | None:
+        for name, columns in choices:
+            found = self._table(name, columns, scale)
+            if found is not None and len(found.time):
+                return found
+        return None
+
+    def _position(self) -> LogSeries | None:
+        own = self._first((("POS", ("Lat", "Lng", "Alt")), ("AHR2", ("Lat", "Lng", "Alt"))))
+        if own is not None:
+            return own
+        gps = self._messages("GPS")
+        found = self._first((("GPS", ("Lat", "Lng", "Alt")),))
+        if found is None or not gps.has("Status"):
+            return found
+        # Below a fix in three dimensions there is no height.
+        fixed = gps.column("Status") >= 3
+        return LogSeries("GPS", found.time[fixed], found.values[fixed])
+
+    def _velocity(self) -> LogSeries | None:
+        """East, north, up."""
+        for name in ("XKF1", "NKF1", "EKF1"):
+            found = self._table(name, ("VE", "VN", "VD"))
+            if found is not None and len(found.time):
+                return LogSeries(name, found.time, found.values * np.array([1.0, 1.0, -1.0]))
+        gps = self._table("GPS", ("Spd", "GCrs", "VZ"))
+        if gps is None:
+            return None
+        speed, course, down = gps.values.T
+        course = np.radians(course)
+        return LogSeries("GPS", gps.time, np.stack([speed * np.sin(course), speed * np.cos(course), -down], axis=1))
+
+    def _wind(self) -> LogSeries | None:
+        found = self._first([(name, ("VWE", "VWN")) for name in ("XKF2", "NKF2", "EKF2")])
+        # An estimate that was never made stays at nothing.
+        return found if found is not None and np.any(found.values) else None
+
+    def _airspeed(self) -> LogSeries | None:
+        """True airspeed: ArduPilot's are equivalent ones."""
+        sensor = self._messages("ARSP")
+        found = self._table("ARSP", ("Airspeed",))
+        if found is not None and sensor.has("U"):
+            used = sensor.column("U") > 0
+            found = LogSeries("ARSP", found.time[used], found.values[used]) if used.any() else None
+        if found is None or not len(found.time):
+            found = self._first((("CTUN", ("As",)),)) if self._messages("CTUN").has("AsT") else None
+        if found is None or not len(found.time) or not np.any(found.values):
+            return None
+        return LogSeries(found.source, found.time, found.values * self._true_by_equivalent(found.time)[:, None])
+
+    def _true_by_equivalent(self, time: Floats) -> Floats:
+        ratio = self._table("CTUN", ("E2T",))
+        if ratio is not None and len(ratio.time) > 1:
+            order = np.argsort(ratio.time, kind="stable")
+            return np.asarray(np.interp(time, ratio.time[order], ratio.values[order, 0]))
+        place = self._position()
+        if place is None or not len(place.time):
+            return np.ones(len(time))
+        order = np.argsort(place.time, kind="stable")
+        up = np.clip(np.interp(time, place.time[order], place.values[order, 2]), -500.0, 20_000.0)
+        return np.array([true_by_equivalent(float(height)) for height in up])
+
+    def _battery(self) -> LogSeries | None:
+        """Current, and energy used so far."""
+        found = self._table("BAT", ("Curr", "EnrgTot"))
+        if found is None or not len(found.time):
+            found = self._table("CURR", ("Curr", "EnrgTot"))
+        if found is not None and len(found.time):
+            return found if np.any(found.values) else None
+        for name in ("BAT", "CURR"):
+            volts = self._table(name, ("Volt", "Curr"))
+            if volts is not None and len(volts.time) and np.any(volts.values[:, 1]):
+                step = np.diff(volts.time, prepend=volts.time[0])
+                energy = np.cumsum(volts.values[:, 0] * volts.values[:, 1] * np.clip(step, 0.0, 10.0)) / 3600.0
+                return LogSeries(name, volts.time, np.stack([volts.values[:, 1], energy], axis=1))
+        return None
+
+    def _throttle(self) -> LogSeries | None:
+        for column in ("ThO", "ThrOut"):
+            found = self._table("CTUN", (column,), 0.01)
+            if found is not None and len(found.time):
+                return found
+        return None
+
+    def _heights(self) -> Iterable[HeightSource]:
+        position = self._position()
+        gps = self._table("GPS", ("Alt",))
+        if gps is not None and position is not None and position.source != "GPS":
+            yield HeightSource("GPS.Alt", "amsl", gps)
+        baro = self._table("BARO", ("AltAMSL",))
+        if baro is not None:
+            yield HeightSource("BARO.AltAMSL", "amsl", baro)
+        else:
+            baro = self._table("BARO", ("Alt",))
+            if baro is not None:
+                yield HeightSource("BARO.Alt (above where it was switched on)", "unstated", baro)
+
+    def _modes(self) -> Iterable[ModeChange]:
+        found = self._messages("MODE")
+        column = "ModeNum" if found.has("ModeNum") else "Mode"
+        if not found.has(column) or found.rows.dtype[column].kind == "S":
+            return
+        for time, number in zip(self._time(found).tolist(), found.rows[column].tolist(), strict=True):
+            name, automatic = plane_mode(int(number))
+            yield ModeChange(time, name, automatic)
+
+    def _missions(self) -> Iterable[LoggedMission]:
+        found = self._messages("CMD")
+        time = self._time(found) if len(found) else np.zeros(0)
+        return dataflash_missions(found, time, self._messages("ORGN"), self._source)
+
+    def _parameters(self) -> dict[str, float]:
+        found = self._messages("PARM")
+        if not found.has("Name", "Value"):
+            return {}
+        values = zip(found.texts("Name"), found.column("Value").tolist(), strict=True)
+        return {name: value for name, value in values if name and math.isfinite(value)}
+
+    def _events(self) -> Iterable[tuple[float, str]]:
+        found = self._messages("MSG")
+        if found.has("Message"):
+            yield from zip(self._time(found).tolist(), found.texts("Message"), strict=True)
+
+    def _program(self) -> tuple[str, VehicleKind]:
+        named = next((text for _, text in self._events() if _PROGRAM.match(text)), "")
+        match = _PROGRAM.match(named)
+        if match:
+            return named, _PROGRAMS[match.group(1)]
+        version = self._messages("VER")
+        if version.has("BT") and len(version):
+            text = version.texts("FWS")[0] if version.has("FWS") else ""
+            return text, _BUILDS.get(int(version.column("BT")[0]), "unknown")
+        return "", "unknown"
+
+    def _utc_start(self) -> float:
+        found = self._messages("GPS")
+        for weeks, millis in (("GWk", "GMS"), ("Week", "TimeMS")):
+            if found.has(weeks, millis, "TimeUS"):
+                # Before it has a fix a receiver makes a week up.
+                good = (found.column(weeks) > 1000) & (found.column("Status") >= 3 if found.has("Status") else True)
+                if good.any():
+                    k = int(np.argmax(good))
+                    seconds = found.column(weeks)[k] * _WEEK + found.column(millis)[k] * 1e-3
+                    return float(_GPS_EPOCH - _LEAP + seconds - self._time(found)[k])
+        return math.nan
+
+
+_DEGREE = math.pi / 180.0
+_READ = (
+    "POS", "AHR2", "GPS", "ATT", "XKF1", "NKF1", "EKF1", "XKF2", "NKF2", "EKF2", "ARSP", "CTUN", "BAT", "CURR",
+    "BARO", "MODE", "CMD", "PARM", "MSG", "VER", "ORGN",
+)  # fmt: skip
+_WITH_INSTANCES = frozenset({"GPS", "BARO", "ARSP", "BAT", "XKF1", "XKF2", "NKF1", "NKF2", "EKF1", "EKF2"})
+
+
+def _raw_time(found: Messages) -> Floats:
+    """Times of messages as they are written, s; before 2015 they were milliseconds."""
+    if found.has("TimeUS"):
+        return found.column("TimeUS") * 1e-6
+    return found.column("TimeMS") * 1e-3

@@ -1,0 +1,420 @@
+"""A log made one flight: rows at the times of its places, and everything else it holds brought to those times."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import Mission
+from flight.simulation.setup import Gap, HeightOffset, Heights, MissionStretch, Quantity, RowFaults
+from flight.simulation.track import THROTTLE, Track
+from logs.importers.clean_places import DEGREE, Places, clean_places, find_gaps, metres_between
+from logs.importers.raw_log import COLUMNS, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.errors import LogError
+from world.frames import GeoOrigin, to_map
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# The flights of a log, and the stretches of them that were flown along a mission.
+
+
+# m/s over the ground as a median over `_OVER` s: more is flight.  An aircraft against the wind may be slower for so
+# many seconds.
+FLYING, SLOWER_FOR = 6.0, 60.0
+_OVER = 5.0
+# s.  A flight that is no further from the log's first row, or its last, is cut by it.
+IN_THE_AIR = _OVER
+# s.  A flight lasts this long at least.
+SHORTEST = 20.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlightPart:
+    """One flight with one mission.
+
+    start, end: s, of the flight.
+    mission: number of the mission in the log that it was flown with; -1 for none.
+    stretches: flown along it.
+    """
+
+    start: float
+    end: float
+    mission: int
+    stretches: tuple[MissionStretch, ...]
+
+    @property
+    def along_mission(self) -> float:
+        """Seconds flown along the mission."""
+        return sum(stretch.end - stretch.start for stretch in self.stretches)
+
+
+def flown_spans(time: Floats, lat: Floats, lon: Floats) -> list[tuple[float, float]]:
+    """When the aircraft flew, as starts and ends in s: faster over the ground than a person on the field.
+
+    >>> time = np.arange(0.0, 200.0)
+    >>> north = np.cumsum(np.where((time > 50.0) & (time < 150.0), 20.0, 0.1))
+    >>> [(start, end)] = flown_spans(time, 46.0 + north / 111195.0, np.full(200, 8.0))
+    >>> 45.0 < start < 55.0, 145.0 < end < 155.0
+    (True, True)
+    """
+    if time.size < 3:
+        return []
+    speed = metres_between(lat, lon) / np.maximum(np.diff(time), 1e-3)
+    width = max(1, int(_OVER / max(1e-3, float(np.median(np.diff(time))))))
+    fast = _running_median(speed, width) > FLYING
+    spans: list[list[float]] = []
+    for k in np.flatnonzero(fast).tolist():
+        if spans and time[k] - spans[-1][1] <= SLOWER_FOR:
+            spans[-1][1] = float(time[k + 1])
+        else:
+            spans.append([float(time[k]), float(time[k + 1])])
+    return [(start, end) for start, end in spans if end - start >= SHORTEST]
+
+
+def _running_median(values: Floats, width: int) -> Floats:
+    if width < 2 or values.size <= width:
+        return values
+    half = width // 2
+    padded = np.pad(values, (half, width - 1 - half), mode="edge")
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, width), axis=1))
+
+
+def flight_parts(
+    spans: Sequence[tuple[float, float]],
+    modes: Sequence[ModeChange],
+    missions: Sequence[LoggedMission],
+    last: float,
+) -> list[FlightPart]:
+    """Each flight, once for every mission that it was flown with.
+
+    spans: of `flown_spans`.  last: time of the log's last row, s.  Without modes all of a flight counts as flown along
+    the mission, for nothing says otherwise.
+    """
+    parts = []
+    for start, end in spans:
+        stretches = _stretches(start, end, modes, last)
+        by_mission: dict[int, list[MissionStretch]] = {}
+        for stretch in stretches:
+            by_mission.setdefault(_mission_at(stretch, missions), []).append(stretch)
+        if not by_mission:
+            by_mission[_mission_at(MissionStretch(start, end, "", "log"), missions)] = []
+        parts += [FlightPart(start, end, number, tuple(found)) for number, found in by_mission.items()]
+    return parts
+
+
+def _stretches(start: float, end: float, modes: Sequence[ModeChange], last: float) -> list[MissionStretch]:
+    # A flight that goes on to the log's last rows is cut off by it.
+    open_end = last - end < IN_THE_AIR
+    if not modes:
+        return [MissionStretch(start, end, "", "log" if open_end else "landed")]
+    found = []
+    ordered = sorted(modes, key=lambda mode: mode.time)
+    for k, mode in enumerate(ordered):
+        until = ordered[k + 1].time if k + 1 < len(ordered) else float("inf")
+        begin, stop = max(start, mode.time), min(end, until)
+        if not mode.automatic or stop <= begin:
+            continue
+        if until <= end:
+            found.append(MissionStretch(begin, stop, mode.name, "mode", ordered[k + 1].name))
+        else:
+            found.append(MissionStretch(begin, stop, mode.name, "log" if open_end else "landed"))
+    return found
+
+
+def _mission_at(stretch: MissionStretch, missions: Sequence[LoggedMission]) -> int:
+    """The mission in force when a stretch began: the last that was logged by then, or the first in it."""
+    before = [k for k, logged in enumerate(missions) if logged.time <= stretch.start + 1.0]
+    if before:
+        return before[-1]
+    inside = [k for k, logged in enumerate(missions) if logged.time <= stretch.end]
+    return inside[0] if inside else -1
+
+
+def choose_part(parts: Sequence[FlightPart]) -> int:
+    """Which flight is judged: the one that was flown along its mission for the longest, or the longest."""
+    return max(range(len(parts)), key=lambda k: (parts[k].along_mission, parts[k].end - parts[k].start))
+
+
+# s.  What is shown before and after a flight.
+BESIDE = 10.0
+# A value is taken from rows that are no further apart than this (s), or than so many usual steps of its own.
+_NEAR, _NEAR_STEPS = 1.0, 2.5
+# s.  Over which heights are compared at the start.
+_COMPARED = 5.0
+_REFUSED: dict[VehicleKind, str] = {
+    "copter": "a copter's", "rover": "a rover's", "boat": "a boat's", "submarine": "a submarine's",
+    "tracker": "an antenna tracker's", "blimp": "a blimp's",
+}  # fmt: skip
+_HELD: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
+_MOST_ROWS = 4_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class FieldFlight:
+    """One flight of a log.
+
+    raw: the log.
+    time: (n,) s of the log's clock.  lat, lon: (n,) degrees.  up: (n,) m.
+    columns: by the names of `logs.importers.raw_log.COLUMNS`, (n, k), NaN where the log has nothing near.
+    holds: which of them it holds.
+    stretches: flown along the mission.
+    mission: that it was flown with; None where the log holds none.
+    heights, gaps, faults: see `flight.simulation.setup.FieldSource`.
+    number, count: which of the log's flights, from 1, and how many there are.
+    others: of the others, when they began and for how long they followed a mission, s.
+    begins, ends: whether the log's first row, and its last, is in the air: what came before and after it does not hold.
+    """
+
+    raw: RawLog
+    time: Floats
+    lat: Floats
+    lon: Floats
+    up: Floats
+    columns: dict[str, Floats]
+    holds: tuple[Quantity, ...]
+    stretches: tuple[MissionStretch, ...]
+    mission: LoggedMission | None
+    heights: Heights
+    gaps: tuple[Gap, ...]
+    faults: RowFaults
+    number: int
+    count: int
+    others: tuple[tuple[float, float], ...] = ()
+    begins: bool = False
+    ends: bool = False
+    clock: Places | None = field(default=None, repr=False)
+
+
+def make_flight(raw: RawLog, number: int | None = None) -> FieldFlight:
+    """The flight of a log that was flown along its mission for the longest, or the one of a number, from 1.
+
+    Raises LogError for a vehicle that is no aeroplane, a log without a flight, and a number that it does not have.
+
+    >>> from logs.importers.raw_log import example_raw_log
+    >>> flight = make_flight(example_raw_log())
+    >>> [(stretch.mode, stretch.ended) for stretch in flight.stretches], flight.holds[:2]
+    ([('AUTO', 'log')], ('velocity', 'attitude'))
+    """
+    if raw.vehicle in _REFUSED:
+        named = f" ({raw.program})" if raw.program else ""
+        raise LogError(
+            f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: flights of aeroplanes are judged", file=raw.source
+        )
+    series = raw.series["position"]
+    if len(series.time) > _MOST_ROWS:
+        raise LogError(f"{raw.source}: {len(series.time):,} places: at most {_MOST_ROWS:,} are read", file=raw.source)
+    places = clean_places(series, raw.clock_jumps)
+    spans = flown_spans(places.time, places.lat, places.lon)
+    if not spans:
+        raise LogError(f"{raw.source}: no flight in it: {_why_none(places)}", file=raw.source)
+    last = float(places.time[-1])
+    modes = [type(one)(float(places.on_clock(np.array([one.time]))[0]), one.name, one.automatic) for one in raw.modes]
+    parts = flight_parts(spans, modes, raw.missions, last)
+    chosen = choose_part(parts)
+    if number is not None:
+        if not 1 <= number <= len(parts):
+            raise LogError.of_option("--flight", number, f"it holds flights 1..{len(parts)}", file=raw.source)
+        chosen = number - 1
+    others = tuple((part.start, part.along_mission) for k, part in enumerate(parts) if k != chosen)
+    return _cut(raw, places, parts[chosen], chosen + 1, len(parts), others)
+
+
+def _why_none(places: Places) -> str:
+    if places.time.size < 2:
+        return f"{places.time.size} usable places"
+    return f"in {places.time[-1] - places.time[0]:.0f} s it never went faster than a person for long"
+
+
+def _cut(
+    raw: RawLog, places: Places, part: FlightPart, number: int, count: int, others: tuple[tuple[float, float], ...]
+) -> FieldFlight:
+    keep = (places.time >= part.start - BESIDE) & (places.time <= part.end + BESIDE)
+    time = places.time[keep]
+    columns = {name: _at(raw.series.get(name), name, time, places) for name in COLUMNS if name != "height"}
+    up = places.up[keep]
+    holds: list[Quantity] = [name for name in _HELD if np.isfinite(columns[name]).any()]
+    if np.isfinite(up).all():
+        holds.append("heights")
+    start = part.stretches[0].start if part.stretches else part.start
+    return FieldFlight(
+        raw=raw,
+        time=time,
+        lat=places.lat[keep],
+        lon=places.lon[keep],
+        up=up,
+        columns=columns,
+        holds=tuple(holds),
+        stretches=part.stretches,
+        mission=raw.missions[part.mission] if part.mission >= 0 else None,
+        heights=_heights(raw, places, start),
+        gaps=find_gaps(time),
+        faults=places.faults,
+        number=number,
+        count=count,
+        others=others,
+        begins=part.start - float(places.time[0]) < IN_THE_AIR,
+        ends=float(places.time[-1]) - part.end < IN_THE_AIR,
+        clock=places,
+    )
+
+
+def _at(series: LogSeries | None, name: str, time: Floats, places: Places) -> Floats:
+    """A series at the times of the places (n,), NaN where it has no rows near."""
+    width = len(COLUMNS[name])
+    out = np.full((time.size, width), math.nan)
+    if series is None:
+        return out
+    good = np.isfinite(series.time) & np.isfinite(series.values).all(axis=1) & (np.abs(series.values) < 1e7).all(axis=1)
+    own = places.on_clock(series.time[good])
+    order = np.argsort(own, kind="stable")
+    own, values = own[order], series.values[good][order]
+    fresh = np.concatenate([[True], np.diff(own) > 0.0]) if own.size else np.zeros(0, bool)
+    own, values = own[fresh], values[fresh]
+    if own.size < 2:
+        return out
+    near = max(_NEAR, _NEAR_STEPS * float(np.median(np.diff(own))))
+    after = np.clip(np.searchsorted(own, time), 1, own.size - 1)
+    within = (own[after] - own[after - 1] <= near) & (time >= own[0] - near) & (time <= own[-1] + near)
+    exact = np.isclose(own[after], time, atol=1e-9) | np.isclose(own[after - 1], time, atol=1e-9)
+    if name == "attitude":
+        values = np.unwrap(values, axis=0)
+    for k in range(width):
+        out[:, k] = np.where(within | exact, np.interp(time, own, values[:, k]), math.nan)
+    if name == "attitude":
+        # Back into -pi..pi, the yaw into 0..2 pi.
+        out[:, :2] = np.remainder(out[:, :2] + math.pi, 2.0 * math.pi) - math.pi
+        out[:, 2] = np.remainder(out[:, 2], 2.0 * math.pi)
+    return out
+
+
+def _heights(raw: RawLog, places: Places, start: float) -> Heights:
+    """Which height was taken, and how much higher the others are in the first seconds of what is judged."""
+    offsets = []
+    for other in raw.heights:
+        time = places.on_clock(other.series.time)
+        first = (time >= start) & (time <= start + _COMPARED) & np.isfinite(other.series.values[:, 0])
+        if first.any() and np.isfinite(places.up).any():
+            own = np.interp(time[first], places.time, places.up)
+            offsets.append(HeightOffset(other.name, float(np.median(other.series.values[first, 0] - own))))
+    source = raw.series["position"].source
+    return Heights(source, raw.datum, tuple(offsets))
+
+
+# ----------------------------------------------------------------------
+# Heights for a plan that states none: those at which the flight passed.
+
+
+def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -> Mission:
+    """A mission whose items have the height (m) of the row (n,) nearest to each.
+
+    >>> from flight.mission.items import MissionItem
+    >>> task = Mission(None, tuple(MissionItem(k, 16, 0, (0.0,) * 4, 46.0 + k, 8.0, 0.0) for k in (0, 1)))
+    >>> flown = with_flown_heights(task, np.array([46.0, 47.0]), np.array([8.0, 8.0]), np.array([900.0, 1500.0]))
+    >>> [item.alt for item in flown.items]
+    [900.0, 1500.0]
+    """
+    known = np.isfinite(up)
+    heights = up[known] if known.any() else np.zeros(len(up))
+    lat, lon = (lat[known], lon[known]) if known.any() else (lat, lon)
+    items = []
+    for item in mission.items:
+        if item.has_position and heights.size:
+            east = ((lon - item.lon_deg + 180.0) % 360.0 - 180.0) * np.cos(np.radians(item.lat_deg))
+            away = np.hypot((lat - item.lat_deg) * DEGREE, east * DEGREE)
+            items.append(replace(item, alt=round(float(heights[int(np.argmin(away))]), 2)))
+        else:
+            items.append(item)
+    return replace(mission, items=tuple(items))
+
+
+# ----------------------------------------------------------------------
+# The wind of a flight, as its autopilot estimated it.
+
+# m/s.  The most that a scenario's wind may have.
+_MOST = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class MeanWind:
+    """Mean wind: m/s, rad clockwise from north where it comes from, and the message it is of."""
+
+    speed: float
+    from_course: float
+    source: str
+
+
+def mean_wind(flight: FieldFlight) -> MeanWind | None:
+    """The mean over the stretches that followed the mission, or over the flight; None where the log holds none.
+
+    The estimate's first part is left out: it begins at nothing, and finds the wind in the first turns.
+
+    >>> from logs.importers.raw_log import example_raw_log
+    >>> from logs.importers.imported_flight import make_flight
+    >>> mean_wind(make_flight(example_raw_log()))
+    MeanWind(speed=3.0, from_course=0.0, source='XKF2')
+    """
+    wind = flight.columns["wind"]
+    inside = np.zeros(len(flight.time), bool)
+    for stretch in flight.stretches:
+        inside |= (flight.time >= stretch.start) & (flight.time <= stretch.end)
+    chosen = np.flatnonzero(np.isfinite(wind).all(axis=1) & (inside if inside.any() else True))
+    if not chosen.size:
+        return None
+    east, north = wind[chosen[len(chosen) // 5 :]].mean(axis=0).tolist()
+    speed = min(_MOST, math.hypot(east, north))
+    return MeanWind(speed, math.atan2(-east, -north) % (2.0 * math.pi), flight.raw.series["wind"].source)
+
+
+# ----------------------------------------------------------------------
+# The rows of a flight of the field as a track; what the log does not hold is NaN there.
+
+
+def rows_of_flight(flight: FieldFlight, origin: GeoOrigin) -> Track:
+    """A track on the map about ``origin``.
+
+    Velocities that the log does not hold are the differences of its places.  A log without heights has 0 there, which
+    no rule reads.
+
+    >>> from logs.importers.raw_log import example_raw_log
+    >>> from logs.importers.imported_flight import make_flight
+    >>> track = rows_of_flight(make_flight(example_raw_log()), GeoOrigin(46.0, 8.0))
+    >>> track.position[-1].round(1).tolist(), float(track.airspeed[0]), float(track.current[0])
+    ([1045.0, 1000.0, 500.0], 25.0, nan)
+    """
+    count = len(flight.time)
+    east, north = to_map(origin, flight.lat, flight.lon)
+    position = np.column_stack([east, north, np.nan_to_num(flight.up, nan=0.0)])
+    velocity = flight.columns["velocity"].copy()
+    missing = ~np.isfinite(velocity).all(axis=1)
+    if missing.any() and count > 1:
+        velocity[missing] = np.gradient(position, flight.time, axis=0)[missing]
+    wind = np.column_stack([flight.columns["wind"], np.where(np.isfinite(flight.columns["wind"][:, 0]), 0.0, math.nan)])
+    controls = np.full((count, 4), math.nan)
+    controls[:, THROTTLE] = flight.columns["throttle"][:, 0]
+    current, energy = flight.columns["battery"].T
+    known = energy[np.isfinite(energy)]
+    none = np.full(count, math.nan)
+    return Track(
+        time=flight.time,
+        position=position,
+        velocity=velocity.astype(np.float32),
+        attitude=flight.columns["attitude"].astype(np.float32),
+        rates=np.full((count, 3), math.nan),
+        airspeed=flight.columns["airspeed"][:, 0].astype(np.float32),
+        flow=np.full((count, 2), math.nan),
+        controls=controls,
+        commands=np.full((count, 4), math.nan),
+        wind=wind,
+        load_factor=none,
+        current=current,
+        energy=energy - known[0] if known.size else energy,
+        leg=np.zeros(count, dtype=np.int32),
+        cross_track=none,
+        height_error=none,
+        speed_command=none,
+        clearance=none,
+    )

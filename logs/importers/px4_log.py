@@ -1,0 +1,319 @@
+"""PX4's logs (`.ulg`): the topics that say where the vehicle was, what it felt, and what it was told.
+
+pyulog reads the container; names of topics and fields are those of PX4's message documentation, of older releases those
+that stood there then.
+"""
+
+import contextlib
+import io
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+from pyulog import ULog
+
+from flight.mission.items import Home, Mission, MissionItem, item_problem, on_grid, renumbered
+from flight.simulation.setup import Damage
+from logs.importers.dataflash_frames import MappedFile, pieces
+from logs.importers.logged_missions import px4_state
+from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.errors import LogError
+from world.kernels import compiled
+
+Bytes = NDArray[np.uint8]
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+FORMAT = "PX4 log"
+# Bytes before the first record, and the letters of all records (PX4, "ULog File Format").
+_HEADER, _LETTERS = 16, b"BFIMPQARDLCSO"
+_TOPICS = [
+    "vehicle_global_position", "vehicle_local_position", "vehicle_attitude", "airspeed_validated", "airspeed", "wind",
+    "wind_estimate", "battery_status", "vehicle_status", "navigator_mission_item", "vehicle_gps_position", "sensor_gps",
+    "vehicle_air_data", "actuator_controls_0", "vehicle_thrust_setpoint", "home_position",
+]  # fmt: skip
+# vehicle_status.vehicle_type.
+_TYPES: dict[int, VehicleKind] = {1: "copter", 2: "plane", 3: "rover", 4: "blimp"}
+_AMSL, _OVER_HOME = 0, 3
+# Degrees, and m, that no home has; each is checked again where the mission is placed.
+_PLACE = np.array([90.0, 180.0, 10_000.0])
+
+
+def read_px4(path: Path) -> RawLog:
+    """Read a log.  Raises LogError for one that pyulog cannot read, and one without vehicle_global_position."""
+    try:
+        # It complains on the terminal.
+        with contextlib.redirect_stdout(io.StringIO()), path.open("rb") as file:
+            found = ULog(_Steps(file), _TOPICS, disable_str_exceptions=True)
+    except MemoryError:
+        raise LogError(f"{path}: claims more than fits into memory", file=path) from None
+    except Exception as error:  # of whatever kind: the library raises struct's, its own and plain ones
+        raise LogError(f"{path}: not a PX4 log that can be read: {_one_line(error)}", file=path) from error
+    return _Topics(found, str(path), _damage_of(path)).log()
+
+
+class _Steps:
+    """A file in which a step back from a read that met the end is as long as what was read.
+
+    pyulog steps back by what a record claims to be, and would read the end of a damaged file again and again.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._missing = file, 0
+
+    def read(self, size: int) -> bytes:
+        data = self._file.read(size)
+        self._missing = size - len(data)
+        return data
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        missing = self._missing if whence == 1 else 0
+        self._missing = 0
+        return self._file.seek(offset + missing, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def find_damage(data: Bytes, let_go: Callable[[], None] = lambda: None) -> Damage:
+    """What of a log (n,) of bytes cannot be read: its records follow each other, each with a length and a known letter.
+
+    >>> find_damage(np.zeros(20, np.uint8)).places
+    1
+    """
+    state = np.zeros(5, np.int64)
+    state[_AT], state[_READING] = _HEADER, 1
+    for until in pieces(data.size, let_go):
+        _walk(data, until, state, np.frombuffer(_LETTERS, np.uint8))
+    cut = bool(state[_CUT]) or int(state[_AT]) < data.size
+    return Damage(int(state[_PLACES]), int(state[_LOST]), cut)
+
+
+def _damage_of(path: Path) -> Damage:
+    file = MappedFile(path)
+    return find_damage(file.data, file.let_go)
+
+
+# Of a walk: the next byte, places where no record begins, their bytes, whether the last was one, whether it is cut.
+_AT, _PLACES, _LOST, _READING, _CUT = range(5)
+
+
+@compiled
+def _walk(data: Bytes, until: int, state: Ints, letters: Bytes) -> None:  # pragma: no cover - compiled
+    """Go on to a byte from a walk's state."""
+    known = np.zeros(256, np.bool_)
+    for letter in letters:
+        known[letter] = True
+    k, places, size, reading, cut = state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT]
+    while k + 3 <= data.size and k < until and not cut:
+        length = data[k] + 256 * data[k + 1]
+        after = k + 3 + length
+        if known[data[k + 2]] and after > data.size:
+            # Only what a cut record would be: nothing else can follow it.
+            cut = 1
+            break
+        follows = after + 3 > data.size or known[data[after + 2]]
+        if known[data[k + 2]] and follows:
+            k = after
+            reading = 1
+        else:
+            places += reading
+            reading = 0
+            size += 1
+            k += 1
+    state[_AT], state[_PLACES], state[_LOST], state[_READING], state[_CUT] = k, places, size, reading, cut
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:120] or type(error).__name__
+
+
+class _Topics:
+    """The topics of one log, the first instance of each."""
+
+    def __init__(self, log: ULog, source: str, damage: Damage) -> None:
+        self._log, self._source, self._damage = log, source, damage
+        self._data: dict[str, dict[str, Any]] = {}
+        for one in sorted(log.data_list, key=lambda data: -int(data.multi_id)):
+            if "timestamp" in one.data and len(one.data["timestamp"]):
+                self._data[one.name] = one.data
+
+    def log(self) -> RawLog:
+        series = {name: found for name, found in self._series() if found is not None and len(found.time)}
+        if "position" not in series:
+            raise LogError(f"{self._source}: no vehicle_global_position: nothing says where it flew", file=self._source)
+        return RawLog(
+            source=self._source,
+            format=FORMAT,
+            program=self._program(),
+            vehicle=self._vehicle(),
+            series=series,
+            heights=tuple(self._heights()),
+            datum="amsl",
+            modes=tuple(self._modes()),
+            missions=tuple(self._missions()),
+            parameters=self._parameters(),
+            events=tuple((one.timestamp * 1e-6, str(one.message)) for one in self._log.logged_messages),
+            utc_start=self._utc_start(),
+            damage=replace(self._damage, places=self._damage.places + len(self._log.dropouts)),
+        )
+
+    def _table(self, topic: str, *choices: tuple[str, ...]) -> LogSeries | None:
+        """The first choice of fields that a topic has."""
+        data = self._data.get(topic, {})
+        for columns in choices:
+            if data and all(column in data for column in columns):
+                values = np.stack([np.asarray(data[column], dtype=np.float64) for column in columns], axis=1)
+                return LogSeries(topic, np.asarray(data["timestamp"], dtype=np.float64) * 1e-6, values)
+        return None
+
+    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+        place = self._table("vehicle_global_position", ("lat", "lon", "alt"), ("latitude", "longitude", "altitude"))
+        yield "position", place if place is not None else self._gps()
+        yield "velocity", self._velocity()
+        yield "attitude", self._attitude()
+        yield "airspeed", self._airspeed()
+        wind = self._table("wind", ("windspeed_east", "windspeed_north"))
+        if wind is None:
+            wind = self._table("wind_estimate", ("windspeed_east", "windspeed_north"))
+        yield "wind", wind if wind is not None and np.any(wind.values) else None
+        yield "battery", self._battery()
+        yield "throttle", self._table("actuator_controls_0", ("control[3]",))
+
+    def _gps(self) -> LogSeries | None:
+        for topic in ("vehicle_gps_position", "sensor_gps"):
+            found = self._table(topic, ("latitude_deg", "longitude_deg", "altitude_msl_m"))
+            if found is not None:
+                return found
+            whole = self._table(topic, ("lat", "lon", "alt"))
+            if whole is not None:
+                return LogSeries(topic, whole.time, np.round(whole.values * np.array([1e-7, 1e-7, 1e-3]), 7))
+        return None
+
+    def _velocity(self) -> LogSeries | None:
+        found = self._table("vehicle_local_position", ("vy", "vx", "vz"))
+        if found is None:
+            found = self._table("vehicle_global_position", ("vel_e", "vel_n", "vel_d"))
+        if found is None:
+            return None
+        return LogSeries(found.source, found.time, found.values * np.array([1.0, 1.0, -1.0]))
+
+    def _attitude(self) -> LogSeries | None:
+        found = self._table("vehicle_attitude", ("q[0]", "q[1]", "q[2]", "q[3]"))
+        if found is None:
+            return self._table("vehicle_attitude", ("roll", "pitch", "yaw"))
+        w, x, y, z = found.values.T
+        roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return LogSeries(found.source, found.time, np.stack([roll, pitch, yaw], axis=1))
+
+    def _airspeed(self) -> LogSeries | None:
+        for topic in ("airspeed_validated", "airspeed"):
+            found = self._table(topic, ("true_airspeed_m_s",))
+            if found is not None:
+                good = np.isfinite(found.values[:, 0])
+                if good.any() and np.any(found.values[good]):
+                    return LogSeries(topic, found.time[good], found.values[good])
+        return None
+
+    def _battery(self) -> LogSeries | None:
+        found = self._table("battery_status", ("current_a", "voltage_v"))
+        if found is None or not (found.values[:, 0] > 0.0).any():
+            return None
+        step = np.clip(np.diff(found.time, prepend=found.time[0]), 0.0, 10.0)
+        current = np.maximum(found.values[:, 0], 0.0)
+        energy = np.cumsum(current * found.values[:, 1] * step) / 3600.0
+        return LogSeries(found.source, found.time, np.stack([current, energy], axis=1))
+
+    def _heights(self) -> Iterable[HeightSource]:
+        gps = self._gps()
+        if gps is not None and "vehicle_global_position" in self._data:
+            yield HeightSource(f"{gps.source}.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
+        baro = self._table("vehicle_air_data", ("baro_alt_meter",))
+        if baro is not None:
+            yield HeightSource("vehicle_air_data.baro_alt_meter", "pressure", baro)
+
+    def _modes(self) -> Iterable[ModeChange]:
+        data = self._data.get("vehicle_status", {})
+        if "nav_state" not in data:
+            return
+        last = -1
+        for time, state in zip(data["timestamp"].tolist(), data["nav_state"].tolist(), strict=True):
+            if state != last:
+                yield ModeChange(time * 1e-6, *px4_state(int(state)))
+                last = state
+
+    def _vehicle(self) -> VehicleKind:
+        data = self._data.get("vehicle_status", {})
+        if "vehicle_type" in data:
+            kinds = np.asarray(data["vehicle_type"])
+            # A VTOL is a copter at its ends.
+            if (kinds == 2).any():
+                return "plane"
+            return _TYPES.get(int(kinds[0]), "unknown")
+        if "is_rotary_wing" in data:
+            return "copter" if np.all(np.asarray(data["is_rotary_wing"])) else "plane"
+        return "unknown"
+
+    def _missions(self) -> Iterable[LoggedMission]:
+        """Items as they became the current one; those that were never flown to are not in the log."""
+        data = self._data.get("navigator_mission_item", {})
+        wanted = ("sequence_current", "nav_cmd", "latitude", "longitude", "altitude")
+        if not all(name in data for name in wanted):
+            return
+        count = len(data["timestamp"])
+        relative = data.get("altitude_is_relative", np.zeros(count))
+        radius = data.get("acceptance_radius", np.zeros(count))
+        items: dict[int, MissionItem] = {}
+        for k in range(count):
+            number, command, lat, lon, up = (float(data[name][k]) for name in wanted)
+            # Before anything is made of them: garbage may be too large for any degrees.
+            if not (abs(lat) <= 90.0 and abs(lon) <= 180.0 and math.isfinite(up)):
+                continue
+            frame = _OVER_HOME if relative[k] else _AMSL
+            params = (0.0, float(radius[k]), 0.0, 0.0)
+            place = (on_grid(lat), on_grid(lon), round(up, 6))
+            item = MissionItem(int(number), int(command), frame, params, *place)
+            if math.isfinite(number) and item_problem(item) is None:
+                items.setdefault(item.seq, item)
+        if len(items) > 1:
+            made = Mission(
+                self._home(), tuple(items[seq] for seq in sorted(items)), source=f"{self._source}: mission items"
+            )
+            yield LoggedMission(float(data["timestamp"][0]) * 1e-6, renumbered(made), "navigator_mission_item")
+
+    def _home(self) -> Home | None:
+        found = self._table("home_position", ("lat", "lon", "alt"))
+        if found is None:
+            return None
+        placed = found.values[np.isfinite(found.values).all(axis=1) & (np.abs(found.values) < _PLACE).all(axis=1)]
+        return Home(on_grid(placed[-1, 0]), on_grid(placed[-1, 1]), float(placed[-1, 2])) if len(placed) else None
+
+    def _parameters(self) -> dict[str, float]:
+        return {str(name): float(value) for name, value in self._log.initial_parameters.items()}
+
+    def _program(self) -> str:
+        info = self._log.msg_info_dict
+        name, release = str(info.get("sys_name", "PX4")), info.get("ver_sw_release")
+        if isinstance(release, int):
+            return f"{name} v{release >> 24 & 0xFF}.{release >> 16 & 0xFF}.{release >> 8 & 0xFF}"
+        return name
+
+    def _utc_start(self) -> float:
+        for topic in ("vehicle_gps_position", "sensor_gps"):
+            data = self._data.get(topic, {})
+            if "time_utc_usec" in data:
+                stamps = np.asarray(data["time_utc_usec"], dtype=np.float64)
+                good = np.flatnonzero(stamps > 0.0)
+                if good.size:
+                    return float((stamps[good[0]] - float(data["timestamp"][good[0]])) * 1e-6)
+        return math.nan

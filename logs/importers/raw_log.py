@@ -1,0 +1,183 @@
+"""What a log of the field holds, in SI units, whatever program wrote it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.mission.items import Command, Frame, Home, Mission, MissionItem, on_grid
+from flight.simulation.setup import Damage, VerticalDatum
+from world.frames import GeoOrigin, to_geo
+
+Floats = NDArray[np.float64]
+
+
+# What kind of vehicle wrote it: "unknown" where the log does not say.
+VehicleKind = Literal["plane", "copter", "rover", "boat", "submarine", "tracker", "blimp", "unknown"]
+
+# Columns of each series.
+COLUMNS = {
+    "position": ("lat", "lon", "up"),
+    "velocity": ("east", "north", "up"),
+    "attitude": ("roll", "pitch", "yaw"),
+    "airspeed": ("true",),
+    "wind": ("east", "north"),
+    "battery": ("current", "energy"),
+    "throttle": ("share",),
+    "height": ("up",),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LogSeries:
+    """Rows of one kind in the order of the file.
+
+    source: the message they are of, for people: "POS", "vehicle_global_position".
+    time: (n,) s on the log's clock, as written.
+    values: (n, k), a column for each name of `COLUMNS`: degrees for latitude and longitude, rad for attitude, m, m/s,
+    A and Wh for the rest.
+    """
+
+    source: str
+    time: Floats
+    values: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class HeightSource:
+    """One of several heights that a log holds.
+
+    datum: of the heights.  series: one column, m.
+    """
+
+    name: str
+    datum: VerticalDatum
+    series: LogSeries
+
+
+@dataclass(frozen=True, slots=True)
+class ModeChange:
+    """From when (s) a flight mode held; automatic: the vehicle followed its mission."""
+
+    time: float
+    name: str
+    automatic: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedMission:
+    """A mission as the vehicle had it, from a time (s) on.
+
+    origin: what of the log holds it, for people: "CMD", "MISSION_ITEM_INT", "declared task".
+    with_heights: whether its items state heights.
+    """
+
+    time: float
+    mission: Mission
+    origin: str
+    with_heights: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class RawLog:
+    """A log as its reader gives it; nothing is put in order yet.
+
+    format: for people: "ArduPilot dataflash log".
+    program: what flew, as the log names it; "" where it does not.
+    vehicle: what it is.
+    series: by the names of `COLUMNS` but "height"; a name that is not there the log does not hold.
+    heights: the heights beside that of the position, for comparison.
+    datum: of the position's height.
+    modes: in order of the file; none of a log without modes.
+    missions: in order of the file.
+    parameters: by name, the last value of each.
+    events: time (s) and text of what the vehicle said.
+    clock: "boot" for seconds since the vehicle was switched on, "start" since the first row.
+    utc_start: s since 1970 at time 0 of the log's clock; NaN where it is not known.
+    clock_jumps: where the log's clock went back for good, s.
+    damage: what could not be read.
+    """
+
+    source: str
+    format: str
+    program: str
+    vehicle: VehicleKind
+    series: Mapping[str, LogSeries]
+    heights: tuple[HeightSource, ...]
+    datum: VerticalDatum
+    modes: tuple[ModeChange, ...] = ()
+    missions: tuple[LoggedMission, ...] = ()
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    events: tuple[tuple[float, str], ...] = ()
+    clock: Literal["boot", "start"] = "boot"
+    utc_start: float = math.nan
+    clock_jumps: tuple[float, ...] = ()
+    damage: Damage = field(default_factory=Damage)
+
+
+# ----------------------------------------------------------------------
+# A log of a short flight that nobody flew, for examples and tests: along two legs at a right angle, in AUTO.
+
+# m/s, m.
+SPEED, LEG, UP = 25.0, 1000.0, 500.0
+# s, between rows; until the first waypoint is passed, and after the last.
+STEP, BEFORE, AFTER = 0.2, 10.0, 2.0
+
+
+def example_raw_log(lat: float = 46.0, lon: float = 8.0, up: float = UP) -> RawLog:
+    """North for 1 km and east for as much from a place (degrees) at a height (m AMSL), the corner as sharp as none is.
+
+    >>> log = example_raw_log()
+    >>> log.program, log.modes[0].name, len(log.missions[0].mission.items)
+    ('ArduPlane V4.5.0', 'AUTO', 3)
+    """
+    time = np.arange(0.0, BEFORE + 2.0 * LEG / SPEED + AFTER, STEP)
+    run = SPEED * (time - BEFORE)
+    north, east = np.minimum(run, LEG), np.maximum(run - LEG, 0.0)
+    lats, lons = to_geo(GeoOrigin(lat, lon), east, north)
+    on_first = run < LEG
+    course = np.where(on_first, 0.0, 0.5 * math.pi)
+    level = np.zeros(time.size)
+    boot = time + 20.0
+
+    def series(name: str, *columns: np.ndarray) -> LogSeries:
+        return LogSeries(name, boot, np.column_stack(columns))
+
+    ends = [to_geo(GeoOrigin(lat, lon), *place) for place in ((0.0, 0.0), (0.0, LEG), (LEG, LEG))]
+    items = tuple(
+        MissionItem(
+            number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(float(y)), on_grid(float(x)), up
+        )
+        for number, (y, x) in enumerate(ends, 1)
+    )
+    home = Home(items[0].lat_deg, items[0].lon_deg, up - 100.0)
+    height = np.full(time.size, up)
+    return RawLog(
+        source="example.BIN",
+        format="ArduPilot dataflash log",
+        program="ArduPlane V4.5.0",
+        vehicle="plane",
+        series={
+            "position": series("POS", lats, lons, height),
+            "velocity": series("XKF1", SPEED * np.sin(course), SPEED * np.cos(course), level),
+            "attitude": series("ATT", level, level + 0.05, course),
+            "airspeed": series("ARSP", level + SPEED),
+            "wind": series("XKF2", level, level - 3.0),
+            "throttle": series("CTUN", level + 0.6),
+        },
+        heights=(HeightSource("GPS.Alt", "amsl", series("GPS", height + 0.5)),),
+        datum="amsl",
+        modes=(ModeChange(20.0, "AUTO", True),),
+        missions=(LoggedMission(20.0, Mission(home, items, source="example.BIN"), "CMD"),),
+        parameters={
+            "WP_RADIUS": 60.0,
+            "AIRSPEED_CRUISE": 25.0,
+            "AIRSPEED_MIN": 18.0,
+            "AIRSPEED_MAX": 32.0,
+            "ROLL_LIMIT_DEG": 45.0,
+        },
+        utc_start=1_700_000_000.0,
+    )

@@ -1,0 +1,438 @@
+"""Telemetry logs (`.tlog`) of ground stations: what an ArduPlane or PX4 sent, and the missions it was sent.
+
+The clock is the vehicle's, `time_boot_ms`; messages without it are placed by the time at which they were received.
+"""
+
+import math
+import struct
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pymavlink.dialects.v20 import ardupilotmega as dialect
+
+from flight.autopilots.arduplane.law import true_by_equivalent
+from flight.mission.items import Home, Mission, MissionItem, on_grid, renumbered
+from flight.simulation.setup import Damage
+from logs.importers.clean_places import steady_clock
+from logs.importers.dataflash_frames import PIECE, MappedFile
+from logs.importers.logged_missions import Item, gather_items, logged_mission, plane_mode, px4_mode
+from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, ModeChange, RawLog, VehicleKind
+from world.errors import LogError
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# The messages of a telemetry log (`.tlog`): each a time of eight bytes, and a MAVLink packet as it was received.
+#
+# MAVLink 1 packets begin with 0xFE, those of MAVLink 2 with 0xFD (mavlink.io, "Packet Serialization"); pymavlink
+# decodes
+# them and checks their checksums.  The time is in microseconds since 1970, big-endian (QGroundControl, MAVProxy).
+
+_STAMP = struct.Struct(">Q")
+_V1, _V2 = 0xFE, 0xFD
+# Bytes beside the payload, the checksum included; those of a signature.
+_V1_FRAME, _V2_FRAME, _SIGNATURE = 8, 12, 13
+_SIGNED = 0x01
+# Times that a telemetry log may hold: from 2000 to 2100, us since 1970.
+_FIRST, _LAST = 946_684_800_000_000, 4_102_444_800_000_000
+
+
+@dataclass
+class TelemetryReader:
+    """Decodes the wanted messages of a log and counts what could not be read.
+
+    wanted: their numbers.
+    let_go: called now and then, to give back the memory of what was read.
+    """
+
+    data: memoryview
+    wanted: frozenset[int]
+    let_go: Callable[[], None] = lambda: None
+    places: int = 0
+    size: int = 0
+    cut: bool = False
+    unreadable: int = 0
+    _decoder: Any = field(default_factory=lambda: dialect.MAVLink(None))
+
+    def messages(self) -> Iterator[tuple[float, Any]]:
+        """Time received (s since 1970) and message, in the order of the file."""
+        at, end, reading, piece = 0, len(self.data), True, PIECE
+        while at + _STAMP.size + _V1_FRAME <= end:
+            if at >= piece:
+                self.let_go()
+                piece = at + PIECE
+            length = self._length(at)
+            if length == 0:
+                self.places += reading
+                self.size += 1
+                at += 1
+                reading = False
+                continue
+            if at + length > end:
+                self.cut = True
+                break
+            reading = True
+            if self._number(at) in self.wanted:
+                stamp = _STAMP.unpack_from(self.data, at)[0] * 1e-6
+                message = self._decode(bytes(self.data[at + _STAMP.size : at + length]))
+                if message is None:
+                    self.unreadable += 1
+                else:
+                    yield stamp, message
+            at += length
+
+    def damage(self) -> Damage:
+        """What could not be read."""
+        return Damage(self.places, self.size, self.cut, self.unreadable)
+
+    def _length(self, at: int) -> int:
+        """Bytes of the record at a place, its time included; 0 where none begins there."""
+        stamp = _STAMP.unpack_from(self.data, at)[0]
+        if not _FIRST <= stamp <= _LAST:
+            return 0
+        packet = at + _STAMP.size
+        magic, payload = self.data[packet], self.data[packet + 1]
+        if magic == _V1:
+            return _STAMP.size + _V1_FRAME + payload
+        if magic == _V2:
+            signature = _SIGNATURE if self.data[packet + 2] & _SIGNED else 0
+            return _STAMP.size + _V2_FRAME + payload + signature
+        return 0
+
+    def _number(self, at: int) -> int:
+        packet = at + _STAMP.size
+        if self.data[packet] == _V1:
+            return self.data[packet + 5]
+        return self.data[packet + 7] | self.data[packet + 8] << 8 | self.data[packet + 9] << 16
+
+    def _decode(self, packet: bytes) -> Any:
+        try:
+            return self._decoder.decode(bytearray(packet))
+        except Exception:  # of whatever kind: the library raises struct's, its own and plain ones
+            return None
+
+
+def looks_like_telemetry(head: bytes) -> bool:
+    """Whether a file's first bytes are a time and a packet's beginning.
+
+    >>> looks_like_telemetry(_STAMP.pack(1_700_000_000_000_000) + bytes([0xFD, 9]))
+    True
+    """
+    if len(head) < _STAMP.size + 2:
+        return False
+    return _FIRST <= _STAMP.unpack_from(head)[0] <= _LAST and head[_STAMP.size] in (_V1, _V2)
+
+
+# ----------------------------------------------------------------------
+# The messages of one system in a telemetry log: those of numbers as rows, so that a long log stays small.
+
+
+# Fields that are kept of the messages that come many times a second.
+NUMBERS = {
+    "GLOBAL_POSITION_INT": ("lat", "lon", "alt", "vx", "vy", "vz"),
+    "ATTITUDE": ("roll", "pitch", "yaw"),
+    "VFR_HUD": ("airspeed", "groundspeed", "alt", "throttle"),
+    "WIND": ("direction", "speed"),
+    "WIND_COV": ("wind_x", "wind_y"),
+    "GPS_RAW_INT": ("lat", "lon", "alt", "fix_type"),
+    "SYS_STATUS": ("current_battery", "voltage_battery"),
+    "BATTERY_STATUS": ("current_battery", "energy_consumed"),
+}
+# Of each other kind this many are kept.
+_MOST = 200_000
+
+
+class BootClock(NamedTuple):
+    """The vehicle's clock.
+
+    offset: of time 0, s since 1970.  jumps: s, where the vehicle was switched on anew.  time: (n,) s, of each message.
+    """
+
+    offset: float
+    jumps: tuple[float, ...]
+    time: Floats
+
+
+class SystemMessages:
+    """What one system sent."""
+
+    def __init__(self) -> None:
+        self._stamps, self._boots = array("d"), array("d")
+        self._rows: dict[str, array[float]] = {}
+        self._named: dict[str, list[tuple[int, Any]]] = {}
+
+    def __len__(self) -> int:
+        """How many messages."""
+        return len(self._stamps)
+
+    def add(self, stamp: float, message: Any) -> None:
+        """Take a message, received at ``stamp`` (s since 1970)."""
+        name, number = message.get_type(), len(self._stamps)
+        boot = getattr(message, "time_boot_ms", None)
+        self._stamps.append(stamp)
+        self._boots.append(math.nan if boot is None else boot * 1e-3)
+        fields = NUMBERS.get(name)
+        if fields is None:
+            kept = self._named.setdefault(name, [])
+            if len(kept) < _MOST:
+                kept.append((number, message))
+            return
+        rows = self._rows.setdefault(name, array("d"))
+        rows.append(number)
+        rows.extend(float(getattr(message, field)) for field in fields)
+
+    def table(self, name: str) -> Floats:
+        """Rows (n, 1 + fields) of a kind in `NUMBERS`: the message's number among all, and its fields."""
+        rows = self._rows.get(name)
+        return np.array(rows if rows is not None else [], dtype=np.float64).reshape(-1, 1 + len(NUMBERS[name]))
+
+    def named(self, name: str) -> list[tuple[int, Any]]:
+        """Number and message of every other kind."""
+        return self._named.get(name, [])
+
+    def boot_times(self) -> BootClock:
+        """The vehicle's clock, and each message's time on it.
+
+        A message without a time of its own has that of the one before it, and as much more as it was received later.
+        """
+        stamps, time = np.array(self._stamps), np.array(self._boots)
+        known = np.flatnonzero(np.isfinite(time))
+        if not known.size:
+            offset = float(stamps[0]) if stamps.size else math.nan
+            return BootClock(offset, (), stamps - offset)
+        offset = float(stamps[known[0]] - time[known[0]])
+        steady = steady_clock(time[known])
+        time[known] = steady.time
+        before = known[np.clip(np.searchsorted(known, np.arange(time.size), side="right") - 1, 0, None)]
+        unknown = ~np.isfinite(time)
+        time[unknown] = time[before[unknown]] + (stamps - stamps[before])[unknown]
+        return BootClock(offset, steady.jumps, time)
+
+
+FORMAT = "MAVLink telemetry log"
+_KEPT = ("HEARTBEAT", "PARAM_VALUE", "STATUSTEXT", "HOME_POSITION")
+_MISSION = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
+_WANTED = frozenset((*_KEPT, *_MISSION, *NUMBERS))
+_NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED)
+# Items that are kept: far more than a station sends.
+_MOST_ITEMS = 200_000
+# MAV_TYPE; what is not listed says nothing of what it is.
+_TYPES: dict[int, VehicleKind] = {
+    1: "plane", 16: "plane", 19: "plane", 20: "plane", 21: "plane", 22: "plane", 23: "plane", 24: "plane", 25: "plane",
+    2: "copter", 3: "copter", 4: "copter", 13: "copter", 14: "copter", 15: "copter", 29: "copter", 35: "copter",
+    5: "tracker", 7: "blimp", 10: "rover", 11: "boat", 12: "submarine",
+}  # fmt: skip
+# Ground stations, onboard computers, gimbals, receivers for other traffic.
+_NO_VEHICLES = (6, 18, 26, 27)
+_NOT_AUTOPILOTS = (8, 18)
+_PX4 = 12
+_NAMES = {3: "ArduPilot", _PX4: "PX4"}
+_MISSION_TYPE = 0
+
+
+def read_telemetry(path: Path) -> RawLog:
+    """Read a log.  Raises LogError for one without GLOBAL_POSITION_INT or GPS_RAW_INT."""
+    file = MappedFile(path)
+    reader = TelemetryReader(memoryview(file.data), _NUMBERS, file.let_go)  # type: ignore[arg-type]  # a buffer
+    systems: dict[int, SystemMessages] = {}
+    items: list[tuple[float, Any]] = []
+    for stamp, message in reader.messages():
+        systems.setdefault(message.get_srcSystem(), SystemMessages()).add(stamp, message)
+        if message.get_type() in _MISSION and len(items) < _MOST_ITEMS:
+            items.append((stamp, message))
+    vehicles = [found for found in systems.values() if any(_is_vehicle(one) for _, one in found.named("HEARTBEAT"))]
+    if not vehicles:
+        raise LogError(f"{path}: no HEARTBEAT of a vehicle: nothing says what flew", file=path)
+    # Of several the one that is heard most often.
+    return _Messages(max(vehicles, key=len), items, str(path)).log(reader)
+
+
+def _is_vehicle(message: Any) -> bool:
+    return message.type not in _NO_VEHICLES and message.autopilot not in _NOT_AUTOPILOTS
+
+
+class _Messages:
+    """The messages of one vehicle, by name, on its own clock."""
+
+    def __init__(self, own: SystemMessages, items: list[tuple[float, Any]], source: str) -> None:
+        self._source, self._found = source, own
+        clock = own.boot_times()
+        self._offset, self.jumps, self._times = clock.offset, clock.jumps, clock.time
+        # Missions go to the vehicle: they are the station's messages.
+        self._items = [(stamp - self._offset, message) for stamp, message in items]
+        self._own = {name: [(float(self._times[k]), one) for k, one in own.named(name)] for name in _KEPT}
+
+    def log(self, reader: TelemetryReader) -> RawLog:
+        series = {name: found for name, found in self._series() if found is not None}
+        beats = [one for _, one in self._own.get("HEARTBEAT", []) if _is_vehicle(one)]
+        if "position" not in series:
+            raise LogError(
+                f"{self._source}: no GLOBAL_POSITION_INT or GPS_RAW_INT with a fix: nothing says where it flew",
+                file=self._source,
+            )
+        return RawLog(
+            source=self._source,
+            format=FORMAT,
+            program=self._program(beats[0]),
+            vehicle=_TYPES.get(beats[0].type, "unknown"),
+            series=series,
+            heights=tuple(self._heights()),
+            datum="amsl",
+            modes=tuple(self._modes()),
+            missions=tuple(self._missions()),
+            parameters=self._parameters(),
+            events=tuple((time, _text(one.text)) for time, one in self._own.get("STATUSTEXT", [])),
+            utc_start=self._offset,
+            clock_jumps=self.jumps,
+            damage=reader.damage(),
+        )
+
+    def _table(self, name: str, columns: Iterable[str]) -> LogSeries | None:
+        rows = self._found.table(name)
+        if not len(rows):
+            return None
+        wanted = [1 + NUMBERS[name].index(column) for column in columns]
+        return LogSeries(name, self._times[rows[:, 0].astype(np.int64)], rows[:, wanted])
+
+    def _series(self) -> Iterable[tuple[str, LogSeries | None]]:
+        place = self._table("GLOBAL_POSITION_INT", ("lat", "lon", "alt", "vy", "vx", "vz"))
+        if place is not None:
+            known = (place.values[:, :2] != 0.0).any(axis=1)
+            place = LogSeries(place.source, place.time[known], place.values[known]) if known.any() else None
+        if place is not None:
+            scaled = place.values * np.array([1e-7, 1e-7, 1e-3, 0.01, 0.01, -0.01])
+            # To the nearest 1e-7 degrees, which is what was sent.
+            scaled[:, :2] = np.round(scaled[:, :2], 7)
+            yield "position", LogSeries(place.source, place.time, scaled[:, :3])
+            yield "velocity", LogSeries(place.source, place.time, scaled[:, 3:])
+        else:
+            yield "position", self._gps_place()
+        yield "attitude", self._table("ATTITUDE", ("roll", "pitch", "yaw"))
+        yield "wind", self._wind()
+        hud = self._table("VFR_HUD", ("airspeed", "alt", "throttle", "groundspeed"))
+        if hud is not None:
+            # Where there is no sensor some send the ground speed.
+            sensed = np.any(hud.values[:, 0] > 0.0) and not np.array_equal(hud.values[:, 0], hud.values[:, 3])
+            if sensed:
+                up = np.clip(hud.values[:, 1], -500.0, 20_000.0)
+                ratio = np.array([true_by_equivalent(float(height)) for height in up])
+                yield "airspeed", LogSeries("VFR_HUD", hud.time, hud.values[:, :1] * ratio[:, None])
+            yield "throttle", LogSeries("VFR_HUD", hud.time, hud.values[:, 2:3] * 0.01)
+        yield "battery", self._battery()
+
+    def _gps_place(self) -> LogSeries | None:
+        found = self._table("GPS_RAW_INT", ("lat", "lon", "alt", "fix_type"))
+        if found is None:
+            return None
+        fixed = found.values[:, 3] >= 3
+        if not fixed.any():
+            return None
+        scaled = np.round(found.values[fixed, :3] * np.array([1e-7, 1e-7, 1e-3]), 7)
+        return LogSeries("GPS_RAW_INT", found.time[fixed], scaled)
+
+    def _wind(self) -> LogSeries | None:
+        own = self._table("WIND", ("direction", "speed"))
+        if own is not None and np.any(own.values[:, 1]):
+            # It blows from there.
+            course, speed = np.radians(own.values[:, 0]), own.values[:, 1]
+            return LogSeries("WIND", own.time, np.stack([-speed * np.sin(course), -speed * np.cos(course)], axis=1))
+        covered = self._table("WIND_COV", ("wind_y", "wind_x"))
+        return covered if covered is not None and np.any(covered.values) else None
+
+    def _battery(self) -> LogSeries | None:
+        found = self._table("BATTERY_STATUS", ("current_battery", "energy_consumed"))
+        if found is not None and (found.values >= 0.0).all() and np.any(found.values[:, 1]):
+            return LogSeries(found.source, found.time, found.values * np.array([0.01, 1.0 / 36.0]))
+        found = self._table("SYS_STATUS", ("current_battery", "voltage_battery"))
+        if found is None or (found.values[:, 0] < 0.0).any() or not np.any(found.values[:, 0]):
+            return None
+        current, volts = found.values[:, 0] * 0.01, found.values[:, 1] * 1e-3
+        step = np.clip(np.diff(found.time, prepend=found.time[0]), 0.0, 10.0)
+        return LogSeries(
+            found.source, found.time, np.stack([current, np.cumsum(current * volts * step) / 3600.0], axis=1)
+        )
+
+    def _heights(self) -> Iterable[HeightSource]:
+        gps = self._gps_place()
+        if gps is not None and len(self._found.table("GLOBAL_POSITION_INT")):
+            yield HeightSource("GPS_RAW_INT.alt", "amsl", LogSeries(gps.source, gps.time, gps.values[:, 2:]))
+        hud = self._table("VFR_HUD", ("alt",))
+        if hud is not None:
+            yield HeightSource("VFR_HUD.alt", "amsl", hud)
+
+    def _modes(self) -> Iterable[ModeChange]:
+        last: tuple[str, bool] | None = None
+        for time, beat in self._own.get("HEARTBEAT", []):
+            if not _is_vehicle(beat):
+                continue
+            mode = px4_mode(beat.custom_mode) if beat.autopilot == _PX4 else plane_mode(beat.custom_mode)
+            if mode != last:
+                yield ModeChange(time, *mode)
+                last = mode
+
+    def _missions(self) -> Iterable[LoggedMission]:
+        """Items as they went up, or came down when a station asked for them."""
+        rows: list[Item] = []
+        total = 0
+        for time, message in self._items:
+            kind = message.get_type()
+            if getattr(message, "mission_type", _MISSION_TYPE) != _MISSION_TYPE:
+                continue
+            if kind == "MISSION_COUNT":
+                total = message.count
+            elif kind in ("MISSION_ITEM", "MISSION_ITEM_INT"):
+                rows.append(Item(time, total, _item(message, scaled=kind == "MISSION_ITEM_INT")))
+        px4 = any(one.autopilot == _PX4 for _, one in self._own["HEARTBEAT"])
+        for start, items in gather_items(rows):
+            made = _px4_mission(items, self._source) if px4 else logged_mission(items, f"{self._source}: mission items")
+            if made is not None:
+                yield LoggedMission(start, self._with_home(made), "mission items")
+
+    def _with_home(self, mission: Mission) -> Mission:
+        """With home as the vehicle has it: that of an uploaded mission is only where a station supposed it."""
+        heard = [one for _, one in self._own["HOME_POSITION"] if one.latitude or one.longitude]
+        if not heard:
+            return mission
+        home = heard[-1]
+        place = Home(home.latitude * 1e-7, home.longitude * 1e-7, home.altitude * 1e-3)
+        return Mission(place, mission.items, warnings=mission.warnings, source=mission.source)
+
+    def _parameters(self) -> dict[str, float]:
+        found: dict[str, float] = {}
+        for _, one in self._own.get("PARAM_VALUE", []):
+            name = _text(one.param_id)
+            if name and math.isfinite(one.param_value):
+                found[name] = float(one.param_value)
+        return found
+
+    def _program(self, beat: Any) -> str:
+        for _, one in self._own.get("STATUSTEXT", []):
+            text = _text(one.text)
+            if "Ardu" in text and " V" in text:
+                return text
+        return _NAMES.get(beat.autopilot, "")
+
+
+def _text(value: str | bytes) -> str:
+    text = value.decode("latin-1") if isinstance(value, bytes) else value
+    return text.partition("\0")[0].strip()
+
+
+def _item(message: Any, *, scaled: bool) -> MissionItem:
+    command, frame = int(message.command), int(message.frame)
+    lat, lon = (message.x * 1e-7, message.y * 1e-7) if scaled else (float(message.x), float(message.y))
+    params = (float(message.param1), float(message.param2), float(message.param3), float(message.param4))
+    return MissionItem(int(message.seq), command, frame, params, on_grid(lat), on_grid(lon), round(message.z, 6))
+
+
+def _px4_mission(items: tuple[MissionItem, ...], source: str) -> Mission | None:
+    """PX4 keeps no home among the items."""
+    if len(items) < 2:
+        return None
+    return renumbered(Mission(None, items, source=f"{source}: mission items"))

@@ -1,0 +1,332 @@
+"""Track files: GPX, IGC flight recorders and KML, as flights without attitude or controls."""
+
+import calendar
+import math
+import re
+import zipfile
+import zlib
+from datetime import UTC, datetime
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree
+
+import gpxpy
+import gpxpy.gpx
+import numpy as np
+
+from flight.mission.items import Command, Frame, Mission, MissionItem, on_grid
+from flight.simulation.setup import Damage, VerticalDatum
+from logs.importers.raw_log import HeightSource, LoggedMission, LogSeries, RawLog
+from world.errors import LogError
+
+# ----------------------------------------------------------------------
+# The text of a track file: of a size that can be read, and without the traps of XML.
+
+# A track of a day at ten points a second takes less.
+MOST_BYTES = 256 * 2**20
+# A document type can hold entities that grow without bound, or that name other files.
+_DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
+
+
+def track_text(path: Path, *, xml: bool) -> str:
+    """The text of a file, bytes that are no UTF-8 replaced.
+
+    Of a zipped file (`.kmz`) it is that of its first `.kml`.  Raises LogError for a file of more than `MOST_BYTES`, and
+    for XML with a document type.
+    """
+    size = path.stat().st_size
+    if size > MOST_BYTES:
+        raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read of a track", file=path)
+    text = _bytes_of(path).decode("utf-8-sig", errors="replace")
+    if xml and _DOCUMENT_TYPE.search(text):
+        raise LogError(
+            f"{path}: a document type: none is expected in a track, and entities are not expanded", file=path
+        )
+    return text
+
+
+def _bytes_of(path: Path) -> bytes:
+    if not zipfile.is_zipfile(path):
+        return path.read_bytes()
+    try:
+        with zipfile.ZipFile(path) as archive:
+            # Google Earth has one, doc.kml, and reads the first of several (OGC 12-007, "KMZ").
+            entry = next((one for one in archive.infolist() if one.filename.lower().endswith(".kml")), None)
+            if entry is None:
+                raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
+            with archive.open(entry) as file:
+                # What it claims to hold is not what it holds.
+                data = file.read(MOST_BYTES + 1)
+    except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
+        why = " ".join(str(error).split())[:120]
+        raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
+    if len(data) > MOST_BYTES:
+        message = f"{path}: more than {MOST_BYTES:,} bytes unpacked: at most as many are read of a track"
+        raise LogError(message, file=path)
+    return data
+
+
+# ----------------------------------------------------------------------
+# GPX tracks, by gpxpy: points with times; a route in the same file is what was planned.
+
+GPX = "GPX track"
+
+
+def read_gpx(path: Path) -> RawLog:
+    """Read a track.  Raises LogError for one without points that have times."""
+    text = track_text(path, xml=True)
+    try:
+        found = gpxpy.parse(text)
+    except (gpxpy.gpx.GPXException, ValueError) as error:
+        raise LogError(
+            f"{path}: not a GPX file that can be read: {' '.join(str(error).split())[:120]}", file=path
+        ) from error
+    points = [point for track in found.tracks for segment in track.segments for point in segment.points]
+    timed = [point for point in points if point.time is not None]
+    if len(timed) < 2:
+        raise LogError(
+            f"{path}: {len(timed)} track points with a time of {len(points)}: at least 2 are expected", file=path
+        )
+    # Times without a zone are UTC, as the format has all of them.
+    times = [point.time if point.time.tzinfo else point.time.replace(tzinfo=UTC) for point in timed if point.time]
+    stamps = np.array([time.timestamp() for time in times])
+    up = [math.nan if point.elevation is None else point.elevation for point in timed]
+    values = np.array([[point.latitude, point.longitude, height] for point, height in zip(timed, up, strict=True)])
+    return RawLog(
+        source=str(path),
+        format=GPX,
+        program=str(found.creator or ""),
+        vehicle="unknown",
+        series={"position": LogSeries("trkpt", stamps - stamps[0], values)},
+        heights=(),
+        datum="unstated",
+        missions=tuple(_routes(found, str(path))),
+        clock="start",
+        utc_start=float(stamps[0]),
+        damage=Damage(unreadable=len(points) - len(timed)),
+    )
+
+
+def _routes(found: gpxpy.gpx.GPX, source: str) -> list[LoggedMission]:
+    made = []
+    for route in found.routes:
+        heights = all(point.elevation is not None for point in route.points)
+        items = tuple(
+            MissionItem(
+                number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4,
+                on_grid(point.latitude), on_grid(point.longitude), float(point.elevation or 0.0),
+            )
+            for number, point in enumerate(route.points, 1)
+        )  # fmt: skip
+        if len(items) > 1:
+            mission = Mission(None, items, source=f"{source}: route {route.name or ''}".rstrip())
+            made.append(LoggedMission(0.0, mission, "route", heights))
+    return made
+
+
+# ----------------------------------------------------------------------
+# IGC flight recorder files: B records are fixes, C records the declared task.
+#
+# The record layouts are those of the FAI's "Technical Specification for GNSS Flight Recorders", appendix A: `B` HHMMSS
+# DDMMmmmN DDDMMmmmE V PPPPP GGGGG with the pressure altitude (of 1013.25 hPa) and the GNSS altitude in metres; a `V` in
+# place of `A` says that there is no height by GNSS.
+
+IGC = "IGC flight recorder file"
+_PLACE = r"(\d{2})(\d{2})(\d{3})([NS])(\d{3})(\d{2})(\d{3})([EW])"
+_FIX = re.compile(rf"B(\d{{2}})(\d{{2}})(\d{{2}}){_PLACE}([AV])(-\d{{4}}|\d{{5}})(-\d{{4}}|\d{{5}})")
+_TASK_POINT = re.compile(rf"C{_PLACE}")
+_DATE = re.compile(r"HFDTE(?:DATE:?\s*)?(\d{2})(\d{2})(\d{2})")
+_DAY = 86_400.0
+_HALF_DAY = 43_200.0
+# What HFALG says of the GNSS altitude.
+_DATUMS: dict[str, VerticalDatum] = {"ELL": "ellipsoid", "GEO": "amsl"}
+
+
+def read_igc(path: Path) -> RawLog:
+    """Read a track.  Raises LogError for one with fewer than two fixes."""
+    lines = re.split(r"\r\n|\n|\r", track_text(path, xml=False))
+    rows, unreadable = _fixes(lines)
+    if len(rows) < 2:
+        raise LogError(f"{path}: {len(rows)} fixes (B records): at least 2 are expected", file=path)
+    table = np.array(rows)
+    time = _over_midnight(table[:, 0])
+    gnss, pressure = table[:, 4], table[:, 3]
+    use_gnss = bool((np.isfinite(gnss) & (gnss != 0.0)).mean() > 0.5)
+    up, source = (gnss, "B record, GNSS altitude") if use_gnss else (pressure, "B record, pressure altitude")
+    midnight = _midnight(lines)
+    start = float(time[0])
+    other = HeightSource("pressure altitude", "pressure", LogSeries("B", time - start, pressure[:, None]))
+    return RawLog(
+        source=str(path),
+        format=IGC,
+        program=_recorder(lines),
+        vehicle="unknown",
+        series={"position": LogSeries(source, time - start, np.column_stack([table[:, 1:3], up]))},
+        heights=(other,) if use_gnss else (),
+        datum=_datum(lines) if use_gnss else "pressure",
+        missions=_task(lines, str(path)),
+        clock="start",
+        utc_start=midnight + start,
+        damage=Damage(unreadable=unreadable),
+    )
+
+
+def _degrees(whole: str, minutes: str, thousandths: str, side: str) -> float:
+    value = int(whole) + (int(minutes) + int(thousandths) / 1000.0) / 60.0
+    return -value if side in "SW" else value
+
+
+def _fixes(lines: list[str]) -> tuple[list[tuple[float, float, float, float, float]], int]:
+    """Second of the day, latitude, longitude, pressure and GNSS altitude of each fix; how many could not be read."""
+    rows, unreadable = [], 0
+    for line in lines:
+        if not line.startswith("B"):
+            continue
+        found = _FIX.match(line)
+        if found is None:
+            unreadable += 1
+            continue
+        hour, minute, second, *rest = found.groups()
+        lat, lon = _degrees(*rest[:4]), _degrees(*rest[4:8])
+        gnss = float(rest[10]) if rest[8] == "A" else math.nan
+        rows.append((int(hour) * 3600.0 + int(minute) * 60.0 + int(second), lat, lon, float(rest[9]), gnss))
+    return rows, unreadable
+
+
+def _over_midnight(time: np.ndarray) -> np.ndarray:
+    """Seconds that go on after midnight."""
+    steps = np.diff(time)
+    days = np.cumsum(np.where(steps < -_HALF_DAY, 1.0, np.where(steps > _HALF_DAY, -1.0, 0.0)))
+    return time + np.concatenate([[0.0], days]) * _DAY
+
+
+def _midnight(lines: list[str]) -> float:
+    """The day's beginning, s since 1970; NaN where the file states none."""
+    for line in lines:
+        found = _DATE.match(line)
+        if found:
+            day, month, year = (int(part) for part in found.groups())
+            if 1 <= month <= 12 and 1 <= day <= 31:
+                return float(calendar.timegm((1900 + year if year >= 80 else 2000 + year, month, day, 0, 0, 0)))
+    return math.nan
+
+
+def _datum(lines: list[str]) -> VerticalDatum:
+    for line in lines:
+        if line.startswith("HFALG") or line.startswith("HOALG"):
+            return next((datum for word, datum in _DATUMS.items() if word in line[5:]), "unstated")
+    # The specification has the ellipsoid's where nothing is stated.
+    return "ellipsoid"
+
+
+def _recorder(lines: list[str]) -> str:
+    named = next((line for line in lines if line.startswith("HFFTY")), "")
+    return named.partition(":")[2].strip()
+
+
+def _task(lines: list[str], source: str) -> tuple[LoggedMission, ...]:
+    """The declared task: take-off and landing places, which it begins and ends with, are left out where they are 0."""
+    points = []
+    for line in lines:
+        found = _TASK_POINT.match(line)
+        if found:
+            lat, lon = _degrees(*found.groups()[:4]), _degrees(*found.groups()[4:])
+            if (lat, lon) != (0.0, 0.0):
+                points.append((lat, lon))
+    # Take-off and landing are where the glider was, not what it was to fly.
+    turn_points = points[1:-1] if len(points) > 3 else points
+    items = tuple(
+        MissionItem(number, int(Command.NAV_WAYPOINT), int(Frame.GLOBAL), (0.0,) * 4, on_grid(lat), on_grid(lon), 0.0)
+        for number, (lat, lon) in enumerate(turn_points, 1)
+    )
+    if len(items) < 2:
+        return ()
+    return (LoggedMission(0.0, Mission(None, items, source=f"{source}: declared task"), "declared task", False),)
+
+
+# ----------------------------------------------------------------------
+# KML tracks: `gx:Track` with times (Google's extension of OGC 12-007); a line without times is no flight.
+
+KML = "KML track"
+
+
+def read_kml(path: Path) -> RawLog:
+    """Read the tracks of a file as one.  Raises LogError for one without places that have times."""
+    try:
+        root = ElementTree.fromstring(track_text(path, xml=True))
+    except (ElementTree.ParseError, ValueError) as error:
+        raise LogError(
+            f"{path}: not a KML file that can be read: {' '.join(str(error).split())[:120]}", file=path
+        ) from error
+    rows, unreadable, mode = [], 0, "clampToGround"
+    for track in root.iter():
+        if _name(track) != "Track":
+            continue
+        mode = next((str(child.text).strip() for child in track if _name(child) == "altitudeMode"), mode)
+        pairs, alone = _pairs(track, path)
+        unreadable += alone
+        for when, coord in pairs:
+            row = _row(when, coord)
+            if row is None:
+                unreadable += 1
+            else:
+                rows.append(row)
+    if len(rows) < 2:
+        lines = sum(_name(one) == "LineString" for one in root.iter())
+        why = f"; its {lines} lines have no times" if lines else ""
+        raise LogError(f"{path}: {len(rows)} places with a time (gx:Track): at least 2 are expected{why}", file=path)
+    table = np.array(rows)
+    datum: VerticalDatum = "amsl" if mode == "absolute" else "unstated"
+    return RawLog(
+        source=str(path),
+        format=KML,
+        program="",
+        vehicle="unknown",
+        series={"position": LogSeries(f"gx:coord, {mode}", table[:, 0] - table[0, 0], table[:, 1:])},
+        heights=(),
+        datum=datum,
+        clock="start",
+        utc_start=float(table[0, 0]),
+        damage=Damage(unreadable=unreadable),
+    )
+
+
+def _name(element: ElementTree.Element) -> str:
+    """An element's name without its namespace: files have Google's, OGC's or none."""
+    return element.tag.rpartition("}")[2] if isinstance(element.tag, str) else ""
+
+
+def _pairs(track: ElementTree.Element, path: Path) -> tuple[list[tuple[str, str]], int]:
+    """Times and places that belong together, and how many of either are alone.
+
+    All times stand before all places, or each before its own.  Raises LogError where it cannot be told which is whose.
+    """
+    marks = [(_name(child), child.text or "") for child in track if _name(child) in ("when", "coord")]
+    whens = [text for name, text in marks if name == "when"]
+    coords = [text for name, text in marks if name == "coord"]
+    last_when = max((k for k, (name, _) in enumerate(marks) if name == "when"), default=-1)
+    if all(name == "when" for name, _ in marks[: last_when + 1]):
+        if len(whens) != len(coords):
+            raise LogError(
+                f"{path}: a track of {len(whens)} times (when) and {len(coords)} places (gx:coord): as many of both"
+                " are expected",
+                file=path,
+            )
+        return list(zip(whens, coords, strict=True)), 0
+    pairs = [(one, other) for (name, one), (kind, other) in pairwise(marks) if (name, kind) == ("when", "coord")]
+    return pairs, len(marks) - 2 * len(pairs)
+
+
+def _row(when: str, coord: str) -> tuple[float, float, float, float] | None:
+    """Time since 1970 (s), latitude, longitude, height; None for what is none."""
+    parts = coord.replace(",", " ").split()
+    try:
+        time = datetime.fromisoformat(when.strip().replace("Z", "+00:00"))
+        stamp = (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
+        numbers = [float(part) for part in parts]
+    except ValueError:
+        return None
+    if len(numbers) not in (2, 3):
+        return None
+    lon, lat, up = (*numbers, float("nan"))[:3]
+    return stamp, lat, lon, up

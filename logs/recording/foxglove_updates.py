@@ -1,0 +1,364 @@
+"""What moves in 3-D viewers: the pose, the track so far, events, and point clouds for viewers without meshes."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.LocationFix_pb2 import LocationFix
+from foxglove_schemas_protobuf.PackedElementField_pb2 import PackedElementField
+from foxglove_schemas_protobuf.PointCloud_pb2 import PointCloud
+from foxglove_schemas_protobuf.Pose_pb2 import Pose
+from foxglove_schemas_protobuf.Quaternion_pb2 import Quaternion
+from foxglove_schemas_protobuf.Vector3_pb2 import Vector3
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from logs.recording import foxglove_scene as scene
+from logs.recording.foxglove_scene import AIRCRAFT, MAP, log_message, model_corners, terrain_points, timestamp
+from logs.recording.mcap_writer import SECOND_NS, MessageRecords, single_record, stamped_records
+from logs.recording.state_channel import (
+    EPOCH_NS,
+    Encoded,
+    as_bytes,
+    fill_doubles,
+    fill_submessage,
+    submessage,
+    tagged_doubles,
+)
+from world.frames import GeoOrigin, to_geo
+from world.scenario import Scenario
+from world.threats import Threats
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+# ----------------------------------------------------------------------
+# The flown track as a line that keeps up: every 2 s all of it so far, in a bounded number of points.
+#
+# A viewer that seeks gets the newest message alone, so that each holds the whole track; for a file that stays small,
+# older parts lose the points that lie nearest to the straight way between their neighbours.
+
+
+# s between messages.
+EVERY = 2
+# Points of one message: when there are so many, they are thinned to so few.
+MOST_POINTS, THINNED = 96, 64
+
+
+class TrackSoFar:
+    """Points of the track so far, the oldest first."""
+
+    def __init__(self) -> None:
+        self._points = np.zeros((MOST_POINTS + 1, 3))
+        self._count = 0
+
+    def add(self, position: Floats) -> Floats:
+        """Take a position (3,), `EVERY` s after the one before, and give (n, 3) of the track, until the next call.
+
+        >>> track = TrackSoFar()
+        >>> for k in range(500):
+        ...     points = track.add(np.array([float(k), 0.0, 100.0]))
+        >>> len(points) <= MOST_POINTS, points[0].tolist(), points[-1].tolist()
+        (True, [0.0, 0.0, 100.0], [499.0, 0.0, 100.0])
+        """
+        self._points[self._count] = position
+        self._count += 1
+        if self._count > MOST_POINTS:
+            self._points[:THINNED] = thinned(self._points, THINNED)
+            self._count = THINNED
+        return self._points[: self._count]
+
+
+def thinned(points: Floats, wanted: int) -> Floats:
+    """Points (n, 3) without those that a line loses least by, its ends kept: ``wanted`` of them.
+
+    >>> corner = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0], [10.0, 9.0, 0.0]])
+    >>> thinned(corner, 3)[:, :2].tolist()
+    [[0.0, 0.0], [10.0, 0.0], [10.0, 9.0]]
+    """
+    while len(points) > wanted:
+        before, here, after = points[:-2], points[1:-1], points[2:]
+        way = after - before
+        share = np.clip(((here - before) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-9), 0.0, 1.0)
+        off = ((before + share[:, None] * way - here) ** 2).sum(axis=1)
+        going = np.zeros(len(points), dtype=bool)
+        for k in np.argsort(off, kind="stable")[: len(points) - wanted].tolist():
+            # Of neighbours one at a time: the other's distance is then from another way.
+            going[k + 1] = not (going[k] or going[k + 2])
+        points = points[~going]
+    return points
+
+
+# ----------------------------------------------------------------------
+# What happens in flight, noted when it happens: legs that begin, threats whose reach is entered and left.
+
+
+# `name` of these in the log: what a timeline works out for itself is not read back.
+NAME = "flight"
+# Threats are looked at so often, ns.
+_LOOK = 200_000_000
+
+
+class FlightEvents:
+    """Makes a Log message of each, whatever blocks the rows come in."""
+
+    def __init__(self, setup: FlightSetup, channel: int) -> None:
+        """channel: number of the log's topic."""
+        self._route, self._threats, self._channel = setup.route, setup.scenario.threats, channel
+        self._leg, self._slot = -1, -1
+        self._inside = {
+            "missile range": np.zeros(len(self._threats.names), dtype=bool),
+            "radar range": np.zeros(len(self._threats.names), dtype=bool),
+        }
+
+    def take(self, log_times: Ints, position: Floats, leg: Floats) -> Iterator[MessageRecords]:
+        """Messages of rows; log_times: (n,) ns.  position: (n, 3).  leg: (n,) the active one."""
+        if not len(log_times):
+            return
+        for k in np.flatnonzero(np.diff(leg, prepend=self._leg) != 0).tolist():
+            yield self._message(int(log_times[k]), self._leg_text(int(leg[k])), "info")
+        self._leg = int(leg[-1])
+        slots = log_times // _LOOK
+        looked = np.flatnonzero(np.diff(slots, prepend=self._slot) > 0)
+        self._slot = int(slots[-1])
+        if not len(self._threats.names) or not looked.size:
+            return
+        with np.errstate(over="ignore", invalid="ignore"):
+            off = position[looked, None, :] - self._threats.position
+            distance = np.sqrt((off**2).sum(axis=2))
+        reaches = (self._threats.kill_radius, self._threats.detection_radius)
+        for (kind, before), radius in zip(self._inside.items(), reaches, strict=True):
+            inside = (distance < radius) & (radius > 0.0)
+            changed = np.diff(inside, axis=0, prepend=before[None, :])
+            for row, threat in np.argwhere(changed).tolist():
+                yield self._threat(int(log_times[looked[row]]), kind, threat, bool(inside[row, threat]))
+            self._inside[kind] = inside[-1]
+
+    def _leg_text(self, leg: int) -> str:
+        items = self._route.items
+        to = leg + 1
+        if not 0 <= to < len(items):
+            return f"leg {leg}"
+        return f"leg {leg}, to waypoint {to}" + (f" (item {items[to]})" if items[to] >= 0 else "")
+
+    def _threat(self, time: int, kind: str, threat: int, entered: bool) -> MessageRecords:
+        name, level = self._threats.names[threat], "warning" if kind == "missile range" else "info"
+        text = f"inside the {kind} of {name}" if entered else f"out of the {kind} of {name}"
+        return self._message(time, text, level if entered else "info")
+
+    def _message(self, time: int, text: str, level: str) -> MessageRecords:
+        message = log_message(time, text, level, NAME).SerializeToString(deterministic=True)
+        return single_record(self._channel, time, message)
+
+
+# ----------------------------------------------------------------------
+# Ground, plan, threats, track and aircraft as points: what a viewer shows that has no triangles and lines, as Rerun.
+#
+# Rerun's reader of MCAP knows foxglove.PointCloud, FrameTransform and LocationFix, and no foxglove.SceneUpdate.
+
+Colour = tuple[int, int, int, int]
+
+_POINT = np.dtype(
+    [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("red", "u1"), ("green", "u1"), ("blue", "u1"), ("alpha", "u1")]
+)
+_TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8}
+_PLAN, _TRACK, _AIRCRAFT = (25, 90, 230, 255), (245, 245, 245, 255), (255, 200, 40, 255)
+_KILL, _DETECTION = (217, 26, 26, 255), (242, 166, 26, 255)
+# m between points of a line, at most so many of them; points of a sphere; points along each side of a triangle.
+_STEP, _MOST, _SPHERE, _SIDE = 30.0, 4000, 150, 7
+
+
+def cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
+    """A PointCloud of points (n, 3) m in a frame, rounded to 1/16 m.
+
+    colours: (n, 4) red, green, blue, alpha, or one for all.
+    """
+    packed = np.zeros(len(points), dtype=_POINT)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for column, name in enumerate("xyz"):
+            packed[name] = np.round(points[:, column] * 16.0) / 16.0
+    shades = np.broadcast_to(np.asarray(colours, dtype=np.uint8), (len(points), 4))
+    for column, name in enumerate(("red", "green", "blue", "alpha")):
+        packed[name] = shades[:, column]
+    message = PointCloud(
+        timestamp=timestamp(time_ns),
+        frame_id=frame,
+        pose=Pose(position=Vector3(), orientation=Quaternion(x=0.0, y=0.0, z=0.0, w=1.0)),
+        point_stride=_POINT.itemsize,
+        fields=[
+            PackedElementField(name=name, offset=_POINT.fields[name][1], type=_TYPES[_POINT.fields[name][0].kind])
+            for name in _POINT.names or ()
+            if _POINT.fields is not None
+        ],
+        data=packed.tobytes(),
+    )
+    data: bytes = message.SerializeToString(deterministic=True)
+    return data
+
+
+def ground_cloud(time_ns: int, scenario: Scenario) -> bytes:
+    """The corners of the ground's mesh."""
+    points, colours = terrain_points(scenario)
+    shades = np.hstack([np.round(colours * 255.0), np.full((len(points), 1), 255.0)]).astype(np.uint8)
+    return cloud(time_ns, MAP, points, shades)
+
+
+def plan_cloud(time_ns: int, waypoints: Floats) -> bytes:
+    """The legs between waypoints (w, 3)."""
+    return cloud(time_ns, MAP, along(waypoints), _PLAN)
+
+
+def track_cloud(time_ns: int, positions: Floats) -> bytes:
+    """The flown positions (n, 3)."""
+    return cloud(time_ns, MAP, positions, _TRACK)
+
+
+def aircraft_cloud(time_ns: int) -> bytes:
+    """The aircraft's model, in its own frame."""
+    first, second, third = (corner[:, None, :] for corner in np.moveaxis(model_corners().astype(np.float64), 1, 0))
+    shares = [(i / _SIDE, j / _SIDE) for i in range(_SIDE + 1) for j in range(_SIDE + 1 - i)]
+    a, b = (np.array(column)[None, :, None] for column in zip(*shares, strict=True))
+    points = (a * first + b * second + (1.0 - a - b) * third).reshape(-1, 3)
+    return cloud(time_ns, AIRCRAFT, np.unique(np.round(points, 2), axis=0), _AIRCRAFT)
+
+
+def threats_cloud(time_ns: int, threats: Threats) -> bytes:
+    """The spheres that missiles and radars reach, evenly dotted."""
+    k = np.arange(_SPHERE) + 0.5
+    up, turn = 1.0 - 2.0 * k / _SPHERE, math.pi * (1.0 + math.sqrt(5.0)) * k
+    sphere = np.stack([np.sqrt(1.0 - up**2) * np.cos(turn), np.sqrt(1.0 - up**2) * np.sin(turn), up], axis=1)
+    points, shades = [np.zeros((0, 3))], [np.zeros((0, 4), dtype=np.uint8)]
+    for radii, colour in ((threats.kill_radius, _KILL), (threats.detection_radius, _DETECTION)):
+        for centre, radius in zip(threats.position, radii, strict=True):
+            if radius > 0.0:
+                points.append(centre + float(radius) * sphere)
+                shades.append(np.tile(np.array(colour, dtype=np.uint8), (_SPHERE, 1)))
+    return cloud(time_ns, MAP, np.concatenate(points), np.concatenate(shades))
+
+
+def along(waypoints: Floats) -> Floats:
+    """Points of the straight legs between waypoints (w, 3), the waypoints among them, evenly on each leg."""
+    lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
+    step = max(_STEP, float(lengths.sum()) / _MOST)
+    legs = [
+        np.linspace(start, end, max(1, math.ceil(length / step)), endpoint=False)
+        for start, end, length in zip(waypoints[:-1], waypoints[1:], lengths.tolist(), strict=True)
+    ]
+    return np.concatenate([*legs, waypoints[-1:]])
+
+
+# ----------------------------------------------------------------------
+# The moving part of what viewers show: the pose five times a second, a fix a second, and the track so far.
+
+TF_TOPIC, FIX_TOPIC, TRACK_TOPIC, TRACK_POINTS = "/tf", "/fix", "/scene/track", "/points/track"
+
+_SLOT_NS = 200_000_000  # one transform in each, 5 Hz; one fix a second
+_XYZ, _XYZW, _GEO = "xyz", "xyzw", ("latitude", "longitude", "altitude")
+# The track's points: s between messages at least, and the ratio of their times, so that a long flight's stay few.
+_CLOUD_EVERY, _CLOUD_RATIO = 10.0, 1.05
+# The messages behind their timestamps, in protobuf's encoding.
+_TRANSFORM_NAMES = FrameTransform(parent_frame_id=scene.MAP, child_frame_id=scene.AIRCRAFT).SerializeToString(
+    deterministic=True
+)
+_TRANSFORM = np.dtype(
+    [
+        ("names", np.uint8, (len(_TRANSFORM_NAMES),)),
+        ("translation", submessage(_XYZ)),
+        ("rotation", submessage(_XYZW)),
+    ]
+)
+_FIX_NAMES = LocationFix(frame_id=scene.AIRCRAFT).SerializeToString(deterministic=True)
+_FIX = np.dtype([("names", np.uint8, (len(_FIX_NAMES),)), *tagged_doubles(_GEO)])
+
+
+def transform_messages(channel: int, log_times: Ints, position: Floats, attitude: Floats) -> MessageRecords:
+    """Position and attitude of the aircraft: a FrameTransform for each of n rows.
+
+    position, attitude: (n, 3).  Rounded to 2^-10 m and 2^-20 of the quaternion, which no viewer shows and which halves
+    their size in the log; the state's own message is exact.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        translation = np.round(position * 1024.0) / 1024.0
+    rotation = np.round(scene.body_rotation(attitude) * 2.0**20) / 2.0**20
+    out: Encoded = np.zeros(len(log_times), dtype=_TRANSFORM)
+    out["names"] = np.frombuffer(_TRANSFORM_NAMES, np.uint8)
+    fill_submessage(out["translation"], FrameTransform.TRANSLATION_FIELD_NUMBER, _XYZ, translation)
+    fill_submessage(out["rotation"], FrameTransform.ROTATION_FIELD_NUMBER, _XYZW, rotation)
+    return stamped_records(log_times, channel, FrameTransform.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
+
+
+def fix_messages(channel: int, log_times: Ints, origin: GeoOrigin, position: Floats) -> MessageRecords:
+    """Latitude, longitude and height above mean sea level: a LocationFix for each of n rows.
+
+    position: (n, 3).
+    """
+    east, north, up = position.T
+    lat, lon = to_geo(origin, east, north)
+    out: Encoded = np.zeros(len(log_times), dtype=_FIX)
+    out["names"] = np.frombuffer(_FIX_NAMES, np.uint8)
+    fill_doubles(out, _GEO, np.stack([lat, lon, up], axis=1))
+    return stamped_records(log_times, channel, LocationFix.TIMESTAMP_FIELD_NUMBER, as_bytes(out))
+
+
+class Poses:
+    """Chooses the rows that viewers get, second by second, and makes their messages."""
+
+    def __init__(self, origin: GeoOrigin, channels: dict[str, int]) -> None:
+        """channels: the number of each topic."""
+        self._origin, self._channels = origin, channels
+        self._slot = self._second = -1
+        self._path: list[Floats] = []  # positions, one a second
+        self._tail = np.zeros((0, 3))  # the newest position
+        self._so_far = TrackSoFar()
+        self._next_cloud = 0.0  # s
+
+    def take(self, log_times: Ints, position: Floats, attitude: Floats) -> Iterator[MessageRecords]:
+        """Messages for the first good row in each slot, a fix a second, and the track so far every `EVERY` seconds.
+
+        log_times: (n,) ns, of whole seconds.  position, attitude: (n, 3).
+        """
+        good = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(attitude).all(axis=1))
+        slots = log_times[good] // _SLOT_NS
+        chosen = good[_changes(slots, self._slot)]
+        if good.size:
+            self._tail = position[good[-1:]]
+        if not chosen.size:
+            return
+        self._slot = int(slots[-1])
+        chosen_times = log_times[chosen]
+        yield transform_messages(self._channels[TF_TOPIC], chosen_times, position[chosen], attitude[chosen])
+        seconds = chosen_times // SECOND_NS
+        starts = chosen[_changes(seconds, self._second)]
+        if not starts.size:
+            return
+        self._second = int(seconds[-1])
+        firsts = position[starts]
+        yield fix_messages(self._channels[FIX_TOPIC], log_times[starts], self._origin, firsts)
+        self._path.append(firsts)
+        for k in np.flatnonzero((log_times[starts] - EPOCH_NS) // SECOND_NS % EVERY == 0).tolist():
+            log_time = int(log_times[starts[k]])
+            with np.errstate(over="ignore", invalid="ignore"):
+                line = np.round(self._so_far.add(firsts[k]) * 16.0) / 16.0
+            yield single_record(self._channels[TRACK_TOPIC], log_time, scene.track_scene(log_time, line))
+            time = (log_time - EPOCH_NS) / SECOND_NS
+            if time >= self._next_cloud:
+                self._next_cloud = max(time + _CLOUD_EVERY, time * _CLOUD_RATIO)
+                yield self._cloud(log_time, [*self._path[:-1], firsts[: k + 1]])
+
+    def whole(self, log_time: int) -> Iterator[MessageRecords]:
+        """The track up to the newest row, a point a second, at ``log_time`` (ns): as a line and as points."""
+        parts = [*self._path, self._tail]
+        path = scene.track_scene(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
+        yield single_record(self._channels[TRACK_TOPIC], log_time, path)
+        yield self._cloud(log_time, parts)
+
+    def _cloud(self, log_time: int, parts: list[Floats]) -> MessageRecords:
+        points = track_cloud(log_time, np.concatenate([np.zeros((0, 3)), *parts]))
+        return single_record(self._channels[TRACK_POINTS], log_time, points)
+
+
+def _changes(values: Ints, before: int) -> Ints:
+    """Where non-decreasing values differ from the one before, the first from ``before``."""
+    return np.flatnonzero(np.diff(values, prepend=before) > 0)

@@ -1,0 +1,1 @@
+"""Judging an imported flight, and comparing it with the model."""

@@ -1,0 +1,429 @@
+"""Judging a flight of the field: the stretches that followed the mission, by the same rules, as far as its log goes.
+
+A log may lack what a rule needs, have pauses, and end before the flight does.  What cannot be known from it is not
+judged and says why; what it shows to be wrong is wrong all the same.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import UTC, datetime
+from math import isfinite
+
+import numpy as np
+
+from flight.mission.items import Command
+from flight.simulation.setup import (
+    Damage,
+    FieldSource,
+    FlightSetup,
+    Gap,
+    MissionStretch,
+    Quantity,
+    RowFaults,
+    VerticalDatum,
+)
+from flight.simulation.track import Track
+from logs.verdict.findings import RULES, Finding, Verdict, make_finding, message, reason_of
+from logs.verdict.imported.flown_legs import FlownLegs, flown_legs
+from logs.verdict.judge_geometry import flown_findings
+from logs.verdict.places import FLIGHT, LevelAnswer, Place
+from logs.verdict.summary import headline
+
+# ----------------------------------------------------------------------
+# The lines of a verdict on a flight of the field: the answer, what was judged and what not, and what the log is.
+
+_DATUM_TEXTS: dict[VerticalDatum, str] = {
+    "amsl": "above mean sea level, as the log has it",
+    "ellipsoid": "above the WGS 84 ellipsoid",
+    "pressure": "by pressure, above the level of 1013.25 hPa",
+    "unstated": "above what the log does not say",
+}
+# Jumps of the clock whose times are listed.
+_LISTED = 4
+
+
+def field_lines(
+    findings: Sequence[Finding], setup: FlightSetup, own: LevelAnswer, flown: Sequence[FlownLegs]
+) -> tuple[str, ...]:
+    """Lines of the summary, the headline first."""
+    source = setup.source
+    if source is None:
+        return (own.headline,)
+    lines = [own.headline, *_judged_lines(source, flown), *_unjudged_lines(findings)]
+    lines.append(f"Flown by: {source.program or 'not stated'} ({source.format} {source.file}{_when(source)})")
+    if source.mission:
+        lines.append(f"Mission: {source.mission}")
+    lines.append(f"Heights: {heights_text(source)}")
+    wind = setup.scenario.wind
+    if source.wind:
+        lines.append(f"Wind: {wind.speed:.1f} m/s on average, {source.wind}")
+    lines.append(f"Rows: {rows_text(source.faults, len(source.gaps))}")
+    if source.damage.lossy or source.damage.cut:
+        lines.append(f"Lost: {damage_text(source.damage)}")
+    lines += [f"Note: {note}" for note in source.notes]
+    if setup.route.notes:
+        lines.append(f"Not flown as written: {'; '.join(setup.route.notes)}")
+    return tuple(lines)
+
+
+def _judged_lines(source: FieldSource, flown: Sequence[FlownLegs]) -> list[str]:
+    """What is judged: each stretch, with its time and its legs."""
+    if not source.stretches:
+        return ["Judged: nothing, for no stretch followed the mission"]
+    by_start = {legs.stretch.start: legs for legs in flown}
+    lines = []
+    for stretch in source.stretches:
+        name = stretch.mode or "the flight (the log knows no modes)"
+        times = f"{name} from {stretch.start:.1f} s to {stretch.end:.1f} s"
+        legs = by_start.get(stretch.start)
+        if legs is None:
+            lines.append(f"Judged: nothing of {times}: it passed no two waypoints in order")
+            continue
+        part = f", leg {legs.last - 1} in part" if legs.partial else ""
+        begins = float(legs.aligned.track.time[0])
+        lines.append(f"Judged: {times}, legs {legs.first} to {legs.last - 1}{part}, from {begins:.1f} s on")
+    return lines
+
+
+def _unjudged_lines(findings: Sequence[Finding]) -> list[str]:
+    """Which rules were not judged, and why, one line each; on which legs, where others were."""
+    lines = []
+    for rule, title in RULES.items():
+        mine = [item for item in findings if item.rule == rule]
+        silent = [item for item in mine if item.ok is None]
+        if not silent:
+            continue
+        where = "" if len(silent) == len(mine) else f" on {len(silent)} of {len(mine)}"
+        lines.append(f"Not judged: {title}{where} ({silent[0].brief})")
+    return lines
+
+
+def heights_text(source: FieldSource) -> str:
+    """Which height was taken, its datum, and how far off the others were at the start.
+
+    >>> from flight.simulation.setup import HeightOffset, Heights
+    >>> heights_text(FieldSource("a.BIN", "", "", heights=Heights("POS", "amsl", (HeightOffset("GPS.Alt", -0.1),))))
+    'POS, above mean sea level, as the log has it; at the start GPS.Alt -0.1 m of it'
+    """
+    offsets = ", ".join(f"{one.name} {one.offset:+.1f} m" for one in source.heights.offsets)
+    beside = f"; at the start {offsets} of it" if offsets else ""
+    return f"{source.heights.source}, {_DATUM_TEXTS[source.heights.datum]}{beside}"
+
+
+def rows_text(faults: RowFaults, gaps: int) -> str:
+    """What was wrong with a log's rows, in words.
+
+    >>> rows_text(RowFaults(doubled=2, clock_jumps=(12.5,)), 1)
+    '1 gap, 2 doubled, 1 jump of the clock (at 12.5 s)'
+    >>> rows_text(RowFaults(), 0)
+    'in order, without gaps'
+    """
+    counted = (
+        (gaps, "gap" if gaps == 1 else "gaps"),
+        (faults.doubled, "doubled"),
+        (faults.unordered, "out of order"),
+        (faults.unusable, "without a place"),
+        (faults.glitches, "glitches of position"),
+    )
+    words = [f"{count} {name}" for count, name in counted if count]
+    if faults.clock_jumps:
+        count = len(faults.clock_jumps)
+        times = ", ".join(f"{time:.1f} s" for time in faults.clock_jumps[:_LISTED])
+        words.append(f"{count} {'jump' if count == 1 else 'jumps'} of the clock (at {times})")
+    return ", ".join(words) or "in order, without gaps"
+
+
+def damage_text(damage: Damage) -> str:
+    """What of a file could not be read, in words.
+
+    >>> damage_text(Damage(places=2, size=40, cut=True))
+    '2 places in the file (40 bytes) cannot be read; it ends within a message'
+    """
+    words = []
+    if damage.places:
+        size = f" ({damage.size:,} bytes)" if damage.size else ""
+        words.append(f"{damage.places} {'place' if damage.places == 1 else 'places'} in the file{size} cannot be read")
+    if damage.unreadable:
+        words.append(f"{damage.unreadable} messages hold nothing that can be used")
+    if damage.cut:
+        words.append("it ends within a message")
+    return "; ".join(words) or "nothing"
+
+
+def _when(source: FieldSource) -> str:
+    if not isfinite(source.utc_start) or not 0.0 <= source.utc_start < 4.1e9:
+        return ""
+    return f", its time 0 is {datetime.fromtimestamp(source.utc_start, UTC):%Y-%m-%d %H:%M:%S} UTC"
+
+
+# What each rule needs beside times and places.
+NEEDS: dict[str, tuple[Quantity, ...]] = {
+    "slope": ("heights",),
+    "clearance": ("heights",),
+    "height": ("heights",),
+    "fence": ("heights",),
+    "threat": ("heights",),
+    "bounds": ("heights",),
+    "speed": ("airspeed",),
+    "stall": ("airspeed", "attitude"),
+    "energy": ("battery",),
+}
+# What each quantity is called where a log lacks it.
+_CALLED: dict[Quantity, str] = {
+    "heights": "height",
+    "airspeed": "airspeed",
+    "attitude": "attitude",
+    "battery": "battery current and voltage",
+    "wind": "wind",
+    "throttle": "throttle",
+    "velocity": "velocity",
+}
+# Columns of the track that hold a quantity.
+_COLUMNS: dict[Quantity, str] = {"airspeed": "airspeed", "attitude": "attitude", "battery": "energy"}
+_DATUMS = {
+    "ellipsoid": "the log's heights are above the ellipsoid, the plan's above mean sea level",
+    "pressure": "the log's heights are by pressure, above the level of 1013.25 hPa",
+    "unstated": "the log does not say what its heights are above (--datum says it)",
+}
+# What the mode is called that flies a return to launch.
+_RETURN = "RTL"
+# Rules that ask for the heights of the plan.
+_OF_PLANNED_HEIGHTS = frozenset({"slope", "height"})
+# Rules that ask what the aircraft can do.
+_OF_AIRCRAFT = frozenset({"turn", "slope", "speed", "stall", "loiter", "energy"})
+_UNNAMED = "the aircraft is not named (--aircraft)"
+
+
+def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verdict:
+    """Judge the stretches of a flight that followed its mission: level "flown".
+
+    setup: with the source of the flight.  whole: planfly's own log of it has its end.
+    """
+    source = setup.source
+    if source is None:
+        raise ValueError("a flight without a source is not of the field")
+    flown = [legs for stretch in source.stretches if (legs := flown_legs(setup, track, stretch)) is not None]
+    findings = _merged([_of_stretch(setup, legs) for legs in flown])
+    findings = (*findings, _completion(setup, flown, whole=whole))
+    failed = any(item.ok is False for item in findings)
+    flyable = bool(flown) and not failed
+    complete = findings[-1].ok is True
+    own = LevelAnswer("airframe" if setup.parameters is None else "autopilot", flyable, headline(findings, flyable))
+    lines = field_lines(findings, setup, own, flown)
+    return Verdict(
+        findings,
+        flyable,
+        complete,
+        lines,
+        "flown",
+        levels=(own,),
+        notes=setup.route.notes,
+        leg_ends=_leg_ends(setup, flown),
+        parameters=setup.parameters,
+    )
+
+
+def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
+    """Findings of one stretch, at the places of the whole route."""
+    found = flown_findings(legs.demands, legs.aligned, "completed", True, True)
+    out = []
+    for item in found:
+        if item.rule == "completion":
+            continue
+        judged = _within_gaps(_as_far_as_held(setup, legs, item), legs)
+        if legs.partial:
+            judged = _in_part(judged, legs)
+        out.append(_shifted(judged, legs.first, setup))
+    if "stall" not in {item.rule for item in out} and setup.source is not None:
+        lacking = [quantity for quantity in NEEDS["stall"] if quantity not in setup.source.holds]
+        if lacking:
+            # The rule itself says nothing of a flight without numbers.
+            why = f"the log holds no {_CALLED[lacking[0]]}"
+            out.append(make_finding("stall", FLIGHT, ok=None, reason=why, source="aircraft", unit="m/s"))
+    return out
+
+
+def _as_far_as_held(setup: FlightSetup, legs: FlownLegs, item: Finding) -> Finding:
+    """A finding, or that the log does not hold what it needs."""
+    source = setup.source
+    if source is None:
+        return item
+    reason = ""
+    for quantity in NEEDS.get(item.rule, ()):
+        if quantity not in source.holds:
+            reason = f"the log holds no {_CALLED[quantity]}"
+            break
+        if quantity == "heights":
+            stated = source.plan_heights or item.rule not in _OF_PLANNED_HEIGHTS
+            reason = _DATUMS.get(source.heights.datum, "") if stated else "the plan states no heights"
+        else:
+            reason = _missing(legs, quantity)
+        if reason:
+            break
+    if reason:
+        return _unjudged(item, reason)
+    if not source.aircraft_known and item.rule in _OF_AIRCRAFT and item.limit_source != "scenario":
+        return _unjudged(item, _UNNAMED, measured=bool(item.ok))
+    return item
+
+
+def _missing(legs: FlownLegs, quantity: Quantity) -> str:
+    """When a stretch has no values of a quantity that the log holds elsewhere, in words; "" where it has them all."""
+    values = getattr(legs.aligned.track, _COLUMNS[quantity])
+    bad = ~np.isfinite(values.reshape(len(values), -1)).all(axis=1)
+    if not bad.any():
+        return ""
+    time = legs.aligned.track.time[bad]
+    return f"the log holds no {_CALLED[quantity]} at {int(bad.sum())} rows from {time[0]:.1f} s to {time[-1]:.1f} s"
+
+
+def _unjudged(item: Finding, why: str, *, measured: bool = False) -> Finding:
+    """A finding that says why it is none; measured: what was measured stays beside it."""
+    reason = f"{why}; {item.reason}" if measured else why
+    facts = item.facts if measured else ()
+    return replace(item, ok=None, reason=reason, brief=why, placed=False, margin=None, facts=facts, suggestions=())
+
+
+def _within_gaps(item: Finding, legs: FlownLegs) -> Finding:
+    """A finding that passed says nothing of a pause in its leg."""
+    if item.ok is not True or item.place.index is None or item.place.kind not in ("leg", "waypoint"):
+        return item
+    track, rows = legs.aligned.track, legs.aligned.rows
+    first = item.place.index if item.place.kind == "leg" else max(0, item.place.index - 1)
+    last = min(len(rows) - 1, item.place.index + 1)
+    start, end = float(track.time[rows[first]]), float(track.time[rows[last]])
+    for gap in gaps_between(legs, start, end):
+        if item.place.kind == "leg" or item.rule == "turn":
+            why = f"the log has no rows from {gap.start:.1f} s to {gap.end:.1f} s"
+            return _unjudged(item, why, measured=True)
+    return item
+
+
+def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
+    """Pauses of the log between two times, s."""
+    source = legs.demands.setup.source
+    return [] if source is None else [gap for gap in source.gaps if gap.start < end and gap.end > start]
+
+
+def _in_part(item: Finding, legs: FlownLegs) -> Finding:
+    """The last waypoint was not reached: it is not judged, and what of the leg before it passed is its first part."""
+    leg, waypoint = legs.demands.legs - 1, legs.demands.legs
+    unreached = item.place.kind == "waypoint" and item.place.index == waypoint
+    of_leg = item.place.kind == "leg" and item.place.index == leg
+    if unreached:
+        return _unjudged(item, _left(legs.stretch))
+    if of_leg and item.rule in ("slope", "speed"):
+        return _unjudged(item, f"flown in part: {_left(legs.stretch)}") if item.ok is not False else item
+    return item
+
+
+def _left(stretch: MissionStretch) -> str:
+    """How a stretch ended, in words."""
+    if stretch.ended == "mode":
+        return f"{stretch.mode} was left for {stretch.next_mode} at {stretch.end:.1f} s"
+    if stretch.ended == "landed":
+        return f"the flight was over at {stretch.end:.1f} s"
+    return f"the log ends at {stretch.end:.1f} s"
+
+
+def _shifted(item: Finding, first: int, setup: FlightSetup) -> Finding:
+    """A finding at its place on the whole route."""
+    place = item.place
+    if not first or place.index is None or place.kind not in ("leg", "waypoint"):
+        return item
+    index = place.index + first
+    return replace(item, place=replace(place, index=index))
+
+
+def _merged(stretches: Sequence[Sequence[Finding]]) -> tuple[Finding, ...]:
+    """Findings of all stretches, one a rule, place and check: what failed counts before what passed."""
+    found: dict[tuple[str, Place, str], Finding] = {}
+    for findings in stretches:
+        for item in findings:
+            key = (item.rule, item.place, item.check)
+            known = found.get(key)
+            if known is None or _weight(item) > _weight(known):
+                found[key] = item
+    rules = list(dict.fromkeys(item.rule for item in found.values()))
+    return tuple(item for rule in rules for item in found.values() if item.rule == rule)
+
+
+def _weight(item: Finding) -> int:
+    return {False: 2, True: 1, None: 0}[item.ok]
+
+
+def _completion(setup: FlightSetup, flown: Sequence[FlownLegs], *, whole: bool) -> Finding:
+    """How much of the mission the log shows; a log that ends on the way says nothing of what came after."""
+    legs, faults, unknown, known = setup.route.legs, [], [], []
+    done = {leg for one in flown for leg in range(one.first, one.last - one.partial)}
+    if not whole:
+        faults.append(message("the log is damaged or unfinished"))
+    if not flown:
+        stretches = () if setup.source is None else setup.source.stretches
+        why = "none of the mission's legs was flown" if stretches else "no stretch of it followed the mission"
+        faults.append(message(why))
+    elif legs - 1 in done:
+        known.append(f"{len(done)} of {legs} legs flown, the last of them to its end")
+    else:
+        last = flown[-1]
+        what = f"{len(done)} of {legs} legs flown"
+        if _returns(setup, last):
+            known.append(f"{what}, and the return that the mission ends with begun at {last.stretch.end:.1f} s")
+        elif last.stretch.ended == "log":
+            unknown.append(f"{_left(last.stretch)}, on the way to {_named(setup, last)}: {what}")
+        else:
+            faults.append(message(f"{_left(last.stretch)}, on the way to {_named(setup, last)}", f": {what}"))
+    gaps = [gap for one in flown for gap in gaps_between(one, one.stretch.start, one.stretch.end)]
+    if gaps:
+        longest = max(gaps, key=lambda gap: gap.end - gap.start)
+        seconds = sum(gap.end - gap.start for gap in gaps)
+        known.append(
+            f"{len(gaps)} gaps of {seconds:.1f} s in all, the longest from {longest.start:.1f} s to {longest.end:.1f} s"
+        )
+    return make_finding(
+        "completion",
+        FLIGHT,
+        ok=False if faults else None if unknown else True,
+        reason=reason_of(faults, [*unknown, *known]),
+        faults=faults,
+        planned=legs,
+        flown=len(done),
+        limit=legs,
+        source="route",
+        tolerance=0.0,
+        margin=len(done) - legs,
+        unit="legs",
+        method="waypoints passed in order, in the stretches that followed the mission",
+    )
+
+
+def _returns(setup: FlightSetup, legs: FlownLegs) -> bool:
+    """Whether a stretch ended with the return to launch that the mission has next: autopilots have a mode for that."""
+    item = int(setup.route.items[_ahead(setup, legs)])
+    commands = {one.seq: one.command for one in setup.mission.items}
+    return legs.stretch.next_mode == _RETURN and commands.get(item) == Command.NAV_RETURN_TO_LAUNCH
+
+
+def _ahead(setup: FlightSetup, legs: FlownLegs) -> int:
+    """The waypoint that a stretch was on the way to when it ended."""
+    return min(setup.route.legs, legs.last if legs.partial else legs.last + 1)
+
+
+def _named(setup: FlightSetup, legs: FlownLegs) -> str:
+    ahead = _ahead(setup, legs)
+    item = int(setup.route.items[ahead])
+    return f"waypoint {ahead}" + (f" (item {item})" if item >= 0 else "")
+
+
+def _leg_ends(setup: FlightSetup, flown: Sequence[FlownLegs]) -> tuple[float, ...]:
+    """When each leg but the last ended, s, inf from the first that no stretch came to; rising."""
+    ends = np.full(len(setup.route.waypoints), np.inf)
+    for legs in flown:
+        times = legs.aligned.track.time[legs.aligned.rows]
+        passed = legs.last if legs.partial else legs.last + 1
+        ends[legs.first : passed] = np.minimum(ends[legs.first : passed], times[: passed - legs.first])
+    if flown:
+        # Waypoints before the first that was met were behind the aircraft by then.
+        ends[: flown[0].first] = ends[flown[0].first]
+    rising = np.maximum.accumulate(ends)
+    return tuple(rising[1:-1].tolist())

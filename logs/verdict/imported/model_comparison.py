@@ -1,0 +1,250 @@
+"""A flight of the field and the model's flight of the same mission, side by side: leg by leg, turn by turn."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup, MissionStretch
+from flight.simulation.track import ROLL, Track
+from logs.verdict.imported.flown_legs import FlownLegs
+from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.track_alignment import AlignedTrack, along_across, lay_track
+from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
+from world.errors import LogError
+
+Floats = NDArray[np.float64]
+
+# m of leg between two places at which the flights are held against each other.
+STEP = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A flight along its route, at n places; NaN where it was not.
+
+    cross_track, height_error: m, right of and above the legs.  ground_speed: m/s.  bank: rad.
+    energy: Wh used since the first of them.
+    """
+
+    cross_track: Floats
+    height_error: Floats
+    ground_speed: Floats
+    bank: Floats
+    energy: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class LegPair:
+    """One leg as flown and as simulated, each a pair of numbers; NaN where one has none.
+
+    leg: of the whole route.  cross_track, height_error: m, the farthest from the leg, signed.
+    ground_speed: m/s, mean.  bank: deg, the most.  energy: Wh.
+    """
+
+    leg: int
+    cross_track: tuple[float, float]
+    height_error: tuple[float, float]
+    ground_speed: tuple[float, float]
+    bank: tuple[float, float]
+    energy: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class TurnPair:
+    """One turn as flown and as simulated.
+
+    waypoint: of the whole route.  turn: deg.  overshoot: m.  bank: deg, the most.  passed: m, nearest to the waypoint.
+    """
+
+    waypoint: int
+    turn: float
+    overshoot: tuple[float, float]
+    bank: tuple[float, float]
+    passed: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """How far apart the flights are in one quantity: median and 95 % of the differences' sizes, in ``unit``."""
+
+    name: str
+    unit: str
+    median: float
+    most: float
+
+
+@dataclass(frozen=True, slots=True)
+class Reflight:
+    """Both flights.
+
+    stretch: of the flight of the field that is compared.
+    setup: of the simulated one.  simulated: its rows.  ended: how it ended.
+    distance: (n,) m along the route's legs at which they are compared.
+    ends: (legs,) m along the route at which each leg ends.
+    flown, model: profiles.
+    first: number of the first leg in the whole route.
+    stands_in: the aircraft of the log is not known, and another's model flew.
+    """
+
+    stretch: MissionStretch
+    setup: FlightSetup
+    simulated: Track
+    ended: str
+    distance: Floats
+    ends: Floats
+    flown: Profile
+    model: Profile
+    first: int
+    legs: tuple[LegPair, ...]
+    turns: tuple[TurnPair, ...]
+    spreads: tuple[Spread, ...]
+    stands_in: bool
+
+
+def compare_with_model(
+    setup: FlightSetup, flown: FlownLegs, simulated: Track, ended: str, *, stands_in: bool = False
+) -> Reflight:
+    """Hold a model's flight of a route against the flight of the field on it.
+
+    setup: of the model's flight.  Raises LogError where the model's flight has too few rows.
+
+    >>> from flight.simulation.setup import MissionStretch
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.verdict.imported.flown_legs import flown_legs
+    >>> log = example_log()
+    >>> flown = flown_legs(log.setup, log.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+    >>> again = compare_with_model(log.setup, flown, log.track, "completed")
+    >>> [(one.name, one.most) for one in again.spreads]
+    [('cross_track', 0.0), ('height_error', 0.0), ('ground_speed', 0.0), ('bank', 0.0)]
+    """
+    demands = route_demands(setup)
+    aligned = lay_track(demands, simulated)
+    if aligned is None:
+        raise LogError(f"{setup.scenario.name}: the model's flight has too few rows", file=setup.scenario.name)
+    pairs = (flown.demands, flown.aligned), (demands, aligned)
+    ends = np.cumsum(demands.runs)
+    places = [np.arange(0.0, run, STEP) for run in demands.runs]
+    profiles = [_profile(one, track, places) for one, track in pairs]
+    begins = np.concatenate([[0.0], ends[:-1]])
+    distance = np.concatenate([begin + along for begin, along in zip(begins, places, strict=True)])
+    counts = np.concatenate([[0], np.cumsum([len(along) for along in places])])
+    legs = tuple(
+        _leg(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles) for k in range(demands.legs)
+    )
+    corners = [corner_passes(one, track) for one, track in pairs]
+    turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, demands.legs))
+    flown_profile, model_profile = profiles
+    return Reflight(
+        stretch=flown.stretch,
+        setup=setup,
+        simulated=simulated,
+        ended=ended,
+        distance=distance,
+        ends=ends,
+        flown=flown_profile,
+        model=model_profile,
+        first=flown.first,
+        legs=legs,
+        turns=turns,
+        spreads=_spreads(flown_profile, model_profile),
+        stands_in=stands_in,
+    )
+
+
+def _profile(demands: RouteDemands, aligned: AlignedTrack, places: Sequence[Floats]) -> Profile:
+    parts: list[Floats] = []
+    track = aligned.track
+    speed = np.hypot(track.velocity[:, 0], track.velocity[:, 1]).astype(np.float64)
+    bank, energy = track.attitude[:, ROLL].astype(np.float64), track.energy.astype(np.float64)
+    for leg, along_leg in enumerate(places):
+        if not aligned.flew(leg):
+            parts.append(np.full((5, len(along_leg)), math.nan))
+            continue
+        rows = aligned.leg_rows(leg)
+        along, across = along_across(demands, leg, track.position[rows])
+        # Where a flight goes back, as on a circle, the first time counts.
+        forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
+        line = demands.points[leg, 2] + along * math.tan(demands.slopes[leg])
+        off = track.position[rows, 2] - line
+        columns = (across, off, speed[rows], bank[rows], energy[rows])
+        parts.append(
+            np.array(
+                [
+                    np.interp(along_leg, along[forward], column[forward], left=math.nan, right=math.nan)
+                    for column in columns
+                ]
+            )
+        )
+    table = np.concatenate(parts, axis=1)
+    known = table[4][np.isfinite(table[4])]
+    table[4] -= known[0] if known.size else 0.0
+    return Profile(*table)
+
+
+def _leg(leg: int, rows: slice, profiles: Sequence[Profile]) -> LegPair:
+    def pair(name: str, reduce: str) -> tuple[float, float]:
+        one, other = (_reduced(getattr(profile, name)[rows], reduce) for profile in profiles)
+        return one, other
+
+    flown_bank, model_bank = pair("bank", "size")
+    return LegPair(
+        leg,
+        cross_track=pair("cross_track", "farthest"),
+        height_error=pair("height_error", "farthest"),
+        ground_speed=pair("ground_speed", "mean"),
+        bank=(math.degrees(flown_bank), math.degrees(model_bank)),
+        energy=pair("energy", "span"),
+    )
+
+
+def _reduced(values: Floats, reduce: str) -> float:
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return math.nan
+    match reduce:
+        case "mean":
+            return float(known.mean())
+        case "span":
+            return float(known[-1] - known[0])
+        case "size":
+            return float(np.abs(known).max())
+    return float(known[np.argmax(np.abs(known))])
+
+
+def _turn(
+    first: int,
+    k: int,
+    pairs: Sequence[tuple[RouteDemands, AlignedTrack]],
+    corners: Sequence[Sequence[CornerPass]],
+) -> TurnPair:
+    one, other = (measure_turn(demands, aligned, k) for demands, aligned in pairs)
+    passed, again = (passes[k] for passes in corners)
+
+    def both(left: float | None, right: float | None, factor: float = 1.0) -> tuple[float, float]:
+        return (math.nan if left is None else left * factor, math.nan if right is None else right * factor)
+
+    return TurnPair(
+        first + k,
+        math.degrees(float(pairs[0][0].turns[k])),
+        overshoot=both(passed.overshoot, again.overshoot),
+        bank=both(one.peak_bank, other.peak_bank, 180.0 / math.pi),
+        passed=both(passed.nearest, again.nearest),
+    )
+
+
+def _spreads(flown: Profile, model: Profile) -> tuple[Spread, ...]:
+    out = []
+    for name, unit, factor in (
+        ("cross_track", "m", 1.0),
+        ("height_error", "m", 1.0),
+        ("ground_speed", "m/s", 1.0),
+        ("bank", "deg", 180.0 / math.pi),
+    ):
+        off = factor * np.abs(getattr(flown, name) - getattr(model, name))
+        known = off[np.isfinite(off)]
+        if known.size:
+            out.append(Spread(name, unit, float(np.median(known)), float(np.percentile(known, 95.0))))
+    return tuple(out)

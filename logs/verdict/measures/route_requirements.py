@@ -1,0 +1,473 @@
+"""What a route asks of the aircraft and what the aircraft's limits are: the planned side of every finding."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from aircraft.path_limits import (
+    BLEND_ACCELERATION,
+    Limits,
+    PerformanceTable,
+    aircraft_slopes,
+    arc_slope,
+    downwind,
+    fly_over_run,
+    ground_speed_on,
+    roll_reversal_length,
+    turn_radius_between,
+)
+from flight.autopilots.arduplane.law import true_by_equivalent
+from flight.guidance.path import FlyByPath, path_polyline
+from flight.mission.fences import fence_zones
+from flight.mission.route import Route
+from flight.simulation.setup import FlightSetup
+from logs.verdict.places import Place
+from logs.verdict.tolerances import LARGEST_OFFSET, OFF_SPEED, U_TURN
+from world.airspace.zone_kernels import ZoneRecords, zone_records
+from world.airspace.zones import Zone
+from world.errors import MissionError
+from world.geometry import fly_by_offset, leg_courses, leg_runs, leg_slopes, signed_turns, tangent_length
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# The zones that a flight is judged by: those of its scenario, then those of its mission's own fence.
+
+
+@dataclass(frozen=True, slots=True)
+class Airspace:
+    """Zones in the order in which findings number them.
+
+    zones: the scenario's, then the fence's.
+    records: the same, for compiled code.
+    of_scenario: how many are the scenario's.
+    fault: why the mission's fence makes no zones; "" where it does, or where there is none.
+    """
+
+    zones: tuple[Zone, ...]
+    records: ZoneRecords
+    fault: str = ""
+    of_scenario: int = 0
+
+    def place(self, index: int) -> Place:
+        """A zone as the place of a finding."""
+        zone = self.zones[index]
+        return Place(zone.kind, index, name=zone.name)
+
+
+def airspace_of(setup: FlightSetup) -> Airspace:
+    """The zones that a setup's flight is to keep out of or to stay in.
+
+    A fence that makes no zones, which a log of before fences were judged may hold, is left out and named.
+
+    >>> from logs.recording.example_log import example_log
+    >>> airspace_of(example_log().setup).zones
+    ()
+    """
+    fault, own = "", tuple[Zone, ...]()
+    try:
+        own = fence_zones(setup.mission.fences, setup.scenario.origin, "the mission")
+    except MissionError as error:
+        fault = str(error)
+    zones = (*setup.scenario.zones, *own)
+    return Airspace(zones, zone_records(zones), fault, len(setup.scenario.zones))
+
+
+def with_fence_zones(setup: FlightSetup) -> FlightSetup:
+    """The setup with its mission's fence among its scenario's zones, for whatever draws them.
+
+    >>> from logs.recording.example_log import example_log
+    >>> with_fence_zones(example_log().setup).scenario.zones
+    ()
+    """
+    if not setup.mission.fences:
+        return setup
+    return setup.in_scenario(replace(setup.scenario, zones=airspace_of(setup).zones))
+
+
+# ----------------------------------------------------------------------
+# What a route's turns take of their legs, and the sharpest turn that fits beside its neighbours.
+
+
+@dataclass(frozen=True, slots=True)
+class TurnDemands:
+    """A route's turns, for w waypoints.
+
+    turns: (w,) rad, positive to the right, 0 at the ends.
+    tightest: (w,) m, radius of the arc at the bank limit.
+    radius: (w,) m, of the arc that is flown: the same, or a loiter's.
+    before, after: (w,) m of leg that the turn uses on either side, inf for a U-turn.
+    reversal: (w - 1,) m of leg that the roll from a turn into one the other way round uses.
+    limit: (w,) rad, the sharpest turn there that fits both legs beside the neighbouring turns.
+    """
+
+    turns: Floats
+    tightest: Floats
+    radius: Floats
+    before: Floats
+    after: Floats
+    reversal: Floats
+    limit: Floats
+
+
+def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceTable]:
+    """The aircraft's performance at each airspeed of a route, m/s."""
+    return {float(speed): limits.performance(float(speed)) for speed in route.airspeed}
+
+
+def turn_demands(route: Route, tables: dict[float, PerformanceTable]) -> TurnDemands:
+    """Work out what each turn takes, by the aircraft's performance at the route's airspeeds."""
+    points = np.asarray(route.waypoints, dtype=np.float64)
+    courses, runs, count = leg_courses(points), leg_runs(points), len(points)
+    turns = np.zeros(count)
+    if count > 2:
+        turns[1:-1] = signed_turns(points)
+    tightest, radius, before, after = (np.zeros(count) for _ in range(4))
+    for i in range(1, count - 1):
+        speed = float(max(route.airspeed[i - 1], route.airspeed[i]))
+        tightest[i] = turn_radius_between(tables[speed], courses[i - 1], courses[i], points[i, 2])
+        radius[i] = route.arcs[i] or tightest[i]
+        before[i], after[i] = turn_lengths(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
+    reversal = _reversals(route, tables, courses, turns, radius, points[:, 2])
+    limit = _sharpest_turns(route, runs, tightest, before, after, reversal)
+    return TurnDemands(turns, tightest, radius, before, after, reversal, limit)
+
+
+def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
+    """Length of leg (m) that a turn (rad) uses before and after its waypoint; a fly-over only after it."""
+    if turn < 1e-9:
+        return 0.0, 0.0
+    if fly_over:
+        return 0.0, radius * fly_over_run(turn)
+    if turn > U_TURN:
+        return math.inf, math.inf
+    tangent = tangent_length(turn, radius)
+    return tangent, tangent
+
+
+def _reversals(
+    route: Route, tables: dict[float, PerformanceTable], courses: Floats, turns: Floats, radius: Floats, up: Floats
+) -> Floats:
+    """Length of each leg that the roll from one bank into the other uses, (w - 1,) m; 0 between turns of one side."""
+    out = np.zeros(len(courses))
+    for leg in range(1, len(courses) - 1):
+        flown_by = not route.fly_over[leg : leg + 2].any() and np.isfinite(radius[leg : leg + 2]).all()
+        if turns[leg] * turns[leg + 1] < 0.0 and flown_by:
+            table = tables[float(route.airspeed[leg])]
+            ux, uy = math.sin(courses[leg]), math.cos(courses[leg])
+            lower = float(min(up[leg], up[leg + 1]))
+            out[leg] = roll_reversal_length(table, ux, uy, lower, radius[leg], radius[leg + 1], *downwind(table))
+    return out
+
+
+def available_lengths(runs: Floats, before: Floats, after: Floats, reversal: Floats, i: int) -> tuple[float, float]:
+    """Lengths (m) of the legs before and after waypoint i that its turn may use.
+
+    Of a leg too short for its two turns the one that takes more than half of it is at fault, or both are: half of each
+    leg is left to a turn in any case.
+    """
+    return (
+        max(runs[i - 1] - after[i - 1], 0.5 * runs[i - 1]) - reversal[i - 1],
+        max(runs[i] - before[i + 1], 0.5 * runs[i]) - reversal[i],
+    )
+
+
+def _sharpest_turns(
+    route: Route, runs: Floats, tightest: Floats, before: Floats, after: Floats, reversal: Floats
+) -> Floats:
+    """Sharpest turn at each waypoint that fits its legs beside the neighbouring turns, (w,) rad."""
+    out = np.full(len(tightest), math.pi)
+    for i in range(1, len(tightest) - 1):
+        if not math.isfinite(tightest[i]):
+            out[i] = 0.0
+            continue
+        behind, ahead = available_lengths(runs, before, after, reversal, i)
+        if route.fly_over[i]:
+            out[i] = _sharpest_fly_over(ahead / tightest[i])
+        else:
+            out[i] = 2.0 * math.atan(min(behind, ahead) / tightest[i])
+    return out
+
+
+def _sharpest_fly_over(radii: float) -> float:
+    """Sharpest fly-over turn (rad) that needs at most this many radii of leg, by bisection."""
+    low, high = 0.0, math.pi
+    if fly_over_run(high) <= radii:
+        return high
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if fly_over_run(middle) <= radii else (low, middle)
+    return low
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedPath:
+    """The fly-by path as a chain of n points.
+
+    points: (n, 3) m.
+    legs: (n - 1,) leg of each segment.
+    times: (n,) s at which each point is passed.
+    """
+
+    points: Floats
+    legs: NDArray[np.int64]
+    times: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class RouteDemands:
+    """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
+
+    route: the setup's, with true airspeeds where an autopilot takes those that are commanded for equivalent ones.
+
+    For w waypoints:
+
+    points: (w, 3) m.
+    runs: (w - 1,) m, horizontal.
+    courses, slopes: (w - 1,) rad.
+    turns, tightest, radius, before, after, reversal: as of `TurnDemands`.
+    blend: (w,) m of leg beyond each turn on which the slope still changes.
+    fly_by_offset: (w,) m by which the fly-by passes the waypoint.
+    turn_limit: (w,) rad, as `TurnDemands.limit`; inf where the envelope is left out.
+    climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
+    ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
+    envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
+    airspace: the zones of scenario and mission.
+    """
+
+    setup: FlightSetup
+    route: Route
+    points: Floats
+    runs: Floats
+    courses: Floats
+    slopes: Floats
+    turns: Floats
+    tightest: Floats
+    radius: Floats
+    before: Floats
+    after: Floats
+    reversal: Floats
+    blend: Floats
+    fly_by_offset: Floats
+    turn_limit: Floats
+    climb: Floats
+    dive: Floats
+    ground_speed: Floats
+    path: PlannedPath
+    envelope: bool
+    airspace: Airspace
+
+    @property
+    def limits(self) -> Limits:
+        """Limits of scenario and aircraft."""
+        return self.setup.limits
+
+    @property
+    def legs(self) -> int:
+        """How many legs there are."""
+        return len(self.runs)
+
+    @property
+    def limits_source(self) -> str:
+        """Whose the limits of the scenario are: planfly's own where the mission came without one."""
+        return "default" if self.setup.scenario.external else "scenario"
+
+    def waypoint(self, index: int) -> Place:
+        """A waypoint as the place of a finding."""
+        return Place("waypoint", index, self._item(index))
+
+    def leg(self, index: int) -> Place:
+        """A leg as the place of a finding, with the item that it leads to."""
+        return Place("leg", index, to_item=self._item(index + 1))
+
+    def _item(self, waypoint: int) -> int | None:
+        item = int(self.setup.route.items[waypoint])
+        return None if item < 0 else item
+
+    def leg_unit(self, leg: int) -> Floats:
+        """East and north components of a leg's course, (2,)."""
+        return np.array([math.sin(self.courses[leg]), math.cos(self.courses[leg])])
+
+    def apexes(self) -> Floats:
+        """Where the fly-by path passes each waypoint: the middles of the arcs, (w, 3) m."""
+        out = self.points.copy()
+        for i in range(1, len(out) - 1):
+            if self.fly_by_offset[i] > 0.0:
+                inward = self.leg_unit(i) - self.leg_unit(i - 1)
+                out[i, :2] += self.fly_by_offset[i] * inward / math.hypot(*inward)
+                # Halfway between the heights at the arc's ends.
+                tangent = min(self.before[i], self.runs[i - 1], self.runs[i])
+                out[i, 2] += 0.5 * tangent * (math.tan(self.slopes[i]) - math.tan(self.slopes[i - 1]))
+        return out
+
+
+def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
+    """Work out what a setup's route asks for.
+
+    envelope: False leaves the aircraft's limits out, for flown evidence alone.
+    """
+    route, limits = true_route(setup), setup.limits
+    points = np.asarray(route.waypoints, dtype=np.float64)
+    tables = performance_tables(route, limits)
+    turning = turn_demands(route, tables)
+    courses, runs = leg_courses(points), leg_runs(points)
+    climb, dive, speeds = _leg_limits(route, tables, points, courses)
+    if not envelope:
+        climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
+    return RouteDemands(
+        setup=setup,
+        route=route,
+        points=points,
+        runs=runs,
+        courses=courses,
+        slopes=leg_slopes(points),
+        turns=turning.turns,
+        tightest=turning.tightest,
+        radius=turning.radius,
+        before=turning.before,
+        after=turning.after,
+        reversal=turning.reversal,
+        blend=_blends(setup, route, points, runs, turning),
+        fly_by_offset=_fly_by_offsets(route, turning),
+        turn_limit=turning.limit if envelope else np.full(len(points), math.inf),
+        climb=climb,
+        dive=dive,
+        ground_speed=speeds,
+        path=_planned_path(setup.path, route, speeds),
+        envelope=envelope,
+        airspace=airspace_of(setup),
+    )
+
+
+def true_route(setup: FlightSetup) -> Route:
+    """A setup's route with true airspeeds.  ArduPlane flies equivalent ones: each leg's counts at its middle height.
+
+    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> true_route(setup) is setup.route
+    True
+    >>> faster = true_route(replace(setup, parameters=default_parameters()))
+    >>> bool((faster.airspeed > setup.route.airspeed).all())
+    True
+    """
+    route = setup.route
+    if setup.parameters is None:
+        return route
+    middle = 0.5 * (route.waypoints[1:, 2] + route.waypoints[:-1, 2])
+    return replace(route, airspeed=route.airspeed * [float(true_by_equivalent(up)) for up in middle])
+
+
+def _planned_path(path: FlyByPath, route: Route, ground_speed: Floats) -> PlannedPath:
+    points, legs = path_polyline(path)
+    speed = np.where(np.isfinite(ground_speed), ground_speed, route.airspeed)
+    run = np.hypot(*np.diff(points[:, :2], axis=0).T)
+    return PlannedPath(points, legs, np.concatenate([[0.0], np.cumsum(run / speed[legs])]))
+
+
+def _leg_limits(
+    route: Route, tables: dict[float, PerformanceTable], points: Floats, courses: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """Climb and dive over the ground, rad, and ground speed, m/s, that the aircraft has all along each leg."""
+    legs = len(courses)
+    climb, dive, speeds = np.zeros(legs), np.zeros(legs), np.zeros(legs)
+    for leg in range(legs):
+        table, course = tables[float(route.airspeed[leg])], float(courses[leg])
+        heights = (points[leg, 2], 0.5 * (points[leg, 2] + points[leg + 1, 2]), points[leg + 1, 2])
+        speeds[leg] = min(ground_speed_on(table, course, up) for up in heights)
+        if any(math.isnan(ground_speed_on(table, course, up)) for up in heights):
+            speeds[leg] = math.nan
+        climb[leg], dive[leg] = np.min([aircraft_slopes(table, course, up) for up in heights], axis=0)
+    return climb, dive, speeds
+
+
+def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
+    """Distance by which the fly-by passes each waypoint, (w,) m."""
+    out = np.zeros(len(turning.radius))
+    for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
+        radius = float(turning.radius[i])
+        out[i] = min(fly_by_offset(abs(float(turning.turns[i])), radius), LARGEST_OFFSET * radius)
+    return out
+
+
+def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnDemands) -> Floats:
+    """Length of leg beside each turn on which the slope still changes, (w,) m.
+
+    A parabola about each end of the arc, or about the waypoint where there is none.
+    """
+    rise = np.diff(points[:, 2]) / np.maximum(runs, 1.0)
+    blend = np.zeros(len(points))
+    speed = float(route.airspeed.max()) + setup.scenario.wind.strongest(points[:, 2])
+    for i in range(1, len(points) - 1):
+        steps = [abs(rise[i] - rise[i - 1])]
+        arc = turning.radius[i] * abs(turning.turns[i])
+        if 0.0 < arc < math.inf and math.isfinite(turning.after[i]) and not setup.route.fly_over[i]:
+            # The arc is shorter than its two tangents, so that its slope is steeper than the legs'.
+            on_arc = (rise[i - 1] + rise[i]) * turning.after[i] / arc
+            steps = [abs(on_arc - rise[i - 1]), abs(on_arc - rise[i])]
+        blend[i] = max(steps) * speed**2 / (2.0 * BLEND_ACCELERATION)
+    return blend
+
+
+# ----------------------------------------------------------------------
+# The tighter of the scenario's and the aircraft's limit at each turn, leg and fly-by arc.
+
+
+@dataclass(frozen=True, slots=True)
+class SteepArc:
+    """A fly-by arc that is steeper than the aircraft can climb or sink.
+
+    tangent: of the arc's slope.  limit: tangent of the aircraft's, on the mean of both legs' courses; positive.
+    """
+
+    tangent: float
+    limit: float
+
+
+def turn_limit(demands: RouteDemands, i: int) -> tuple[float, str]:
+    """Tighter of the scenario's and the aircraft's limit at a waypoint, rad, and whose it is."""
+    return tighter_turn(demands, i, float(demands.turn_limit[i]))
+
+
+def tighter_turn(demands: RouteDemands, i: int, aircraft: float) -> tuple[float, str]:
+    """Tighter of the scenario's limit at a waypoint and this one of the aircraft, rad, and whose it is."""
+    fixed = demands.limits.max_turn
+    # A circle has no angle: its corners are of our making.
+    if fixed is not None and fixed <= aircraft and demands.setup.route.arcs[i] == 0.0:
+        return fixed, "scenario"
+    return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
+
+
+def slope_limit(demands: RouteDemands, leg: int) -> tuple[float, str]:
+    """Tighter limit on a leg's climb or, for a leg that falls, dive: rad, positive, and whose it is."""
+    rising = demands.slopes[leg] >= 0.0
+    fixed = demands.limits.max_climb if rising else demands.limits.max_dive
+    aircraft = float((demands.climb if rising else demands.dive)[leg])
+    if fixed is not None and fixed <= aircraft:
+        return fixed, "scenario"
+    return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
+
+
+def steep_arc(demands: RouteDemands, leg: int) -> SteepArc | None:
+    """The fly-by arc at a leg's end, where it is too steep.
+
+    None where it leaves the airspeed within `OFF_SPEED`: what the aircraft cannot climb or sink on the arc it takes
+    from its speed or adds to it, g dh / V.
+    """
+    i = leg + 1
+    if i == demands.legs or demands.setup.route.fly_over[i] or demands.setup.route.arcs[i] > 0.0:
+        return None
+    before, length = float(demands.before[i]), float(demands.radius[i]) * abs(float(demands.turns[i]))
+    if not 0.0 < before < min(demands.runs[leg : leg + 2]):
+        return None
+    into, out = math.tan(demands.slopes[leg]), math.tan(demands.slopes[i])
+    tangent = arc_slope(into, out, before, float(demands.radius[i]))
+    limits = (demands.climb if tangent > 0.0 else demands.dive)[leg : leg + 2]
+    if not np.isfinite(limits).all() or not (limits > 0.0).all():
+        return None
+    limit, speed = float(np.tan(limits).mean()), float(demands.route.airspeed[leg])
+    return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > OFF_SPEED else None

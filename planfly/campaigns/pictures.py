@@ -1,0 +1,380 @@
+"""The pictures of campaigns: failures by place, probability against wind, tracks, and the go/no-go chart."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from logs.figures.style import BLUE, FAIL, INK, LIMIT, PLANNED, QUIET, clean_style, new_figure, shorten
+from planfly.campaigns.statistics.decision import Interval, wilson
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Failures by rule and place.
+
+# Most bars, of the most frequent.
+MOST = 14
+
+
+def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
+    """Bars of how many flights failed by which rule at which place, the most first.
+
+    counts: rule's title, place in words, flights.  flights: all of them.
+    """
+    with clean_style():
+        shown = sorted(counts, key=lambda one: -one[2])[:MOST]
+        tall = 1.4 + 0.32 * max(1, len(shown))
+        figure = new_figure(tall)
+        axes = figure.add_axes((0.27, 0.6 / tall, 0.69, 1.0 - 1.1 / tall))
+        axes.set_title("Failures by rule and place")
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+        if not shown:
+            axes.set_axis_off()
+            axes.text(0.0, 0.5, f"No flight of {flights} failed.", transform=axes.transAxes, fontsize=11, color=QUIET)
+            return figure
+        rows = list(range(len(shown)))
+        numbers = [one[2] for one in shown]
+        axes.barh(rows, numbers, height=0.62, color=FAIL)
+        for row, number in zip(rows, numbers, strict=True):
+            axes.annotate(
+                f"{number}  ({100.0 * number / max(1, flights):.1f} %)", (number, row), xytext=(4, 0),
+                textcoords="offset points", va="center", fontsize=8, color=INK,
+            )  # fmt: skip
+        axes.set_yticks(rows, [shorten(f"{rule}, {place}", 38) for rule, place, _ in shown])
+        axes.invert_yaxis()
+        axes.set_xlim(0.0, 1.2 * max(numbers))
+        axes.set_xlabel(f"flights, of {flights}")
+    return figure
+
+
+# ----------------------------------------------------------------------
+# The probability against the wind's speed, and what the deciding margin depends on.
+
+
+# Speeds are put together in steps of so many m/s, or wider where that would make more than so many.
+_STEP, _MOST_BINS = 1.0, 20
+
+
+@dataclass(frozen=True)
+class SpeedBin:
+    """Flights in a range of wind speeds (m/s), how many of them are flyable, and Wilson's interval of that share."""
+
+    low: float
+    high: float
+    flights: int
+    flyable: int
+    interval: Interval
+
+
+@dataclass(frozen=True)
+class Bar:
+    """A quantity's title, its first-order index (0 to 1), and which way the margin goes with it (-1 to 1)."""
+
+    title: str
+    index: float
+    slope: float
+
+
+def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.95) -> list[SpeedBin]:
+    """Flights by wind speed (n,) m/s; ranges without a flight are left out.
+
+    >>> [one.flights for one in speed_bins(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))]
+    [2, 1]
+    """
+    if not speed.size:
+        return []
+    width = max(_STEP, float(np.ptp(speed)) / _MOST_BINS)
+    group = np.floor(speed / width).astype(int)
+    bins = []
+    for number in np.unique(group):
+        mine = flyable[group == number]
+        whole, good = int(mine.size), int(mine.sum())
+        bins.append(SpeedBin(number * width, (number + 1) * width, whole, good, wilson(good, whole, confidence)))
+    return bins
+
+
+def draw_probability(bins: Sequence[SpeedBin], target: float | None) -> Figure:
+    """P against wind speed, with its band and the number of flights in each range."""
+    with clean_style():
+        figure = new_figure(4.2)
+        axes = figure.add_axes((0.08, 0.16, 0.89, 0.70))
+        middle = [0.5 * (one.low + one.high) for one in bins]
+        share = [one.flyable / one.flights for one in bins]
+        for one, x, p in zip(bins, middle, share, strict=True):
+            axes.fill_between(
+                [one.low, one.high], one.interval.low, one.interval.high, color=PLANNED, alpha=0.35, linewidth=0.0
+            )
+            axes.plot([one.low, one.high], [p, p], color=BLUE, linewidth=2.0)
+            axes.annotate(
+                f"{one.flights}",
+                (x, 0.0),
+                xytext=(0, 3),
+                textcoords="offset points",
+                ha="center",
+                fontsize=7,
+                color=QUIET,
+            )
+        if target is not None:
+            axes.axhline(target, color=LIMIT, linewidth=1.2, linestyle="--")
+            axes.annotate(f"target {target:g}", (1.0, target), xycoords=("axes fraction", "data"), xytext=(-4, -11),
+                          textcoords="offset points", ha="right", color=INK, fontsize=8)  # fmt: skip
+        axes.set_ylim(-0.02, 1.05)
+        axes.set_xlabel("mean wind at the start's height (m/s)")
+        axes.set_ylabel("share of flyable flights")
+        axes.set_title("Probability against wind speed: line its share, band Wilson's interval, below how many flew")
+        _light(axes)
+    return figure
+
+
+def draw_tornado(bars: Sequence[Bar], of_what: str) -> Figure:
+    """What the deciding margin's variance comes from: to the right more of the quantity helps, to the left it harms."""
+    with clean_style():
+        tall = 1.2 + 0.3 * max(1, len(bars))
+        figure = new_figure(tall)
+        axes = figure.add_axes((0.17, 0.5 / tall, 0.79, 1.0 - 1.1 / tall))
+        rows = range(len(bars))
+        for row, bar in zip(rows, bars, strict=True):
+            length = bar.index * (1.0 if bar.slope >= 0.0 else -1.0)
+            axes.barh(row, length, height=0.62, color=BLUE if length >= 0.0 else FAIL)
+            axes.annotate(
+                f"{100.0 * bar.index:.0f} %", (length, row), xytext=(4 if length >= 0.0 else -4, 0),
+                textcoords="offset points", va="center", ha="left" if length >= 0.0 else "right", fontsize=8,
+            )  # fmt: skip
+        axes.axvline(0.0, color=INK, linewidth=0.8)
+        axes.set_yticks(list(rows), [bar.title for bar in bars])
+        axes.invert_yaxis()
+        reach = max([0.2, *(1.25 * bar.index for bar in bars)])
+        axes.set_xlim(-reach, reach)
+        axes.set_xlabel("share of the margin's variance   (left: more of it leaves less margin; right: more)")
+        axes.set_title(f"What decides: first-order sensitivity of the margin of {of_what}")
+        axes.set_xticks([])
+        for side in ("top", "right", "left"):
+            axes.spines[side].set_visible(False)
+        axes.tick_params(left=False)
+    return figure
+
+
+def _light(axes: object) -> None:
+    from matplotlib.axes import Axes
+
+    if isinstance(axes, Axes):
+        axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+        axes.set_axisbelow(True)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+
+
+# ----------------------------------------------------------------------
+# Where the flights went: how high above ground along the way, and where they crossed each waypoint.
+
+# Of the flights, the shares between which a band is drawn, the widest first.
+_BANDS = ((0.0, 1.0, 0.18), (0.05, 0.95, 0.30), (0.25, 0.75, 0.45))
+# Chi-square of two degrees of freedom at 95 %: half axes of the ellipse, in standard deviations, squared.
+_CHI2 = -2.0 * math.log(0.05)
+_COLUMNS = 5
+
+
+def draw_clearance_fan(
+    clearance: Floats, failed: NDArray[np.bool_], ground: Floats, length: float, least: float
+) -> Figure:
+    """Height above ground along the way over all flights, over the ground's own profile.
+
+    clearance: (n, s) least of each flight on each of s equal pieces of the way, m, NaN where it did not get.
+    failed: (n,) flights that are not flyable: at most 30 are drawn.  ground: (s,) m AMSL on the way.  length: m.
+    least: clearance required, m.
+    """
+    with clean_style():
+        figure = new_figure(5.4)
+        top = figure.add_axes((0.08, 0.36, 0.89, 0.56))
+        low = figure.add_axes((0.08, 0.10, 0.89, 0.20), sharex=top)
+        stations = clearance.shape[1]
+        along = (np.arange(stations) + 0.5) / stations * length / 1000.0
+        some = np.isfinite(clearance).any(axis=0)
+        for below, above, alpha in _BANDS:
+            ends = np.full((2, stations), np.nan)
+            ends[:, some] = np.nanquantile(clearance[:, some], (below, above), axis=0)
+            label = "all flights" if below == 0.0 else f"{100 * (above - below):.0f} % of them"
+            top.fill_between(along, ends[0], ends[1], color=PLANNED, alpha=alpha + 0.15, linewidth=0.0, label=label)
+        middle = np.full(stations, np.nan)
+        middle[some] = np.nanmedian(clearance[:, some], axis=0)
+        top.plot(along, middle, color=BLUE, linewidth=1.4, label="median")
+        for k, row in enumerate(clearance[failed][:30]):
+            top.plot(along, row, color=FAIL, linewidth=0.7, alpha=0.8, label="not flyable" if k == 0 else None)
+        top.axhline(least, color=LIMIT, linewidth=1.4, linestyle="--", label=f"required, {least:g} m")
+        top.set_ylim(bottom=0.0)
+        top.set_ylabel("above ground (m)")
+        top.set_title("Clearance along the way, over all flights")
+        # Over the panel, where it covers no band.
+        top.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=6, columnspacing=1.0, borderaxespad=0.2)
+        top.tick_params(labelbottom=False)
+        low.fill_between(along, ground, np.nanmin(ground) - 10.0, color="#cfd8b0", linewidth=0.0)
+        low.plot(along, ground, color=QUIET, linewidth=0.8)
+        low.set_xlim(0.0, length / 1000.0)
+        low.set_ylabel("ground (m AMSL)")
+        low.set_xlabel("along the way (km)")
+        for axes in (top, low):
+            axes.grid(visible=True, color="#e2e2e2", linewidth=0.5)
+            axes.set_axisbelow(True)
+            for side in ("top", "right"):
+                axes.spines[side].set_visible(False)
+    return figure
+
+
+def draw_crossings(crossings: Floats, failed: NDArray[np.bool_]) -> Figure:
+    """Where flights crossed the waypoints, seen along the way: a panel each, with the ellipse of 95 %.
+
+    crossings: (n, w, 2) right of and above each waypoint, m, NaN where a flight did not get.  failed: (n,).
+    """
+    count = crossings.shape[1]
+    columns = min(_COLUMNS, count)
+    lines = -(-count // columns)
+    with clean_style():
+        figure = new_figure(0.7 + 2.0 * lines)
+        panels = figure.subplots(lines, columns, squeeze=False)
+        tall = 0.7 + 2.0 * lines
+        figure.subplots_adjust(
+            left=0.07, right=0.98, bottom=0.4 / tall, top=1.0 - 0.65 / tall, wspace=0.22, hspace=0.35
+        )
+        for k, axes in enumerate(panels.ravel()):
+            if k >= count:
+                axes.set_axis_off()
+                continue
+            here = crossings[:, k]
+            good = np.isfinite(here).all(axis=1)
+            axes.axhline(0.0, color="#cccccc", linewidth=0.6)
+            axes.axvline(0.0, color="#cccccc", linewidth=0.6)
+            axes.plot(*here[good & ~failed].T, ".", color=BLUE, markersize=2.2, alpha=0.5)
+            axes.plot(*here[good & failed].T, "x", color=FAIL, markersize=3.5)
+            reach = _reach(here)
+            if good.sum() > 2:
+                ellipse = covariance_ellipse(here[good])
+                # Its extents are in metres as long as it stands on no axes.
+                reach = max(reach, 1.05 * float(np.abs(ellipse.get_extents().get_points()).max()))
+                axes.add_patch(ellipse)
+            axes.set_title(f"waypoint {k}", fontsize=8.5, pad=3.0)
+            axes.set_xlim(-reach, reach)
+            axes.set_ylim(-reach, reach)
+            axes.tick_params(labelsize=7)
+        title = "Crossings of the waypoints, m right of and above each, with the ellipse of 95 %"
+        figure.text(0.07, 1.0 - 0.3 / tall, title, fontsize=11, color=INK)
+        figure.text(0.98, 1.0 - 0.3 / tall, "dots flyable, crosses not", fontsize=8, color=QUIET, ha="right")
+    return figure
+
+
+def covariance_ellipse(points: Floats) -> Ellipse:
+    """The ellipse that holds 95 % of a normal distribution with these points' (n, 2) mean and covariance.
+
+    >>> points = np.array([[3.0, 0.0], [-3.0, 0.0], [0.0, 1.0], [0.0, -1.0]])
+    >>> ellipse = covariance_ellipse(points)
+    >>> round(ellipse.width, 2), round(ellipse.height, 2)
+    (11.99, 4.0)
+    """
+    spread = np.cov(points.T)
+    values, vectors = np.linalg.eigh(spread)
+    wide, narrow = (2.0 * math.sqrt(_CHI2 * max(0.0, float(value))) for value in values[::-1])
+    angle = math.degrees(math.atan2(vectors[1, 1], vectors[0, 1]))
+    east, up = (float(value) for value in points.mean(axis=0))
+    return Ellipse((east, up), wide, narrow, angle=angle, fill=False, edgecolor=INK, linewidth=0.9)
+
+
+def _reach(crossings: Floats) -> float:
+    known = np.abs(crossings[np.isfinite(crossings)])
+    return max(5.0, 1.1 * float(np.quantile(known, 0.995))) if known.size else 10.0
+
+
+# ----------------------------------------------------------------------
+# The go/no-go chart: from each direction the largest wind in which a mission flies.
+
+
+@dataclass(frozen=True)
+class Spoke:
+    """A direction of the chart.
+
+    from_deg: where the wind comes from.
+    boundary: largest wind with the probability asked for, m/s, as estimated; low, high: its interval.
+    reaches: whether the boundary lies beyond all that was looked at.
+    flights: wind speed, flights and flyable ones, for the marks.
+    """
+
+    from_deg: float
+    boundary: float
+    low: float
+    high: float
+    reaches: bool
+    flights: tuple[tuple[float, int, int], ...]
+
+
+def draw_go_no_go(
+    spokes: Sequence[Spoke], most: float, target: float, confidence: float, name: str, wind: tuple[float, float] | None
+) -> Figure:
+    """A polar chart: north up, wind from the direction that a spoke points to, speed outwards to ``most`` m/s.
+
+    wind: the scenario's own, speed m/s and degrees, drawn as a star.
+    """
+    with clean_style():
+        figure = new_figure(7.6)
+        axes = figure.add_axes((0.06, 0.07, 0.64, 0.80), projection="polar")
+        axes.set_theta_zero_location("N")  # type: ignore[attr-defined]  # of polar axes
+        axes.set_theta_direction(-1)  # type: ignore[attr-defined]  # of polar axes
+        angle = np.radians([one.from_deg for one in spokes] + [spokes[0].from_deg + 360.0])
+        ring = [*spokes, spokes[0]]
+        fine = np.linspace(angle[0], angle[-1], 720)
+
+        def outline(values: Sequence[float]) -> np.ndarray:
+            return np.interp(fine, angle, values)
+
+        low, high = outline([one.low for one in ring]), outline([one.high for one in ring])
+        boundary = outline([one.boundary for one in ring])
+        axes.fill_between(fine, 0.0, low, color=PLANNED, alpha=0.45, linewidth=0.0)
+        axes.fill_between(fine, boundary, most, color=FAIL, alpha=0.13, linewidth=0.0)
+        axes.fill_between(fine, low, high, color=LIMIT, alpha=0.45, linewidth=0.0)
+        axes.plot(fine, boundary, color=INK, linewidth=1.8)
+        for one in spokes:
+            for speed, flights, flyable in one.flights:
+                all_well = flights == flyable
+                axes.plot(
+                    np.radians(one.from_deg), speed, marker="o" if all_well else "x", color=BLUE if all_well else FAIL,
+                    markersize=2.6 if all_well else 3.6, linewidth=0.0, alpha=0.75,
+                )  # fmt: skip
+        if wind is not None:
+            axes.plot(np.radians(wind[1]), wind[0], marker="*", color=INK, markersize=13, markeredgecolor="white")
+        axes.set_ylim(0.0, most)
+        axes.set_xticks(np.radians(np.arange(0, 360, 45)), ["N", "NE", "E", "SE", "S", "SW", "W", "NW"])
+        axes.set_rlabel_position(11.0)  # type: ignore[attr-defined]  # of polar axes
+        axes.tick_params(axis="y", labelsize=8)
+        axes.grid(color="#cccccc", linewidth=0.6)
+        figure.text(0.03, 0.955, f"{name}: in which wind it flies", fontsize=14, color=INK)
+        figure.text(
+            0.03, 0.922, f"wind from each direction, m/s; flies with a probability of {target:g} or more",
+            fontsize=9, color=QUIET,
+        )  # fmt: skip
+        _legend(figure, target, confidence, wind)
+    return figure
+
+
+def _legend(figure: Figure, target: float, confidence: float, wind: tuple[float, float] | None) -> None:
+    from matplotlib.artist import Artist
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    entries: list[tuple[Artist, str]] = [
+        (Patch(color=PLANNED, alpha=0.45), f"go: P >= {target:g} also at the\nlow end of the interval"),
+        (Line2D([], [], color=INK, linewidth=1.8), f"boundary, P = {target:g}"),
+        (Patch(color=LIMIT, alpha=0.45), f"its interval, {100 * confidence:g} %"),
+        (Patch(color=FAIL, alpha=0.13), f"no-go: P < {target:g}"),
+        (Line2D([], [], color=BLUE, marker="o", markersize=3, linewidth=0), "flown, all flyable"),
+        (Line2D([], [], color=FAIL, marker="x", markersize=4, linewidth=0), "flown, some not"),
+    ]
+    if wind is not None:
+        entries.append((Line2D([], [], color=INK, marker="*", markersize=11, linewidth=0), "the scenario's wind"))
+    figure.legend(
+        [handle for handle, _ in entries], [label for _, label in entries],
+        loc="center left", bbox_to_anchor=(0.735, 0.45), fontsize=9, labelspacing=1.0,
+    )  # fmt: skip

@@ -1,1 +1,0 @@
-"""Commands on logs of the field."""

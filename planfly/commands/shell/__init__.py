@@ -1,1 +1,0 @@
-"""Commands on planfly itself: its help, and what a shell completes."""

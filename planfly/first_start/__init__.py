@@ -1,1 +1,0 @@
-"""The first start after an install: what compiles is said, shared between processes, and counted."""

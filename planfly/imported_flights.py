@@ -1,0 +1,343 @@
+"""Flights of the field as setups and tracks of planfly's: in a scenario, along a mission, in the wind of their log."""
+
+import hashlib
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.path_limits import Limits
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.dynamics.envelope_tables import load_envelope
+from flight.mission.implied_scenario import implied_scenario
+from flight.mission.items import Mission
+from flight.mission.placing import PlacedMission, place_stops
+from flight.mission.route import lay_route
+from flight.mission_files.formats import mission_text, read_mission
+from flight.simulation.setup import FieldSource, FlightSetup, VerticalDatum, make_limits
+from flight.simulation.simulate import simulate
+from flight.simulation.track import Track
+from logs.importers.clean_places import LONGEST_STEP
+from logs.importers.imported_flight import FieldFlight, make_flight, mean_wind, rows_of_flight, with_flown_heights
+from logs.importers.logged_missions import logged_parameters
+from logs.importers.open_log import open_log
+from logs.recording.reader import LogEvent
+from logs.verdict.findings import Verdict
+from logs.verdict.imported.flown_legs import FlownLegs, flown_legs, plan_mismatch
+from logs.verdict.imported.model_comparison import Reflight, compare_with_model
+from logs.verdict.judge_flight import judge_flight
+from planfly.airframe import find_airframe
+from planfly.open_mission import NamedFences, ScenarioChange, open_plan
+from planfly.pipeline import Advance
+from world.errors import LogError, MissionError
+from world.scenario import Scenario, load_scenario, with_flight, with_wind
+from world.scenario_tables import FlightTable
+
+Floats = NDArray[np.float64]
+
+
+_BLOCK = 2**20
+
+
+@dataclass(frozen=True, slots=True)
+class FieldOptions:
+    """What a person says of a flight beside its log; None where nothing is.
+
+    plan: a mission file or plan.json that was to be flown.
+    scenario: to judge it in.  terrain: an elevation file.
+    aircraft: its name or folder; without one none of an aircraft's limits count.
+    datum: of the log's heights where it states none.
+    number: which flight of the log, from 1.
+    wind_given: the wind is another's, not the log's.
+    fences: to be kept to beside the mission's and the scenario's own.
+    """
+
+    plan: Path | None = None
+    scenario: str | None = None
+    terrain: str | None = None
+    aircraft: str | None = None
+    datum: VerticalDatum | None = None
+    number: int | None = None
+    wind_given: bool = False
+    fences: NamedFences = field(default_factory=NamedFences)
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedFlight:
+    """A flight of the field, judged.
+
+    setup: with its source.  track: its rows.  events: what the vehicle said.
+    ended: how the log shows that it ended.
+    """
+
+    setup: FlightSetup
+    track: Track
+    events: tuple[LogEvent, ...]
+    verdict: Verdict
+    ended: str
+
+    @property
+    def lossy(self) -> bool:
+        """Whether some of the log could not be read."""
+        return self.setup.source is not None and self.setup.source.damage.lossy
+
+
+def import_flight(path: Path, options: FieldOptions, change: ScenarioChange) -> ImportedFlight:
+    """Read a log, set it into its world and judge it.
+
+    change: makes another scenario of the one that the flight is judged in.  Raises LogError for a file that is no log
+    of an aeroplane's flight, MissionError where no mission is known, and for a plan that is not the one flown.
+    """
+    flight = make_flight(open_log(path), options.number)
+    mission, origin_of_mission, planned_in = _mission(path, flight, options)
+    mission = options.fences.on_mission(mission)
+    plan_heights = options.plan is not None or flight.mission is None or flight.mission.with_heights
+    if not plan_heights:
+        mission = with_flown_heights(mission, flight.lat, flight.lon, flight.up)
+    scenario, placed = _world(mission, options, planned_in)
+    parameters, refused = logged_parameters(flight.raw)
+    scenario, wind_source = _in_its_wind(options.fences.on_scenario(change(scenario)), flight, options)
+    known = options.aircraft is not None or options.scenario is not None or planned_in is not None
+    setup = _setup(scenario, placed, mission, parameters, flight)
+    heights = flight.heights
+    if options.datum is not None and heights.datum == "unstated":
+        heights = replace(heights, datum=options.datum)
+    notes = (
+        *_edges(flight),
+        *_other_flights(flight),
+        *refused,
+        *mission.warnings,
+        *_differing(flight, mission, options),
+    )
+    source = FieldSource(
+        file=path.name,
+        sha256=_sha256(path),
+        format=flight.raw.format,
+        program=flight.raw.program,
+        utc_start=flight.raw.utc_start,
+        holds=flight.holds,
+        stretches=flight.stretches,
+        heights=heights,
+        wind=wind_source,
+        mission=origin_of_mission,
+        plan_heights=plan_heights,
+        aircraft_known=known,
+        gaps=flight.gaps,
+        faults=flight.faults,
+        damage=flight.raw.damage,
+        notes=notes,
+    )
+    setup = replace(setup, source=source)
+    track = rows_of_flight(flight, scenario.origin)
+    if options.plan is not None:
+        mismatch = plan_mismatch(setup, track)
+        if mismatch is not None:
+            raise MissionError(f"{path}: not flown by {options.plan}: {mismatch.text}", file=path)
+    verdict = judge_flight(setup, track, "")
+    ended = "completed" if verdict.complete else _end_of(verdict)
+    return ImportedFlight(setup, track, _events(flight), verdict, ended)
+
+
+def _mission(path: Path, flight: FieldFlight, options: FieldOptions) -> tuple[Mission, str, Scenario | None]:
+    """The mission that was to be flown, whose it is, and the scenario that its plan was made in."""
+    if options.plan is not None:
+        if options.plan.suffix.lower() == ".json":
+            opened = open_plan(options.plan, options.terrain)
+            return opened.mission, f"of {options.plan.name}", opened.scenario
+        if not options.plan.is_file():
+            raise MissionError(
+                f"{options.plan}: no such file; a plan.json, .waypoints or .plan file is expected", file=options.plan
+            )
+        return read_mission(options.plan), f"of {options.plan.name}", None
+    if flight.mission is None:
+        raise LogError(f"{path}: holds no mission: --plan MISSION names the one that was to be flown", file=path)
+    found = flight.mission
+    when = f", at {found.time:.1f} s" if found.time > 0.0 else ""
+    return found.mission, f"{found.origin} of the log{when}, {len(found.mission.items)} items", None
+
+
+def _world(mission: Mission, options: FieldOptions, planned_in: Scenario | None) -> tuple[Scenario, PlacedMission]:
+    """The scenario that a flight is judged in, and its mission's places there."""
+    scenario = planned_in
+    if options.scenario is not None:
+        scenario = load_scenario(options.scenario, options.terrain)
+    if scenario is None:
+        # As ArduPlane flies: so that a flight in the simulation can be held against it.
+        table = FlightTable() if options.aircraft is None else FlightTable(aircraft=options.aircraft)
+        implied = implied_scenario(mission, options.terrain, table, vertical_legs=True)
+        return implied.scenario, implied.placed
+    return scenario, place_stops(mission, scenario.origin, scenario.terrain, vertical_legs=True)
+
+
+def _in_its_wind(scenario: Scenario, flight: FieldFlight, options: FieldOptions) -> tuple[Scenario, str]:
+    """The scenario in the mean wind of the stretches, and where that is from."""
+    if options.wind_given:
+        return scenario, "as given"
+    found = mean_wind(flight)
+    if found is None:
+        own = "as the scenario has it: the log holds no wind" if options.scenario else ""
+        return scenario, own
+    blown = with_wind(scenario, found.speed, found.from_course, None)
+    return blown, f"from {math.degrees(found.from_course) % 360.0:03.0f}°, by {found.source} of the log"
+
+
+def _setup(
+    scenario: Scenario,
+    placed: PlacedMission,
+    mission: Mission,
+    parameters: ArduPilotParameters | None,
+    flight: FieldFlight,
+) -> FlightSetup:
+    aircraft, battery = find_airframe(scenario)
+    limits = _limits(scenario, parameters, flight, aircraft.airspeed)
+    return FlightSetup(
+        scenario=scenario,
+        mission=mission,
+        mission_text=mission_text(mission, "waypoints"),
+        route=lay_route(placed, limits.airspeed, scenario.flight.fly_over, limits),
+        limits=limits,
+        aircraft=aircraft.name,
+        battery=battery,
+        seed=1,
+        guidance=scenario.flight.steering.guidance,
+        nav=scenario.flight.steering.nav,
+        guidance_hz=scenario.flight.guidance_hz,
+        parameters=parameters,
+    )
+
+
+def _limits(scenario: Scenario, parameters: ArduPilotParameters | None, flight: FieldFlight, usual: float) -> Limits:
+    """Limits at the speed that was to be flown: the autopilot's, the scenario's, or the one that was flown."""
+    aircraft, _ = find_airframe(scenario)
+    envelope = load_envelope(aircraft, motor_braking=scenario.flight.motor_braking)
+    stated = {} if parameters is None else parameters.by_origin("file")
+    airspeed, bank = scenario.flight.airspeed_mps or usual, math.radians(scenario.flight.max_bank_deg)
+    if "AIRSPEED_CRUISE" in stated:
+        airspeed = stated["AIRSPEED_CRUISE"]
+    elif scenario.flight.airspeed_mps is None and np.isfinite(flight.columns["airspeed"]).any():
+        airspeed = float(np.nanmedian(flight.columns["airspeed"]))
+    if parameters is not None and "ROLL_LIMIT_DEG" in stated:
+        bank = parameters.roll_limit
+    return make_limits(scenario, envelope, max(5.0, airspeed), bank)
+
+
+def _sha256(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as file:
+        while block := file.read(_BLOCK):
+            digest.update(block)
+    return digest.hexdigest()
+
+
+def _edges(flight: FieldFlight) -> tuple[str, ...]:
+    """What the log does not hold of the flight by its nature, in words: before it, after it, between its rows."""
+    notes = []
+    if flight.begins:
+        notes.append(f"the log begins in flight, at {flight.time[0]:.1f} s")
+    if flight.ends:
+        notes.append(f"the log ends in flight, at {flight.time[-1]:.1f} s")
+    usual = float(np.median(np.diff(flight.time)))
+    if usual > LONGEST_STEP:
+        notes.append(f"the log has a place every {usual:.1f} s: what was between them it does not show")
+    return tuple(notes)
+
+
+def _other_flights(flight: FieldFlight) -> tuple[str, ...]:
+    """That a log holds other flights, in words."""
+    if flight.count == 1:
+        return ()
+    others = ", ".join(f"at {start:.0f} s ({along:.0f} s along its mission)" for start, along in flight.others)
+    return (f"flight {flight.number} of {flight.count} is judged; the others began {others} (--flight N)",)
+
+
+def _differing(flight: FieldFlight, mission: Mission, options: FieldOptions) -> tuple[str, ...]:
+    """That the plan is not what the log's own mission is, in words."""
+    if options.plan is None or flight.mission is None:
+        return ()
+    own = flight.mission.mission.items
+    pairs = zip(own, mission.items, strict=False)
+    changed = [one.seq for one, other in pairs if (one.x, one.y, one.alt) != (other.x, other.y, other.alt)]
+    if len(own) == len(mission.items) and not changed:
+        return ()
+    if len(own) != len(mission.items):
+        return (f"the mission of the log has {len(own)} items, the plan {len(mission.items)}",)
+    return (f"{len(changed)} items of the log's own mission lie elsewhere than the plan's, item {changed[0]} first",)
+
+
+def _events(flight: FieldFlight) -> tuple[LogEvent, ...]:
+    """What the vehicle said during the flight, and the modes it was in."""
+    if not len(flight.time):
+        return ()
+    low, high = float(flight.time[0]), float(flight.time[-1])
+    said = [(time, text) for time, text in flight.raw.events if text]
+    said += [(mode.time, f"mode {mode.name}") for mode in flight.raw.modes]
+    clock = flight.clock
+    moved = np.array([time for time, _ in said])
+    if clock is not None and said:
+        moved = clock.on_clock(moved)
+    events = zip(moved.tolist(), said, strict=True)
+    inside = [LogEvent(max(low, time), text, "info") for time, (_, text) in events if low - 60.0 <= time <= high]
+    return tuple(sorted(inside, key=lambda event: event.time))
+
+
+def _end_of(verdict: Verdict) -> str:
+    found = next((item for item in verdict.findings if item.rule == "completion"), None)
+    return "not judged" if found is None else found.brief
+
+
+# ----------------------------------------------------------------------
+# The mission of a flight of the field, flown again by the model of its aircraft.
+
+
+def fly_again(
+    setup: FlightSetup, track: Track, aircraft: str | None, turbulence: str | None, advance: Advance, most: int = 9
+) -> tuple[Reflight, ...]:
+    """Fly the legs of every stretch again, in the wind of the log, and hold the flights side by side: longest first.
+
+    setup: with its source.  aircraft: that flies it, in place of the setup's.  turbulence: in place of the scenario's.
+    most: of the stretches, the longest.
+
+    Raises LogError for a flight that followed none of its mission, and StartError where the model cannot begin.
+    """
+    return tuple(_one_again(setup, legs, aircraft, turbulence, advance) for legs in _stretches(setup, track)[:most])
+
+
+def _one_again(
+    setup: FlightSetup, legs: FlownLegs, aircraft: str | None, turbulence: str | None, advance: Advance
+) -> Reflight:
+    scenario = with_wind(with_flight(setup.scenario, aircraft=aircraft), None, None, turbulence)
+    model, battery = find_airframe(scenario)
+    limits = setup.limits
+    if model.name != setup.aircraft:
+        envelope = load_envelope(model, motor_braking=scenario.flight.motor_braking)
+        limits = make_limits(scenario, envelope, setup.airspeed, min(setup.max_bank, envelope.max_bank))
+    own = replace(
+        legs.demands.setup,
+        scenario=scenario,
+        limits=limits,
+        aircraft=model.name,
+        battery=battery,
+        source=None,
+        nav="perfect",
+    )
+
+    def report(done: float, whole: float) -> None:
+        advance(done, whole, f"{done / 1000:.1f} of {whole / 1000:.1f} km")
+
+    flown = simulate(own, model, progress=report)
+    if len(flown.track) < 2:
+        raise LogError(f"{scenario.name}: {model.name} flew none of the mission: {flown.ended}", file=scenario.name)
+    stands_in = setup.source is not None and not setup.source.aircraft_known and aircraft is None
+    return compare_with_model(own, legs, flown.track, flown.ended, stands_in=stands_in)
+
+
+def _stretches(setup: FlightSetup, track: Track) -> list[FlownLegs]:
+    source = setup.source
+    stretches = () if source is None else source.stretches
+    found = [legs for stretch in stretches if (legs := flown_legs(setup, track, stretch)) is not None]
+    if not found:
+        name = "the log" if source is None else source.file
+        raise LogError(f"{name}: none of its mission's legs was flown: there is nothing to fly again", file=name)
+    return sorted(found, key=lambda legs: legs.first - legs.last)

@@ -1,0 +1,204 @@
+"""The flights beside an autopilot's: of the aircraft by planfly's guidance, and with other parameters."""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from aircraft.catalog import Aircraft
+from flight.autopilots.arduplane.parameters import ArduPilotParameters
+from flight.simulation.setup import FlightSetup
+from flight.simulation.simulate import Progress, simulate
+from flight.simulation.track import Track
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.route_requirements import true_route
+from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, FlownBeside
+from logs.verdict.summary import first_failed
+from world.errors import StartError
+
+# ----------------------------------------------------------------------
+# Which of ArduPlane's parameters decides a flight that fails: found by flying with one of them changed at a time.
+
+
+class Candidate(NamedTuple):
+    """A parameter that may decide.
+
+    name: ArduPlane's.
+    step: the increment that its parameter reference gives, or a few of them.
+    far: the farthest value that is tried, within the range that the reference gives.
+    unit: of both.
+    """
+
+    name: str
+    step: float
+    far: float
+    unit: str
+
+
+# Names, units, ranges and increments: ArduPlane's complete parameter list (ardupilot.org, Plane, version 4.6).
+_HEIGHT = (
+    Candidate("TECS_HDEM_TCONST", 0.2, 1.0, "s"),
+    Candidate("TECS_CLMB_MAX", 0.5, 10.0, "m/s"),
+    Candidate("TECS_SINK_MAX", 0.5, 10.0, "m/s"),
+    Candidate("TECS_TIME_CONST", 0.2, 3.0, "s"),
+)
+_SIDE = (
+    Candidate("NAVL1_PERIOD", 1.0, 10.0, "s"),
+    Candidate("WP_RADIUS", 5.0, 30.0, "m"),
+    Candidate("WP_RADIUS", 5.0, 150.0, "m"),
+    Candidate("ROLL_LIMIT_DEG", 1.0, 60.0, "deg"),
+)
+# Rules that a height off the plan breaks before a track beside it does.
+_OF_HEIGHT = ("clearance", "height", "bounds", "slope", "energy", "stall", "speed")
+
+Passes = Callable[[ArduPilotParameters], bool]
+
+
+def deciding_parameter(
+    parameters: ArduPilotParameters, findings: tuple[Finding, ...], passes: Passes
+) -> DecidingParameter | None:
+    """The first candidate that passes with another value, and the nearest value that does; None where none does.
+
+    findings: of the flight that failed.
+    passes: flies with other parameters and says whether that flight passes; called about ten times.
+
+    The candidates of what failed come first, heights or sides.  Of each the farthest value is flown, and where that
+    passes the values between, by halves: the value that is named was flown and passed.
+
+    >>> from flight.autopilots.arduplane.parameters import default_parameters
+    >>> from logs.verdict.findings import make_finding
+    >>> from logs.verdict.places import Place
+    >>> low = make_finding("clearance", Place("leg", 4), ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
+    >>> found = deciding_parameter(default_parameters(), (low,), lambda new: new.tecs_height_demand_time < 1.3)
+    >>> found.name, found.current, found.passing
+    ('TECS_HDEM_TCONST', 3.0, 1.2)
+    """
+    failed = first_failed(findings)
+    if failed is None:
+        return None
+    values = {parameter.name: parameter.value for parameter in parameters.values}
+    for name, step, far, unit in (*_HEIGHT, *_SIDE) if failed.rule in _OF_HEIGHT else (*_SIDE, *_HEIGHT):
+        current = values[name]
+
+        def with_value(value: float, name: str = name) -> bool:
+            return passes(parameters.changed(**{name: value}))
+
+        passing = _nearest(current, step, far, with_value)
+        if passing is not None:
+            off = _off(failed, findings)
+            return DecidingParameter(name, current, passing, unit, failed.rule, failed.place, off)
+    return None
+
+
+def _nearest(current: float, step: float, far: float, passes: Callable[[float], bool]) -> float | None:
+    """The value nearest to the current one, in steps towards the farthest, that passes; None where that fails."""
+    steps = int(abs(far - current) / step + 1e-6)
+    sign = 1.0 if far > current else -1.0
+
+    def value(count: int) -> float:
+        return round(current + sign * count * step, 6)
+
+    if not steps or not passes(value(steps)):
+        return None
+    fails, works = 0, steps
+    while works - fails > 1:
+        middle = (fails + works) // 2
+        fails, works = (fails, middle) if passes(value(middle)) else (middle, works)
+    return value(works)
+
+
+def _off(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
+    """How far off (m) the flight was where it failed, as `DecidingParameter` has it."""
+    if failed.rule == "corridor":
+        return failed.flown
+    if failed.place.kind != "leg" or failed.rule not in ("clearance", "height"):
+        return None
+    beside = [item for item in findings if item.rule == "slope" and item.place == failed.place]
+    errors = [fact.value for item in beside for fact in item.facts if fact.what == "height error"]
+    return errors[0] if errors else None
+
+
+class _GivenUp(Exception):
+    """There is no time for flights beside."""
+
+
+def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress | None = None) -> AirframeAnswer:
+    """Fly a setup by planfly's guidance, which knows exactly where it is, and judge that flight.
+
+    It flies the same true airspeeds: those that ArduPlane takes for equivalent ones are higher the higher it flies.
+    progress: as of `flight.simulation.simulate.simulate`.
+    """
+    same = true_route(setup)
+    ideal = replace(setup, parameters=None, program=None, guidance="path", nav="perfect", route=same)
+    try:
+        flown = simulate(ideal, aircraft, progress=progress)
+    except StartError as error:
+        return AirframeAnswer(False, f"not flyable: not started: {error.reason}", (("completion", FLIGHT),))
+    verdict = judge_flight(ideal, flown.track, flown.ended)
+    failed = tuple((item.rule, item.place) for item in verdict.findings if item.ok is False)
+    return AirframeAnswer(verdict.flyable, verdict.headline, failed)
+
+
+def find_deciding_parameter(
+    setup: FlightSetup, aircraft: Aircraft, verdict: Verdict, progress: Progress | None = None
+) -> DecidingParameter | None:
+    """The parameter with another value of which a flight that failed passes; None where there is none.
+
+    verdict: on the flight with the setup's own parameters.  progress: of each flight.  Takes about ten flights, by
+    ArduPlane's law: of a real autopilot's flight they say something where the law's own flight fails as well, and
+    nothing where it passes.
+    """
+    if setup.parameters is None or verdict.flyable:
+        return None
+    findings = verdict.findings
+    if setup.program is not None:
+        own = _flown_by_law(setup, aircraft, progress)
+        if own.flyable:
+            return None
+        findings = own.findings
+    # The corridor is as wide as it was, whatever radius is tried.
+    scenario = setup.scenario
+    limits = scenario.limits.model_copy(update={"corridor_m": setup.corridor})
+    spec = scenario.spec.model_copy(update={"limits": limits})
+    same = setup.in_scenario(replace(scenario, spec=spec, limits=limits))
+
+    def passes(parameters: ArduPilotParameters) -> bool:
+        return _flown_by_law(replace(same, parameters=parameters), aircraft, progress).flyable
+
+    return deciding_parameter(setup.parameters, findings, passes)
+
+
+def judge_with_flights_beside(
+    setup: FlightSetup, aircraft: Aircraft, track: Track, ended: str, hurry: Callable[[], bool] | None = None
+) -> tuple[Verdict, FlownBeside | None]:
+    """Judge an autopilot's flight beside the aircraft's own, and look for the parameter that decides where they differ.
+
+    track, ended: of the flight with the setup.  A flight of planfly's own guidance has none beside it.
+    hurry: asked all the time while others fly; once it says yes they are given up, and the verdict holds what was
+    known by then.  Whether the flight is flyable does not depend on them.
+    """
+
+    def watch(_done: float, _whole: float) -> None:
+        if hurry is not None and hurry():
+            raise _GivenUp
+
+    if setup.parameters is None:
+        return judge_flight(setup, track, ended), None
+    try:
+        beside = FlownBeside(airframe_answer(setup, aircraft, watch))
+    except _GivenUp:
+        return judge_flight(setup, track, ended), None
+    verdict = judge_flight(setup, track, ended, beside=beside)
+    if beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
+        with contextlib.suppress(_GivenUp):
+            beside = replace(beside, deciding=find_deciding_parameter(setup, aircraft, verdict, watch))
+            verdict = judge_flight(setup, track, ended, beside=beside)
+    return verdict, beside
+
+
+def _flown_by_law(setup: FlightSetup, aircraft: Aircraft, progress: Progress | None = None) -> Verdict:
+    """Fly a setup by ArduPlane's law, whoever flew it before, and judge that flight."""
+    by_law = replace(setup, program=None)
+    flown = simulate(by_law, aircraft, progress=progress)
+    return judge_flight(by_law, flown.track, flown.ended)

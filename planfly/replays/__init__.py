@@ -1,0 +1,1 @@
+"""Recorded flights played to other programs, and as movies."""

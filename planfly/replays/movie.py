@@ -1,0 +1,157 @@
+"""``planfly replay --movie``: the frames of a flight as a GIF, an MP4 or a folder of PNG files."""
+
+import argparse
+import contextlib
+import errno
+import io
+import itertools
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageColor
+
+from logs.figures.movie_frames import RATE, MovieFrames
+from logs.figures.style import DRAWN
+from logs.recording.reader import FlightLog
+from planfly.terminal.output import progress
+from planfly.terminal.results import refuse_existing, refuse_folder
+from world.errors import PlanflyError
+from world.files import temporary_folder, write_whole
+
+# A film lasts this long unless a speed is given, s.
+_LASTS = 20.0
+_MOST_FRAMES = 5000
+# The last frame of a GIF stands, ms.
+_REST = 2000
+# The colour number that lets the frame before show.
+_CLEAR = 255
+SUFFIXES = (".gif", ".mp4")
+
+
+def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: float) -> list[Path]:
+    """Write what ``args.movie`` names: a .gif or .mp4 file, or a folder for frame-0000.png and on.
+
+    Raises PlanflyError for a target that exists, too many frames, and an .mp4 without ffmpeg.
+    """
+    target = Path(args.movie)
+    kind = target.suffix.lower()
+    if kind in SUFFIXES:
+        refuse_existing(target, args.overwrite)
+    elif kind:
+        allowed = f"{', '.join(SUFFIXES)} or a folder is expected"
+        raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
+    else:
+        refuse_folder(target, args.overwrite)
+    if kind == ".mp4" and shutil.which("ffmpeg") is None:
+        allowed = "an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
+        raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
+    film = MovieFrames(log.setup, log.track, start, end, args.speed or max(1.0, (end - start) / _LASTS))
+    if len(film) > _MOST_FRAMES:
+        allowed = f"at most {_MOST_FRAMES:,}; raise --speed"
+        raise PlanflyError.at(target, "--movie", len(film), allowed, shown=f"{len(film):,} frames")
+    if not kind:
+        return _write_folder(target, film)
+    write_whole(target, _gif(film) if kind == ".gif" else _mp4(film))
+    return [target]
+
+
+def _shown(film: MovieFrames) -> Iterator[Image.Image]:
+    with progress("drawing") as advance:
+        for number, frame in enumerate(film.frames(), 1):
+            yield Image.fromarray(frame)
+            advance(number, len(film), f"frame {number} of {len(film)}")
+
+
+def _write_folder(folder: Path, film: MovieFrames) -> list[Path]:
+    """Write the frames, which are ours to replace, one file each."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("frame-[0-9][0-9][0-9][0-9].png"):
+        old.unlink()
+    files = []
+    for number, image in enumerate(_shown(film)):
+        data = io.BytesIO()
+        image.save(data, "PNG")
+        files.append(folder / f"frame-{number:04d}.png")
+        write_whole(files[-1], data.getvalue())
+    return files
+
+
+def _colours(frame: Image.Image) -> Image.Image:
+    """An image whose palette holds the colours that pictures draw in, as they are, and the frame's others, blended.
+
+    Of few colours chosen by area alone, thin lines and small marks would lose theirs to the ground.
+    """
+    kept = [ImageColor.getrgb(colour)[:3] for colour in DRAWN]
+    blended = frame.quantize(_CLEAR - len(kept), dither=Image.Dither.NONE).getpalette() or []
+    palette = [part for colour in kept for part in colour] + blended[: 3 * (_CLEAR - len(kept))]
+    holder = Image.new("P", (1, 1))
+    # What is left of 256 repeats the first.
+    holder.putpalette(palette + palette[:3] * (256 - len(palette) // 3))
+    return holder
+
+
+def _in_colours(frame: Image.Image, palette: Image.Image) -> Image.Image:
+    """The frame in the palette's colours; none of its pixels has the number that lets the frame before show."""
+    image = frame.quantize(palette=palette, dither=Image.Dither.NONE)
+    numbers = np.asarray(image)
+    same = Image.fromarray(np.where(numbers == _CLEAR, 0, numbers).astype(np.uint8))
+    same.putpalette(palette.getpalette() or [])
+    return same
+
+
+def _gif(film: MovieFrames) -> bytes:
+    """All frames in the same colours, so that nothing flickers; a frame holds only what has changed."""
+    images = _shown(film)
+    start = next(images)
+    palette = _colours(start)
+    first = _in_colours(start, palette)
+    before, rest = np.asarray(first), []
+    for image in images:
+        now = np.asarray(_in_colours(image, palette))
+        rest.append(Image.fromarray(np.where(now == before, _CLEAR, now).astype(np.uint8)))
+        rest[-1].putpalette(first.getpalette() or [])
+        rest[-1].info["transparency"] = _CLEAR
+        before = now
+    data = io.BytesIO()
+    durations = [round(1000 / RATE)] * len(rest) + [_REST]
+    first.save(
+        data, "GIF", save_all=True, append_images=rest, duration=durations, loop=0, optimize=False, disposal=1,
+        transparency=_CLEAR,
+    )  # fmt: skip
+    return data.getvalue()
+
+
+def _mp4(film: MovieFrames) -> bytes:
+    """Frames through ffmpeg, as raw pixels on its input.  Raises OSError with its last words if it fails."""
+    frames = film.frames()
+    first = next(frames)
+    height, width = first.shape[:2]
+    with temporary_folder("planfly-movie-") as folder, tempfile.TemporaryFile() as messages:
+        out = folder / "film.mp4"
+        command = [
+            "ffmpeg", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
+            "-r", str(RATE), "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(out),
+        ]  # fmt: skip
+        with (
+            progress("drawing") as advance,
+            subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages) as encoder,
+        ):
+            entry = encoder.stdin
+            # Where it ends before us, its status gives the reason.
+            with contextlib.suppress(BrokenPipeError):
+                for number, frame in enumerate(itertools.chain([first], frames), 1):
+                    if entry is not None:
+                        entry.write(frame.tobytes())
+                    advance(number, len(film), f"frame {number} of {len(film)}")
+                if entry is not None:
+                    entry.close()
+            status = encoder.wait()
+        messages.seek(0)
+        lines = messages.read().decode("utf-8", "replace").strip().splitlines()
+        if status or not out.exists():
+            raise OSError(errno.EIO, f"status {status}: {lines[-1] if lines else 'it says nothing'}", "ffmpeg")
+        return out.read_bytes()

@@ -1,0 +1,272 @@
+"""Legs and corners of a path: measured once, and flown as fly-by arcs with parabolas that blend slopes."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aircraft.envelope import GRAVITY
+from aircraft.path_limits import (
+    BLEND_ACCELERATION,
+    PerformanceTable,
+    corner_tangent,
+    fly_over_run,
+    roll_reversal_length,
+    turn_tangents,
+    wind_speed_at,
+)
+from aircraft.tracking import corner_room, faster_by
+from planner.evaluation.problem import ProblemArrays
+from world.geometry import turning_angle
+from world.kernels import Record, Records, compiled, inlined
+
+Floats = NDArray[np.float64]
+
+
+# ----------------------------------------------------------------------
+# Legs and corners of a path as they are measured once, and the length of leg that turns take.
+
+# East and north of the unit vector that the wind blows towards.
+Wind = tuple[float, float]
+
+# A leg: its unit course (0, 0 for none), its horizontal length and its length, m.
+LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64), ("length", np.float64)])
+# A corner: length of leg that its fly-by arc takes on either side, and the arc's radius; lengths of the legs before and
+# after it that turning there takes, the autopilot's settling included; and how far it then strays from the legs, m.
+CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before", "after", "excursion")])
+
+# Leg left over between its two turns: this share of the leg, and this length (m) or what small turns use of it.
+SETTLING_SHARE = 0.05
+SETTLING_LENGTH = 20.0
+
+
+@inlined
+def measure_legs(path: Floats, legs: Records) -> None:  # pragma: no cover - compiled
+    """Fill `LEG` records (w - 1,) of a path (w, 3)."""
+    for i in range(legs.shape[0]):
+        dx, dy = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]
+        dz = path[i + 1, 2] - path[i, 2]
+        run = math.sqrt(dx * dx + dy * dy)
+        legs[i].east = dx / run if run > 0.0 else 0.0
+        legs[i].north = dy / run if run > 0.0 else 0.0
+        legs[i].run = run
+        legs[i].length = math.sqrt(dx * dx + dy * dy + dz * dz)
+
+
+@compiled
+def measure_corners(
+    data: ProblemArrays, wind: Wind, path: Floats, legs: Records, corners: Records
+) -> None:  # pragma: no cover - compiled
+    """Fill `CORNER` records (w,) of a path (w, 3) whose legs are measured."""
+    aircraft, tracking = data.aircraft, data.tracking
+    last: int = legs.shape[0]
+    for i in range(1, last):
+        ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
+        some = (ux != 0.0 or uy != 0.0) and (vx != 0.0 or vy != 0.0)
+        measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
+    for i, asked in ((0, data.start_course), (last, data.destination_course)):
+        ux, uy, vx, vy = courses_at(data, legs, i)
+        some = not math.isnan(asked) and legs[min(i, last - 1)].run > 0.0
+        measure_corner(aircraft, tracking, wind, some, ux, uy, vx, vy, path[i, 2], corners[i])
+
+
+@compiled
+def measure_corner(
+    aircraft: PerformanceTable,
+    tracking: Record,
+    wind: Wind,
+    some: bool,
+    ux: float,
+    uy: float,
+    vx: float,
+    vy: float,
+    amsl: float,
+    corner: Record,
+) -> None:  # pragma: no cover - compiled
+    """Fill the `CORNER` record of a turn between the unit courses u and v; of none where there is no such turn."""
+    tangent, radius, excursion = 0.0, 0.0, 0.0
+    if some:
+        tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, amsl, wind[0], wind[1])
+    before, after = tangent, tangent
+    if tracking.strays and 0.0 < tangent < math.inf:
+        turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
+        # The highest ground speed on the way, which the arc's radius is of.
+        speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank) + faster_by(tracking, amsl)
+        excursion, room_before, room_after = corner_room(tracking, turn, speed)
+        before, after = max(tangent, room_before), max(tangent, room_after)
+    corner.tangent, corner.radius = tangent, radius
+    corner.before, corner.after, corner.excursion = before, after, excursion
+
+
+@inlined
+def courses_at(
+    data: ProblemArrays, legs: Records, i: int
+) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
+    """Unit courses before and after waypoint i; at the ends those asked for, else the leg's own."""
+    last = legs.shape[0]
+    after, before = min(i, last - 1), max(i - 1, 0)
+    ux, uy, vx, vy = legs[before].east, legs[before].north, legs[after].east, legs[after].north
+    if i == 0 and not math.isnan(data.start_course):
+        ux, uy = math.sin(data.start_course), math.cos(data.start_course)
+    if i == last and not math.isnan(data.destination_course):
+        vx, vy = math.sin(data.destination_course), math.cos(data.destination_course)
+    return ux, uy, vx, vy
+
+
+@inlined
+def settling_length(need: float, run: float) -> float:  # pragma: no cover - compiled
+    """Length of a leg (m) that stays straight between its turns, so that the first has settled; need: what they use."""
+    return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
+
+
+@inlined
+def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
+    """Length of leg i that its two turns use, m: of a fly-over only the one at its beginning, on the way back to it."""
+    if not fly_over:
+        need: float = corners[i].after + corners[i + 1].before
+        return need
+    if corners[i].tangent <= 0.0:
+        return 0.0
+    if math.isinf(corners[i].tangent):
+        return math.inf
+    back: float = corners[i].radius * fly_over_run(2.0 * math.atan(corners[i].tangent / corners[i].radius))
+    return max(back, corners[i].after) if corners[i].excursion > 0.0 else back
+
+
+@compiled
+def roll_length(
+    aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
+) -> float:  # pragma: no cover - compiled
+    """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side."""
+    if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
+        return 0.0
+    ux, uy = legs[i].east, legs[i].north
+    into, onward = legs[i - 1].east * uy - legs[i - 1].north * ux, ux * legs[i + 1].north - uy * legs[i + 1].east
+    if into * onward >= 0.0 or math.isinf(corners[i].tangent + corners[i + 1].tangent):
+        return 0.0
+    length: float = roll_reversal_length(
+        aircraft, ux, uy, amsl, corners[i].radius, corners[i + 1].radius, wind[0], wind[1]
+    )
+    return length
+
+
+# ----------------------------------------------------------------------
+# Corners as a flight takes them: fly-by arcs, and the parabolas that blend slopes.
+
+# Chords of a corner's arc: at most this angle each; on a 160 m radius the arc leaves its chord by 1.4 m.
+ARC_STEP = math.radians(15.0)
+
+
+@inlined
+def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
+    """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
+    speed = aircraft.airspeed + wind_speed_at(aircraft, amsl)
+    length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
+    return length
+
+
+@compiled
+def fly_by_vertices(
+    aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
+) -> Floats:  # pragma: no cover - compiled
+    """Vertices (k, 3) of the way that a flight takes past the waypoint `at`; see `blended_vertices`."""
+    return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
+
+
+@compiled
+def blended_vertices(
+    blend: float, before: Floats, at: Floats, after: Floats, radius: float
+) -> Floats:  # pragma: no cover - compiled
+    """Vertices (k, 3) of the way that a flight takes past the waypoint `at`, at least as low as the flight.
+
+    They are: a point on the leg where the blend of heights begins, the fly-by arc of this radius from tangent point to
+    tangent point, and a point on the next leg where the blend ends.  Height is even along the arc; where the slope
+    breaks downwards a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
+    Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
+
+    blend: of `half_blend_length`.
+    """
+    run_before = math.hypot(at[0] - before[0], at[1] - before[1])
+    run_after = math.hypot(after[0] - at[0], after[1] - at[1])
+    if run_before < 1e-6 or run_after < 1e-6:
+        return at.copy().reshape((1, 3))
+    turn = turning_angle(before[0], before[1], at[0], at[1], after[0], after[1])
+    tangent = radius * math.tan(0.5 * turn) if 1e-6 < turn < math.pi - 1e-6 else 0.0
+    if tangent > min(run_before, run_after):
+        tangent = 0.0
+    ux, uy = (at[0] - before[0]) / run_before, (at[1] - before[1]) / run_before
+    vx, vy = (after[0] - at[0]) / run_after, (after[1] - at[1]) / run_after
+    slope_in, slope_out = (at[2] - before[2]) / run_before, (after[2] - at[2]) / run_after
+    chords = math.ceil(turn / ARC_STEP) if tangent > 0.0 else 0
+    arc = radius * turn if chords > 0 else 0.0
+    low, high = at[2] - tangent * slope_in, at[2] + tangent * slope_out
+    slope = (high - low) / arc if chords > 0 else slope_out
+    available_in, available_out = 0.5 * (run_before - tangent), 0.5 * (run_after - tangent)
+    beside = 0.5 * arc if chords > 0 else min(available_in, available_out)
+    available_in, available_out = min(available_in, beside), min(available_out, beside)
+    half_in = min(abs(slope_in - slope) * blend, available_in)
+    half_out = min(abs(slope - slope_out) * blend, available_out) if chords > 0 else half_in
+    deviation_in = 0.25 * max(0.0, slope_in - slope) * half_in
+    deviation_out = 0.25 * max(0.0, slope - slope_out) * half_out
+    out = np.empty((chords + 3, 3))
+    _set(out, 0, at[0] - ux * (tangent + half_in), at[1] - uy * (tangent + half_in), low - half_in * slope_in)
+    side = 1.0 if ux * vy - uy * vx >= 0.0 else -1.0
+    for k in range(chords + 1):
+        f = k / chords if chords > 0 else 0.0
+        ahead, aside = radius * math.sin(f * turn) - tangent, side * radius * (1.0 - math.cos(f * turn))
+        lowered = deviation_in + f * (deviation_out - deviation_in)
+        east, north = at[0] + ux * ahead - uy * aside, at[1] + uy * ahead + ux * aside
+        _set(out, k + 1, east, north, low + f * (high - low) - lowered)
+    away = tangent + half_out
+    _set(out, chords + 2, at[0] + vx * away, at[1] + vy * away, high + half_out * slope_out)
+    return out
+
+
+@compiled
+def legs_about(
+    before: Floats, at: Floats, after: Floats, length_before: float, length_after: float
+) -> Floats:  # pragma: no cover - compiled
+    """The legs before and after the waypoint `at`, as far as these lengths (m), as vertices (3, 3)."""
+    out = np.empty((3, 3))
+    for row, other, length in ((0, before, length_before), (2, after, length_after)):
+        run = math.hypot(at[0] - other[0], at[1] - other[1])
+        share = min(1.0, length / max(run, 1e-6))
+        for axis in range(3):
+            out[row, axis] = at[axis] + share * (other[axis] - at[axis])
+    out[1] = at
+    return out
+
+
+@inlined
+def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  # pragma: no cover - compiled
+    out[row, 0] = east
+    out[row, 1] = north
+    out[row, 2] = up
+
+
+@compiled
+def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
+    """Radius (m) of the fly-by arc at each waypoint (w,); 0 at the ends and where the path goes straight on.
+
+    Where a number alone limits turns, a leg may be shorter than its two turns.  Nothing flies those arcs, so there
+    are none: the corners are evaluated as drawn, and the flight shows what the aircraft makes of them.  A fly-over
+    passes outside its corner, and has none either.
+    """
+    if data.fly_over:
+        return np.zeros(path.shape[0])
+    tangents = turn_tangents(data.aircraft, path)
+    count = path.shape[0]
+    fits = np.ones(count, dtype=np.bool_)
+    if not data.legs_hold_turns:
+        for i in range(count - 1):
+            if tangents[i] + tangents[i + 1] > math.hypot(path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1]):
+                fits[i] = False
+                fits[i + 1] = False
+    radii = np.zeros(count)
+    for i in range(1, count - 1):
+        if not fits[i]:
+            continue
+        turn = turning_angle(path[i - 1, 0], path[i - 1, 1], path[i, 0], path[i, 1], path[i + 1, 0], path[i + 1, 1])
+        half = math.tan(0.5 * min(turn, math.pi - 1e-6))
+        radii[i] = tangents[i] / half if half > 1e-9 and not math.isinf(tangents[i]) else 0.0
+    return radii

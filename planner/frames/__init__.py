@@ -1,1 +1,0 @@
-"""Axes along a way: where a path's waypoints are as lengths along it and across."""

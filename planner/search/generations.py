@@ -1,0 +1,216 @@
+"""Generations of an optimiser: of whole paths, and of waypoints that are worth the best path through each."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.encoding import rotated_frame
+from planner.optimisers.differential_evolution import DifferentialEvolution
+from planner.optimisers.emna import Emna
+from planner.optimisers.markov_chain import MarkovChain
+from planner.optimisers.niche_sampling import NicheSampling
+from planner.optimisers.preference import NO_GOAL, Level, ranks
+from planner.optimisers.umda import Umda
+from planner.search.search_state import CONSTRAINTS, DETECTION, HEIGHT, KILL, LENGTH, Search, best_first
+from planner.seeding.first_samples import bridge_basis, first_samples
+from planner.seeding.waypoint_chains import WaypointChains, open_places, waypoint_chains
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+# ----------------------------------------------------------------------
+# Generations of whole paths: an optimiser of vectors, its samples ranked by the preference between scores.
+
+
+# A seeded search ends when this many generations have shortened its best path by less than this share of the straight
+# line: the pattern search at the end is faster at the rest.
+STALLED_GENERATIONS, LEAST_GAIN = 10, 2e-4
+# Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
+# safe path, and once it has.
+SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
+
+
+def path_generations(search: Search, population: int, generations: int, starts: Floats) -> Floats:
+    """Search with this many paths and generations; the best vector (d,) of the last.
+
+    starts: vectors (s, d) that the first population is drawn around.
+    """
+    encoding, algorithm = search.encoding, search.algorithm
+    levels, before = _levels(search), search.evaluations
+    initial = (
+        first_samples(search.problem.space, encoding, population, starts, search.rng) if algorithm.smooth else None
+    )
+    optimiser = _make_optimiser(search, lambda scores: ranks(scores, levels), population, initial)
+    optimiser.tell(search.evaluate(optimiser.ask()))
+    search.note()
+    bests = [_best_row(optimiser.scores)]
+    whole = population + generations * (population // 2)
+    for generation in range(generations):
+        if search.over() or search.safe_already():
+            break
+        share = SAFE_SHARE if search.best_is_safe() else SEARCH_SHARE
+        if algorithm.seeded and (_stagnant(bests) or search.evaluations >= before + share * whole):
+            break
+        optimiser.tell(search.evaluate(optimiser.ask()))
+        search.note()
+        bests.append(_best_row(optimiser.scores))
+        search.done += 1
+        search.report(generations - generation - 1)
+    return np.asarray(optimiser.samples[best_first(optimiser.scores)[0]])
+
+
+def _levels(search: Search) -> tuple[Level, ...]:
+    """Preference that ranks a population; goals are the scenario's, none by default."""
+    goals = search.problem.scenario.planner.goals
+    length = NO_GOAL if goals.length_ratio is None else goals.length_ratio
+    kill = NO_GOAL if goals.kill_exposure is None else goals.kill_exposure
+    if search.algorithm.graded:
+        return CONSTRAINTS, Level((KILL,), (kill,)), Level((LENGTH,), (length,))
+    return CONSTRAINTS, Level((LENGTH, KILL), (length, kill)), Level((DETECTION, HEIGHT), (NO_GOAL, NO_GOAL))
+
+
+def _best_row(scores: Floats) -> Floats:
+    """Best of the scores (n, 8), in the archive's order."""
+    return np.asarray(scores[best_first(scores)[0]])
+
+
+def _make_optimiser(
+    search: Search, rank: Callable[[Floats], Ints], population: int, initial: Floats | None
+) -> Umda | DifferentialEvolution:
+    """The optimiser that the algorithm names."""
+    lower, upper = search.encoding.lower, search.encoding.upper
+    if search.algorithm.optimiser == "differential":
+        return DifferentialEvolution(lower, upper, rank, population, search.rng, initial=initial)
+    if search.algorithm.optimiser == "emna":
+        return Emna(lower, upper, rank, population, search.rng, initial=initial)
+    if search.algorithm.optimiser == "chain":
+        return MarkovChain(lower, upper, rank, population, search.rng, initial=initial)
+    basis = bridge_basis(search.encoding.waypoints - 2) if search.algorithm.smooth else None
+    return Umda(lower, upper, rank, population, search.rng, initial=initial, basis=basis)
+
+
+def _stagnant(bests: list[Floats]) -> bool:
+    """Whether the last generations have gained next to nothing."""
+    if len(bests) <= STALLED_GENERATIONS:
+        return False
+    before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
+    same = np.array_equal(before[:LENGTH], after[:LENGTH]) and before[KILL] == after[KILL]
+    return bool(same and before[LENGTH] - after[LENGTH] < LEAST_GAIN)
+
+
+# ----------------------------------------------------------------------
+# An estimation of distribution algorithm whose samples are waypoints: what a waypoint is worth is the best path of it.
+#
+# A factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary algorithm for the
+# optimization of additively decomposed functions", Evolutionary Computation 7, 1999) of the paper's subspaces: "to find
+# one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent waypoints satisfy all
+# the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).  UMDA ranks whole paths, and a good
+# waypoint of a bad path is lost with it.  Here the populations of all intervals are joined in every way at once
+# (`planner.seeding.waypoint_chains`), each waypoint is ranked by the best path through it, and the better ones that lie
+# apart make the interval's next density (`planner.optimisers.niche_sampling`): several sides of the obstacles live
+# beside
+# each other until one is shorter.
+
+# Generations at most: the last moves waypoints by decimetres.  Beside seeds, whose best path is tightened in any case,
+# fewer of fewer waypoints do: this share of the population at first.
+MOST_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
+# Of the first generation's waypoints an interval, the share that later ones have, and the fewest.
+LATER_SHARE, FEWEST = 0.2, 24
+# Legs that one generation may be able to join, so many that they fit the memory of a small machine.
+MOST_LEGS = 6_000_000
+# First deviations about a kept waypoint, as shares of the interval, along and across, and up, m; what is left of them
+# after each generation.
+FIRST_ALONG, FIRST_ACROSS, FIRST_UP, SHRINK = 0.4, 0.5, 60.0, 0.5
+# Of the heights, how far draws go on above the ceiling, where spheres are smallest, to be clipped to it.
+ABOVE_CEILING = 0.3
+# How much longer than the best path one through a kept waypoint may be, as a share: in the first generation, the last.
+# Beside seeds the first is less: their best path is nearer to the shortest than the first that samples make.
+FIRST_SLACK, LAST_SLACK, SEEDED_SLACK = 0.1, 0.003, 0.05
+# Bounds on the first path's cost, over the straight line, tried one after the other: the lower, the faster.
+FIRST_BOUNDS = (1.15, 1.3, 1.6, 2.5, math.inf)
+# Paths that are evaluated whole: through so many of the best waypoints of every so many intervals.
+BEST_EACH, EVERY = 3, 3
+# Evaluations that mend a generation's best path by a pattern search while none is feasible, at most.
+MENDING = 100
+
+
+def waypoint_generations(search: Search, population: int, generations: int) -> None:
+    """Search with this many waypoints an interval at first; the archive takes the paths that are found.
+
+    generations: at most `MOST_GENERATIONS` are made, or `SEEDED_GENERATIONS`.
+    """
+    encoding, space = search.encoding, search.problem.space
+    inner = encoding.waypoints - 2
+    frame = rotated_frame(space.start, space.destination)
+    lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
+    data = search.problem.search
+    sampling = NicheSampling(lower, upper, lambda rows, _: open_places(data, frame.restore(rows)), search.rng)
+    seeded, most = search.algorithm.seeded, int(math.sqrt(MOST_LEGS / (inner + 1)))
+    first = max(2, min(int(population * (SEEDED_SHARE if seeded else 1.0)), most))
+    later = min(first, max(FEWEST, int(LATER_SHARE * first)))
+    interval = frame.length / inner
+    deviation = np.array([FIRST_ALONG * interval, FIRST_ACROSS * interval, FIRST_UP])
+    rows = sampling.first(first, np.array([0.0, 0.0, ABOVE_CEILING]))
+    if not len(search.archive.vectors):
+        # Something to show, whenever the search is asked to end.
+        search.evaluate(_as_vectors(rows[:, :1]))
+    steps = min(generations, SEEDED_GENERATIONS if seeded else MOST_GENERATIONS)
+    slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
+    for step in range(steps):
+        rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)
+        slack = slack_at_first * (LAST_SLACK / slack_at_first) ** (step / max(1, steps - 1))
+        chains = _join(search, encoding.decode(_as_vectors(rows)), slack)
+        search.evaluations += math.ceil(chains.legs / (inner + 1))
+        _evaluate_best(search, rows, chains)
+        search.note()
+        search.done += 1
+        search.report(steps - step - 1)
+        if search.over() or search.safe_already():
+            break
+        if step < steps - 1:
+            cost = chains.cost[1:-1]
+            elite = search.archive.vectors[0].reshape(inner, 3)
+            rows = sampling.next(rows, cost, later, deviation, float(cost.min()) * (1.0 + slack), elite)
+            deviation = SHRINK * deviation
+
+
+def _as_vectors(rows: Floats) -> Floats:
+    """Waypoints (i, k, 3) of intervals as vectors (k, 3 i): the k-th of each."""
+    return rows.transpose(1, 0, 2).reshape(rows.shape[1], -1)
+
+
+def _join(search: Search, paths: Floats, slack: float) -> WaypointChains:
+    """Best paths through the waypoints of paths (k, w, 3), within a share of the best path's length if there is one."""
+    data, space = search.problem.search, search.problem.space
+    straight = math.dist(space.start, space.destination)
+    candidates = np.ascontiguousarray(paths.transpose(1, 0, 2))
+    bounds: tuple[float, ...] = FIRST_BOUNDS
+    if len(search.archive.scores) and search.best_is_safe():
+        bounds = (float(search.archive.scores[0, LENGTH]) * (1.0 + slack), *FIRST_BOUNDS)
+    legs = 0
+    for bound in bounds:
+        chains = waypoint_chains(data, candidates, bound * straight, search.pause)
+        legs += chains.legs
+        if chains.cost[1:-1].min() <= bound * straight < math.inf:
+            break
+    return chains._replace(legs=legs)
+
+
+def _evaluate_best(search: Search, rows: Floats, chains: WaypointChains) -> None:
+    """Evaluate the best paths through some of the best waypoints, whole; mend one while none is feasible."""
+    chosen = set()
+    for i in range(1, len(chains.cost) - 1, EVERY):
+        for k in np.argsort(chains.cost[i], kind="stable")[:BEST_EACH]:
+            if chains.cost[i, k] < math.inf:
+                chosen.add(tuple(chains.path_through(i, int(k))[1:-1].tolist()))
+    if not chosen:
+        search.evaluate(_as_vectors(rows[:, :1]))
+        return
+    intervals = np.arange(len(rows))
+    vectors = np.array([rows[intervals, list(numbers)].ravel() for numbers in sorted(chosen)])
+    search.evaluate(vectors)
+    if not search.archive.feasible():
+        search.improve(search.archive.vectors[0], MENDING)

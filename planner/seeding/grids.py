@@ -1,0 +1,482 @@
+"""Routes over coarse grids: cheapest ways through terrain and threats in the rotated frame, stage by stage.
+
+The grid picks the side of each obstacle; `planner.seeding.waypoint_fitting` then puts the path's waypoints, one an
+interval, where whole legs are evaluated.  Both are dynamic programmes over forward steps: a path that the rotated
+encoding can hold never turns back.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.encoding import RotatedFrame
+from planner.evaluation.leg_constraints import slope_limits
+from planner.evaluation.problem import ProblemArrays, RequiredClearance, clearance_at, required_clearance
+from world.frames import polymap
+from world.kernels import Records, compiled
+from world.terrain import pixel_height
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int32]
+
+
+# ----------------------------------------------------------------------
+# What a m of way costs in the cells of a grid: near the ground, and inside kill spheres.
+
+
+# Cost of a m inside a kill sphere, in m of path.
+KILL_COST = 40.0
+# Steps between stages longer than this (m) are coarse: kill spheres grow there by this share of a step, for what lies
+# between the cells.  Finer grids keep them as they are, and find the narrow gaps.
+COARSE, COARSE_GROWTH = 250.0, 0.15
+# Share of a step to either side of a cell within which the highest ground counts.
+GROUND_SPREAD = 0.4
+# A threat in the rotated frame, m, with the radius that routes keep away.
+OBSTACLE = np.dtype(
+    [("along", np.float64), ("across", np.float64), ("up", np.float64), ("radius", np.float64)], align=True
+)
+
+
+class Grid(NamedTuple):
+    """One resolution: stages along, places across (m from the line) and layers of height (m).
+
+    shrink: share of a step by which kill spheres are taken to be smaller than they are; 0 for none.  What such a grid
+    finds may have to be moved to be safe, and it finds gaps between its cells.
+    spread: share of a step to either side of a cell within which the highest ground counts.
+    ratio: between places across, as a share of a step; below 1 the grid knows more courses and finer gaps.
+    """
+
+    stages: int
+    across: Floats
+    layers: Floats
+    shrink: float = 0.0
+    spread: float = GROUND_SPREAD
+    ratio: float = 1.0
+
+
+class _PixelSteps(NamedTuple):
+    """Columns and rows of the raster from one sample of the ground to the next, along and across."""
+
+    columns_along: float
+    rows_along: float
+    columns_across: float
+    rows_across: float
+
+
+@compiled
+def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:  # pragma: no cover - compiled
+    """East and north of a place in the rotated frame."""
+    return (
+        frame.east + frame.cosine * along - frame.sine * across,
+        frame.north + frame.sine * along + frame.cosine * across,
+    )
+
+
+@compiled
+def _lowest_height(
+    data: ProblemArrays,
+    required: RequiredClearance,
+    frame: RotatedFrame,
+    along: float,
+    across: float,
+    steps: _PixelSteps,
+) -> float:  # pragma: no cover - compiled
+    """Lowest height allowed in a cell: highest ground on 3 x 3 samples, plus clearance; inf outside the map.
+
+    steps: 0 along for the middle sample alone.
+    """
+    east, north = position_of(frame, along, across)
+    if not (data.west <= east <= data.east and data.south <= north <= data.north):
+        return math.inf
+    column, row = polymap(data.to_pixel, east, north)
+    spread = 0 if steps.columns_along == 0.0 and steps.rows_along == 0.0 else 1
+    worst = -math.inf
+    for i in range(-spread, spread + 1):
+        for j in range(-spread, spread + 1):
+            ground = pixel_height(
+                data.heights,
+                column + i * steps.columns_along + j * steps.columns_across,
+                row + i * steps.rows_along + j * steps.rows_across,
+            )
+            if math.isnan(ground):
+                return math.inf
+            worst = max(worst, ground)
+    return worst + clearance_at(required, east, north)
+
+
+@compiled
+def _pixel_steps(
+    data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float
+) -> _PixelSteps:  # pragma: no cover - compiled
+    """Steps over the raster that are `pitch` m along and across the line, at this distance along."""
+    east, north = position_of(frame, along, 0.0)
+    column, row = polymap(data.to_pixel, east, north)
+    east, north = position_of(frame, along + pitch, 0.0)
+    column_along, row_along = polymap(data.to_pixel, east, north)
+    east, north = position_of(frame, along, pitch)
+    column_across, row_across = polymap(data.to_pixel, east, north)
+    return _PixelSteps(column_along - column, row_along - row, column_across - column, row_across - row)
+
+
+@compiled
+def find_obstacles(
+    data: ProblemArrays, frame: RotatedFrame, step: float, shrink: float = 0.0
+) -> Records:  # pragma: no cover - compiled
+    """`OBSTACLE` records of the missiles for a grid with this step between stages; shrink: see `Grid`."""
+    growth = COARSE_GROWTH * step if step > COARSE else 0.0
+    if shrink > 0.0:
+        growth = -shrink * step
+    out = np.zeros(data.threats.shape[0], dtype=OBSTACLE)
+    count = 0
+    for k in range(data.threats.shape[0]):
+        threat = data.threats[k]
+        if threat.kill_radius <= 0.0:
+            continue
+        east, north = threat.east - frame.east, threat.north - frame.north
+        out[count].along = frame.cosine * east + frame.sine * north
+        out[count].across = frame.cosine * north - frame.sine * east
+        out[count].up = threat.up
+        out[count].radius = threat.kill_radius + (data.kill_margin + growth)
+        count += 1
+    return out[:count]
+
+
+@compiled
+def _add_danger(
+    obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats
+) -> None:  # pragma: no cover - compiled
+    """Add the cost per m inside kill spheres, growing inwards, to a stage's cells price (layers, across) low..high."""
+    across, layers = grid.across, grid.layers
+    pitch = across[1] - across[0] if across.size > 1 else 1.0
+    for k in range(obstacles.shape[0]):
+        obstacle = obstacles[k]
+        radius = obstacle.radius
+        ahead2 = (along - obstacle.along) ** 2
+        if ahead2 >= radius * radius:
+            continue
+        half = math.sqrt(radius * radius - ahead2)
+        first = max(low, math.ceil((obstacle.across - half - across[0]) / pitch))
+        last = min(high, math.floor((obstacle.across + half - across[0]) / pitch))
+        for z in range(layers.size):
+            flat2 = ahead2 + (layers[z] - obstacle.up) ** 2
+            if flat2 >= radius * radius:
+                continue
+            for y in range(first, last + 1):
+                d2 = flat2 + (across[y] - obstacle.across) ** 2
+                if d2 < radius * radius:
+                    price[z, y] += KILL_COST * (3.0 - 2.0 * math.sqrt(d2) / radius)
+
+
+@compiled
+def set_prices(
+    data: ProblemArrays,
+    required: RequiredClearance,
+    frame: RotatedFrame,
+    stage: int,
+    obstacles: Records,
+    grid: Grid,
+    extra: Floats,
+    low: int,
+    high: int,
+    price: Floats,
+) -> None:  # pragma: no cover - compiled
+    """Cost per m of a stage's cells price (layers, across) low..high; inf where the ground is too near."""
+    across, layers = grid.across, grid.layers
+    step = frame.length / grid.stages
+    steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
+    for y in range(low, high + 1):
+        # The destination is where it is, whatever its clearance.
+        if stage == grid.stages and across[y] == 0.0:
+            lowest = -math.inf
+        else:
+            lowest = _lowest_height(data, required, frame, stage * step, across[y], steps)
+        for z in range(layers.size):
+            price[z, y] = 1.0 + extra[stage, y] if layers[z] >= lowest else math.inf
+    _add_danger(obstacles, stage * step, grid, low, high, price)
+
+
+# ----------------------------------------------------------------------
+# Cheapest routes over grids in the rotated frame, stage by stage: the compiled part of `planner.seeding.grids`.
+#
+# A dynamic programme over forward steps.  It leaves out every cell through which no route is cheaper than a bound;
+# where
+# a route within the bound is found it is the cheapest of all.
+
+
+# Steps across a grid's cell that one stage forward may make.
+SIDEWAYS = 3
+# A cell of a route: its places among those across and among the layers.
+ROUTE_CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
+# Layers that one step may climb and sink.
+STEP_LAYERS = np.dtype([("climb", np.int64), ("sink", np.int64)], align=True)
+# First and last place across, of a layer, that has a cost; first > last for none.
+SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
+
+
+@compiled
+def layers_a_step(
+    data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
+) -> Records:  # pragma: no cover - compiled
+    """`STEP_LAYERS` records (sideways, layers) of one step on its course and at its height."""
+    pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
+    out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
+    a, b = np.zeros(3), np.zeros(3)
+    for side in range(-SIDEWAYS, SIDEWAYS + 1):
+        run = step * math.sqrt(1.0 + (side * ratio) ** 2)
+        b[0], b[1] = position_of(frame, step, side * ratio * step)
+        a[0], a[1] = frame.east, frame.north
+        for z in range(layers.size):
+            a[2] = layers[z]
+            b[2] = layers[z]
+            climb, dive = slope_limits(data, a, b)
+            out[side + SIDEWAYS, z].climb = max(0, math.floor(math.tan(climb) * run / pitch))
+            out[side + SIDEWAYS, z].sink = max(0, math.floor(math.tan(dive) * run / pitch))
+    return out
+
+
+@compiled
+def relax(
+    cost: Floats,
+    price: Floats,
+    after: Floats,
+    came: Codes,
+    start: int,
+    end: int,
+    priced: int,
+    count: int,
+    length: float,
+) -> None:  # pragma: no cover - compiled
+    """One move from `count` cells beside each other to as many, at the prices of cells from `priced`; all flat."""
+    for k in range(count):
+        # Unsigned, or numba would look whether each index counts from the end; and without a branch.  So this, the
+        # innermost loop, takes several cells at once.
+        i, j = np.uintp(start) + np.uintp(k), np.uintp(end) + np.uintp(k)
+        total = cost[i] + length * price[np.uintp(priced) + np.uintp(k)]
+        better = total < after[j]
+        after[j] = total if better else after[j]
+        came[j] = start + k if better else came[j]
+
+
+@compiled
+def step_on(
+    cost: Floats,
+    after: Floats,
+    came: Codes,
+    spans: Records,
+    step_layers: Records,
+    price: Floats,
+    step: float,
+    pitch: float,
+    ratio: float,
+) -> None:  # pragma: no cover - compiled
+    """Relax one stage: costs (layers, across) before and after, the cell each came from, and the cost per m of cells.
+
+    spans: `SPAN` records (layers,) of the cells with a cost before.  pitch: between layers, m.
+    """
+    high, wide = cost.shape
+    flat, flat_after, flat_came, flat_price = cost.ravel(), after.ravel(), came.ravel(), price.ravel()
+    for z in range(high):
+        first, last = spans[z].first, spans[z].last
+        if first > last:
+            continue
+        for side in range(-SIDEWAYS, SIDEWAYS + 1):
+            a, b = max(first, -side), min(last, wide - 1 - side) + 1
+            if a >= b:
+                continue
+            most = step_layers[side + SIDEWAYS, z]
+            bottom, top = max(0, z - most.sink), min(high - 1, z + most.climb)
+            for z2 in range(bottom, top + 1):
+                length = math.sqrt(step * step * (1.0 + (side * ratio) ** 2) + ((z2 - z) * pitch) ** 2)
+                here, there = z * wide + a, z2 * wide + a + side
+                relax(flat, flat_price, flat_after, flat_came, here, there, there, b - a, length)
+
+
+@compiled
+def way_ahead(
+    columns: int, home: int, left: int, step: float, ratio: float, out: Floats
+) -> None:  # pragma: no cover - compiled
+    """Length on the map of the shortest way from each place across to the destination, `left` stages away, m."""
+    for y in range(columns):
+        aside = abs(y - home)
+        if aside > SIDEWAYS * left:
+            out[y] = math.inf
+            continue
+        k = aside // left if left > 0 else 0
+        straight, more = (k + 1) * left - aside, aside - k * left
+        far, further = math.sqrt(1.0 + (k * ratio) ** 2), math.sqrt(1.0 + ((k + 1) * ratio) ** 2)
+        out[y] = step * (straight * far + more * further)
+
+
+@compiled
+def prune(
+    after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int
+) -> None:  # pragma: no cover - compiled
+    """Drop cells low..high from which no route ends within the bound; note which are left.
+
+    spans: `SPAN` records (layers,) to fill.  ahead: (across,) m on the map to the destination.  rises: (layers,) m of
+    height to it.
+    """
+    for z in range(after.shape[0]):
+        spans[z].first, spans[z].last = after.shape[1], -1
+        rise2 = rises[z] * rises[z]
+        for y in range(low, high + 1):
+            left = bound - after[z, y]
+            if left >= 0.0 and left * left >= ahead[y] * ahead[y] + rise2 and after[z, y] < math.inf:
+                spans[z].first = min(spans[z].first, y)
+                spans[z].last = y
+            else:
+                after[z, y] = math.inf
+
+
+@compiled
+def cheapest_route(
+    data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float
+) -> tuple[Records, float]:  # pragma: no cover - compiled
+    """`ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty where none is.
+
+    extra: (stages + 1, across) added to the cost per m.  bound: the most that it may cost; a route that costs more is
+    not looked for.
+    """
+    stages, wide, high = grid.stages, grid.across.size, grid.layers.size
+    step = frame.length / stages
+    pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
+    step_layers, required = layers_a_step(data, frame, step, grid.layers, grid.ratio), required_clearance(data)
+    obstacles = find_obstacles(data, frame, step, grid.shrink)
+    came = np.empty((stages + 1, high, wide), dtype=np.int32)
+    price, cost, after = np.full((high, wide), np.inf), np.full((high, wide), np.inf), np.full((high, wide), np.inf)
+    home, start = int(np.argmin(np.abs(grid.across))), int(np.argmin(np.abs(grid.layers - data.start[2])))
+    goal = int(np.argmin(np.abs(grid.layers - data.destination[2])))
+    rises, ahead = grid.layers - grid.layers[goal], np.empty(wide)
+    cost[start, home] = 0.0
+    spans = np.zeros(high, dtype=SPAN)
+    for z in range(high):
+        spans[z].first, spans[z].last = (home, home) if z == start else (wide, -1)
+    for stage in range(1, stages + 1):
+        low, last = wide, -1
+        for z in range(high):
+            low, last = min(low, spans[z].first), max(last, spans[z].last)
+        low, last = max(0, low - SIDEWAYS), min(wide - 1, last + SIDEWAYS)
+        if low > last:
+            break
+        set_prices(data, required, frame, stage, obstacles, grid, extra, low, last, price)
+        after[:, low : last + 1] = np.inf
+        step_on(cost, after, came[stage], spans, step_layers, price, step, pitch, grid.ratio)
+        way_ahead(wide, home, stages - stage, step, grid.ratio, ahead)
+        prune(after, spans, ahead, rises, bound, low, last)
+        cost, after = after, cost
+    if spans[goal].first > home or spans[goal].last < home or cost[goal, home] == np.inf:
+        return np.zeros(0, dtype=ROUTE_CELL), np.inf
+    return trace_back(came, goal, home), cost[goal, home]
+
+
+@compiled
+def trace_back(came: Codes, layer: int, across: int) -> Records:  # pragma: no cover - compiled
+    """`ROUTE_CELL` records from the start to this cell of the last stage; came: (stages + 1, layers, across)."""
+    wide = came.shape[2]
+    cells = np.zeros(came.shape[0], dtype=ROUTE_CELL)
+    for stage in range(came.shape[0] - 1, -1, -1):
+        cells[stage].across = across
+        cells[stage].layer = layer
+        if stage > 0:
+            parent = came[stage, layer, across]
+            layer, across = parent // wide, parent % wide
+    return cells
+
+
+# Pitch of the layers, as a share of the pitch along: what the gentler slope limit climbs or sinks in a step, over this,
+# and between these.
+LAYERS_A_STEP = 2.5
+LOW_LAYER, HIGH_LAYER = 0.05, 0.12
+# Cells of one grid, at most: stages x across x layers.
+MOST_CELLS = 1_200_000
+# What the first route is expected to cost, over the straight line; grids know eight courses and are too long by that.
+EXPECTED = 1.12
+# Routes beside one another: within this of an earlier one (m, or steps if that is more) a route costs up to twice.
+APART, APART_STEPS = 800.0, 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class GridRoute:
+    """A way over a grid: points (stages + 1, 3) along, across, up, and its cost in m of path."""
+
+    points: Floats
+    cost: float
+
+
+def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
+    """A grid of this many stages, square in the plane, its layers passing through the start's height.
+
+    span: lowest and highest place across, m.  The pitch grows where the grid would get too large.
+    """
+    low, high = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
+    level = np.array([*data.destination[:2], data.start[2]])
+    share = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
+    share = min(HIGH_LAYER, max(LOW_LAYER, share / LAYERS_A_STEP))
+    while True:
+        step = frame.length / stages
+        layer = share * step
+        below, above = math.floor(-span[0] / step), math.floor(span[1] / step)
+        across = np.arange(-below, above + 1) * step
+        up = np.arange(math.ceil((low - data.start[2]) / layer), math.floor((high - data.start[2]) / layer) + 1)
+        if stages <= 4 or (stages + 1) * across.size * max(1, up.size) <= MOST_CELLS:
+            return Grid(stages, np.asarray(across, np.float64), np.asarray(data.start[2] + up * layer, np.float64))
+        stages = max(4, int(stages / 1.2))
+
+
+def grid_route(
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    grid: Grid,
+    used: tuple[GridRoute, ...] = (),
+    expected: float = math.inf,
+) -> GridRoute | None:
+    """Cheapest way over a grid; None where terrain and ceiling close it.
+
+    used: earlier routes; keeping near them costs extra, so that the next one takes another side.  expected: a cost
+    that is probably enough, as that on a coarser grid: it is found faster, and without it all is looked at.
+    """
+    if grid.layers.size == 0:
+        return None
+    along = np.linspace(0.0, frame.length, grid.stages + 1)
+    extra = beside_used(along, grid.across, used)
+    for bound in (expected, math.inf):
+        cells, cost = cheapest_route(data, frame, grid, extra, bound)
+        if cells.size:
+            points = np.column_stack([along, grid.across[cells["across"]], grid.layers[cells["layer"]]])
+            return GridRoute(points, float(cost))
+        if bound == math.inf:
+            break
+    return None
+
+
+def beside_used(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
+    """What keeping near routes costs more, per m, at places along (s,) and across (y,), m: (s, y)."""
+    extra = np.zeros((along.size, across.size))
+    width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
+    for route in used:
+        stage_across = np.interp(along, route.points[:, 0], route.points[:, 1])
+        extra += np.maximum(0.0, 1.0 - np.abs(across[None, :] - stage_across[:, None]) / width)
+    return extra
+
+
+def grid_routes(
+    data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
+) -> Iterator[GridRoute]:
+    """Routes as found: of each grid's number of stages, up to so many different ones."""
+    expected = EXPECTED * math.dist(data.start, data.destination)
+    for stages, each in grids:
+        grid = make_grid(data, frame, span, stages)
+        used: tuple[GridRoute, ...] = ()
+        for _ in range(each):
+            # A second route costs more than the first.
+            route = grid_route(data, frame, grid, used, math.inf if used else expected)
+            if route is None:
+                break
+            if not used:
+                expected = route.cost
+            used = (*used, route)
+            yield route

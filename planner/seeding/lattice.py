@@ -1,0 +1,365 @@
+"""Routes that may turn back and go round to climb: over a lattice of places, heights and courses, pulled taut."""
+
+import heapq
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from planner.evaluation.certify_kernels import turn_and_roll_lengths
+from planner.evaluation.corners import settling_length
+from planner.evaluation.encoding import RotatedFrame
+from planner.evaluation.leg_constraints import PrecomputedLimits, precompute_limits, slope_limits
+from planner.evaluation.problem import ProblemArrays
+from planner.seeding.grids import position_of
+from planner.seeding.waypoint_fitting import leg_cost
+from world.kernels import Records, compiled
+
+Floats = NDArray[np.float64]
+Codes = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+Bytes = NDArray[np.int8]
+
+
+# ----------------------------------------------------------------------
+# Cheapest routes over a lattice of places, heights and courses: the compiled part of `planner.seeding.lattice`.
+#
+# A search after Hart, Nilsson and Raphael (A*, 1968) over states of a place, a layer and one of eight courses.  A step
+# goes to a place beside the last, turns by no more than a right angle, and climbs and sinks no more than the limits
+# allow; so a route that needs more way to climb than there is goes round in the lattice.
+
+
+# Steps to the eight places beside a place, along and across, in the order of their courses.
+_STEPS = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]])
+# What each eighth of a circle of a turn costs, as a share of a step: of ways of one length, that with the fewest turns.
+TURN_COST = 0.1
+# A step whose cost is more than this many times its length is closed.
+CLOSED = 1.05
+# What is known of a step.
+_UNKNOWN, _FREE, _SHUT = range(3)
+# A state of a route: places along and across from the start's, and its layer.
+LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np.int64)], align=True)
+
+
+class Lattice(NamedTuple):
+    """Places in the rotated frame and layers of height.
+
+    step: between places, m.  behind, right: places before the start's and to its right; along, across: places in all.
+    goal: place of the destination along.  low: height of the first layer, m.  pitch: between layers, m.
+    layers: in all.
+    start_layer, goal_layer: those of the ends.
+    """
+
+    step: float
+    behind: int
+    right: int
+    along: int
+    across: int
+    goal: int
+    low: float
+    pitch: float
+    layers: int
+    start_layer: int
+    goal_layer: int
+
+
+@compiled
+def _place(
+    frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats
+) -> None:  # pragma: no cover - compiled
+    """World position of a place and layer, (3,)."""
+    out[0], out[1] = position_of(
+        frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
+    )
+    out[2] = lattice.low + layer * lattice.pitch
+
+
+@compiled
+def _rises(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
+    """Layers (8, 2) that a step on each course may climb and sink."""
+    out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
+    _place(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
+    for course in range(8):
+        aside, ahead = _STEPS[course, 1], _STEPS[course, 0]
+        _place(frame, lattice, lattice.behind + ahead, lattice.right + aside, lattice.start_layer, b)
+        run = math.hypot(b[0] - a[0], b[1] - a[1])
+        climb, dive = slope_limits(data, a, b)
+        out[course, 0] = max(0, math.floor(math.tan(climb) * run / lattice.pitch))
+        out[course, 1] = max(0, math.floor(math.tan(dive) * run / lattice.pitch))
+    return out
+
+
+class _Reached(NamedTuple):
+    """What a search knows of its states: cost (m), the state before, whether it is finished; and of steps from cells.
+
+    rises: layers (8, 2) that a step on each course may climb and sink.  steps: by cell, course and rise.
+    """
+
+    cost: Floats
+    came: Codes
+    done: Flags
+    rises: Codes
+    steps: Bytes
+
+
+@compiled
+def _take_steps(
+    data: ProblemArrays,
+    limits: PrecomputedLimits,
+    frame: RotatedFrame,
+    lattice: Lattice,
+    reached: _Reached,
+    state: int,
+    courses: int,
+    open_states: list[tuple[float, int]],
+) -> None:  # pragma: no cover - compiled
+    """Reach the states a step from one, which become open with their cost and the straight way that is left."""
+    rises, course, cell = reached.rises, state % 8, state // 8
+    layer, place = cell % lattice.layers, cell // lattice.layers
+    along, across = place // lattice.across, place % lattice.across
+    sinks = np.max(rises[:, 1])
+    width = np.max(rises[:, 0]) + sinks + 1
+    a, b, goal = np.empty(3), np.empty(3), np.empty(3)
+    _place(frame, lattice, along, across, layer, a)
+    _place(frame, lattice, lattice.goal, lattice.right, lattice.goal_layer, goal)
+    for turn in range(-courses, courses + 1):
+        to = (course + turn) % 8
+        next_along, next_across = along + _STEPS[to, 0], across + _STEPS[to, 1]
+        if not (0 <= next_along < lattice.along and 0 <= next_across < lattice.across):
+            continue
+        lowest, highest = max(0, layer - rises[to, 1]), min(lattice.layers - 1, layer + rises[to, 0])
+        for next_layer in range(lowest, highest + 1):
+            code = ((next_along * lattice.across + next_across) * lattice.layers + next_layer) * 8 + to
+            _place(frame, lattice, next_along, next_across, next_layer, b)
+            length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+            total = reached.cost[state] + length + TURN_COST * lattice.step * abs(turn)
+            if reached.done[code] or total >= reached.cost[code]:
+                continue
+            # A step is the same whatever the course before it.
+            number = (cell * 8 + to) * width + next_layer - layer + sinks
+            if reached.steps[number] == _UNKNOWN:
+                free = _inside(data, b) and leg_cost(data, limits, a, b) <= CLOSED * length
+                reached.steps[number] = _FREE if free else _SHUT
+            if reached.steps[number] == _FREE:
+                reached.cost[code], reached.came[code] = total, state
+                away = math.sqrt((b[0] - goal[0]) ** 2 + (b[1] - goal[1]) ** 2 + (b[2] - goal[2]) ** 2)
+                heapq.heappush(open_states, (total + away, code))
+
+
+class LatticeSearch(NamedTuple):
+    """A search under way: what it knows of states, and those that are open, in the order of a heap.
+
+    costs, states: (k,) of the open states.  seen: states that were looked at.  found: the state at the destination, or
+    -1.
+    """
+
+    reached: _Reached
+    costs: Floats
+    states: Codes
+    seen: int
+    found: int
+
+
+@compiled
+def begin_lattice_search(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice
+) -> LatticeSearch:  # pragma: no cover - compiled
+    """The search for a route from start to destination before its first step."""
+    rises = _rises(data, frame, lattice)
+    size = lattice.along * lattice.across * lattice.layers * 8
+    width = np.max(rises[:, 0]) + np.max(rises[:, 1]) + 1
+    reached = _Reached(
+        np.full(size, math.inf),
+        np.full(size, -1, dtype=np.int64),
+        np.zeros(size, dtype=np.bool_),
+        rises,
+        np.zeros(size * width, dtype=np.int8),
+    )
+    first = ((lattice.behind * lattice.across + lattice.right) * lattice.layers + lattice.start_layer) * 8
+    asked = _asked_course(frame, data.start_course)
+    states = np.arange(first, first + 8) if asked < 0 else np.array([first + asked])
+    for state in states:
+        reached.cost[state] = 0.0
+    return LatticeSearch(reached, np.zeros(states.size), states, 0, -1)
+
+
+@compiled
+def search_lattice_on(
+    data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, most: int
+) -> LatticeSearch:  # pragma: no cover - compiled
+    """The search after a look at up to so many more states; where none is open any more it is over.
+
+    courses: by which one step may differ from the last, in eighths of a circle.
+    """
+    limits, reached, seen = precompute_limits(data), search.reached, search.seen
+    last = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
+    wanted = _asked_course(frame, data.destination_course)
+    # A heap's own order stays one, so that what is handed on needs no sorting.
+    open_states = [(search.costs[k], search.states[k]) for k in range(search.states.size)]
+    found = -1
+    while len(open_states) > 0 and seen < search.seen + most:
+        _, state = heapq.heappop(open_states)
+        if reached.done[state]:
+            continue
+        reached.done[state] = True
+        seen += 1
+        if state // 8 == last and (wanted < 0 or abs((state % 8 - wanted + 4) % 8 - 4) <= courses):
+            found = state
+            break
+        _take_steps(data, limits, frame, lattice, reached, state, courses, open_states)
+    costs, states = np.empty(len(open_states)), np.empty(len(open_states), dtype=np.int64)
+    for k in range(len(open_states)):
+        costs[k], states[k] = open_states[k]
+    return LatticeSearch(reached, costs, states, seen, found)
+
+
+@compiled
+def _asked_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
+    """The course of a step that is nearest to one (rad, clockwise from north); -1 for NaN."""
+    if math.isnan(course):
+        return -1
+    angle = 0.5 * math.pi - course - math.atan2(frame.sine, frame.cosine)
+    nearest: int = round(angle / (0.25 * math.pi)) % 8
+    return nearest
+
+
+@compiled
+def _inside(data: ProblemArrays, point: Floats) -> bool:  # pragma: no cover - compiled
+    """Whether a point (3,) is on the map and between floor and ceiling."""
+    inside: bool = data.west <= point[0] <= data.east and data.south <= point[1] <= data.north
+    return inside and data.floor <= point[2] <= data.ceiling
+
+
+@compiled
+def traced(came: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no cover - compiled
+    """`LATTICE_CELL` records from the start to a state."""
+    count, state = 0, found
+    while state >= 0:
+        count, state = count + 1, came[state]
+    cells = np.zeros(count, dtype=LATTICE_CELL)
+    state = found
+    for k in range(count - 1, -1, -1):
+        cell = state // 8
+        place = cell // lattice.layers
+        cells[k].layer = cell % lattice.layers
+        cells[k].along = place // lattice.across - lattice.behind
+        cells[k].across = place % lattice.across - lattice.right
+        state = came[state]
+    return cells
+
+
+@compiled
+def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
+    """Points (j, 3) of a route (k, 3) that are left when legs that violate nothing take the place of its steps.
+
+    From each point kept the leg to the furthest point that is free.
+    """
+    limits = precompute_limits(data)
+    out = np.empty(points.shape)
+    out[0] = points[0]
+    count, here, last = 1, 0, points.shape[0] - 1
+    while here < last:
+        to = here + 1
+        for k in range(last, here + 1, -1):
+            a, b = points[here], points[k]
+            length = math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
+            if leg_cost(data, limits, a, b) <= CLOSED * length:
+                to = k
+                break
+        here = to
+        out[count] = points[here]
+        count += 1
+    return out[:count]
+
+
+# Shortest step, m, and the longest that a step has to be for two right angles in it, whatever the aircraft, m.
+LEAST_STEP, LONGEST_STEP = 100.0, 2000.0
+# Layers that the gentler slope limit climbs or sinks in a step along.
+LAYERS_A_STEP = 2
+# States of a lattice, and how many of them are looked at, at most.
+MOST_LATTICE, MOST_STATES = 4_000_000, 600_000
+# States that are looked at before the caller may end the work: some 10 ms.
+STATES_AT_ONCE = 2000
+
+
+def turning_step(data: ProblemArrays) -> float:
+    """Length of a leg between two right angles of one side, m: what they take of it, and settling between them."""
+    if not data.legs_hold_turns:
+        return LEAST_STEP
+    long = LONGEST_STEP
+    square = np.array([[0.0, 0.0], [long, 0.0], [long, long], [0.0, long]]) + data.start[:2]
+    path = np.column_stack([square, np.full(4, data.start[2])])
+    turns, rolls = turn_and_roll_lengths(data, path)
+    need = float(turns[1] + rolls[1])
+    return min(LONGEST_STEP, max(LEAST_STEP, need + settling_length(need, 1.1 * need)))
+
+
+def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
+    """A lattice over the whole map whose steps are at most so long, one of them on each end; longer if it must be.
+
+    step: m.  A lattice of more than `MOST_LATTICE` states has longer steps.
+    """
+    corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
+    low, high = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
+    level = np.array([*data.destination[:2], data.start[2]])
+    gentlest = math.tan(max(0.01, min(slope_limits(data, np.array(data.start), level))))
+    bottom = max(data.floor, float(np.nanmin(data.heights)) + data.clearance)
+    stages = max(1, math.ceil(frame.length / step))
+    while True:
+        step = frame.length / stages
+        pitch = gentlest * step / LAYERS_A_STEP
+        behind, right = math.floor(-low[0] / step), math.floor(-low[1] / step)
+        along, across = behind + math.floor(high[0] / step) + 1, right + math.floor(high[1] / step) + 1
+        below = max(0, math.floor((data.start[2] - bottom) / pitch))
+        layers = below + max(0, math.floor((data.ceiling - data.start[2]) / pitch)) + 1
+        if stages == 1 or along * across * layers * 8 <= MOST_LATTICE:
+            break
+        stages -= 1
+    goal_layer = min(layers - 1, max(0, round((data.destination[2] - data.start[2]) / pitch) + below))
+    start = data.start[2] - below * pitch
+    return Lattice(step, behind, right, along, across, behind + stages, start, pitch, layers, below, goal_layer)
+
+
+def cheapest_lattice_route(
+    data: ProblemArrays,
+    frame: RotatedFrame,
+    lattice: Lattice,
+    courses: int,
+    most_states: int,
+    pause: Callable[[], None] = lambda: None,
+) -> Records:
+    """`LATTICE_CELL` records of the cheapest route from start to destination; none where there is none.
+
+    courses: by which one step may differ from the last, in eighths of a circle.  most_states: that are looked at.
+    """
+    search = begin_lattice_search(data, frame, lattice)
+    while search.found < 0 and len(search.states) and search.seen < most_states:
+        search = search_lattice_on(
+            data, frame, lattice, courses, search, min(STATES_AT_ONCE, most_states - search.seen)
+        )
+        pause()
+    if search.found < 0:
+        return np.zeros(0, dtype=LATTICE_CELL)
+    return traced(search.reached.came, search.found, lattice)
+
+
+def lattice_route(
+    data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None] = lambda: None
+) -> Floats:
+    """World points (k, 3) of a route from start to destination over a lattice of this step (m); (0, 3) for none.
+
+    pause: called after every `STATES_AT_ONCE` states; what it raises ends the work.
+    """
+    lattice = make_lattice(data, frame, step)
+    # Right angles at most, where the limits allow them; a way of eight courses has eighths of a circle at least.
+    courses = 2 if data.max_turn >= math.radians(90.0) else 1
+    cells = cheapest_lattice_route(data, frame, lattice, courses, MOST_STATES, pause)
+    if not len(cells):
+        return np.empty((0, 3))
+    places = np.column_stack([cells["along"], cells["across"]]) * lattice.step
+    up = lattice.low + cells["layer"] * lattice.pitch
+    points = frame.restore(np.column_stack([places, up]))
+    points[0], points[-1] = data.start, data.destination
+    return np.asarray(pulled_taut(data, np.ascontiguousarray(points)))

@@ -1,0 +1,481 @@
+"""The law's memory begins as nothing flown."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft
+from aircraft.envelope import GRAVITY
+from benchmarks.against_arduplane import BINARY, compare, flown_figures
+from flight.autopilots.arduplane.law import (
+    AIRSPEED_READING,
+    ARDUPILOT_MEMORY,
+    ROLL_LAG,
+    demand_height,
+    navigate_legs,
+    past_line,
+    roll_demand,
+    true_by_equivalent,
+    turn_distance,
+    weigh_energies,
+)
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, load_parameters
+from flight.mission_files.formats import parse_mission
+from flight.simulation.simulate import Flight, simulate
+from planfly.airframe import load_airframe
+from planfly.pipeline import make_setup as setup_of
+from tests.flight.autopilots.arduplane.laws import flying, memory, parameters, state, waypoints
+from tests.setups import MakeSetup
+from tests.soak import SOAK
+from world.kernels import Record, field_names
+from world.scenario import from_spec
+
+
+def test_a_fresh_memory_is_on_the_first_leg_and_has_flown_nothing() -> None:
+    fresh: Record = np.zeros(1, ARDUPILOT_MEMORY)[0]
+    assert (fresh.leg, bool(fresh.begun), bool(fresh.flown), bool(fresh.on_circle)) == (0, False, False, False)
+
+
+def test_counts_are_whole_and_all_else_are_numbers() -> None:
+    kinds = {name: ARDUPILOT_MEMORY[name] for name in field_names(ARDUPILOT_MEMORY)}
+    assert {name for name, kind in kinds.items() if kind == np.int64} == {"leg", "held"}
+    assert {name for name, kind in kinds.items() if kind == np.bool_} == {"begun", "flown", "on_circle"}
+    assert all(kind == np.float64 for kind in kinds.values() if kind not in (np.int64, np.bool_))
+
+
+# ----------------------------------------------------------------------
+# ArduPlane's height demand and TECS by plain sums: steps and slopes, lag and rate limits, throttle and pitch.
+
+DT = 0.1
+
+
+def demanded(own: Record, north: float, end: float, up: float = 500.0, **values: float) -> float:
+    """Height that a leg of 1,000 m from 500 m asks for."""
+    (b,) = waypoints((0, 1000, end))
+    demand_height(flying(0.0, north, up), b, parameters(**values), own, DT)
+    return float(own.height_asked)
+
+
+@pytest.mark.parametrize(
+    ("rise", "expected"), [(14.9, 514.9), (15.0, 507.5), (-14.9, 485.1), (-15.0, 492.5), (100.0, 550.0)]
+)
+def test_small_changes_of_height_are_steps_and_others_slopes(rise: float, expected: float) -> None:
+    assert demanded(memory(), 500.0, 500.0 + rise, up=expected) == pytest.approx(expected)
+
+
+def test_the_least_slope_is_glide_slope_min() -> None:
+    assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=21.0) == 520.0
+    assert demanded(memory(), 500.0, 520.0, GLIDE_SLOPE_MIN=19.0) == pytest.approx(510.0)
+    assert demanded(memory(), 500.0, 504.0, GLIDE_SLOPE_MIN=0.0) == pytest.approx(502.0)
+
+
+def test_before_and_past_a_leg_its_ends_heights_hold() -> None:
+    assert demanded(memory(), -100.0, 600.0) == 500.0
+    assert demanded(memory(), 1001.0, 600.0) == 600.0
+
+
+@pytest.mark.parametrize(("above", "again"), [(4.9, False), (5.1, True)])
+def test_high_above_a_climbing_slope_it_is_drawn_anew(above: float, again: bool) -> None:
+    own = memory()
+    asked = demanded(own, 500.0, 600.0, up=550.0 + above)
+    assert asked == pytest.approx(550.0 + (above if again else 0.0))
+    # The new slope goes from here to the end: a quarter of the way on it is half way up what is left.
+    later = demanded(own, 750.0, 600.0, up=560.0)
+    assert later == pytest.approx(600.0 - 0.5 * (50.0 - above) if again else 575.0)
+
+
+@pytest.mark.parametrize("time", [1.0, 3.0])
+def test_a_slope_is_followed_one_time_constant_late(time: float) -> None:
+    own, (b,) = memory(), waypoints((0, 1000, 600))
+    for k in range(600):
+        north = 25.0 * DT * k
+        demand_height(flying(0.0, north, own.height_demand), b, parameters(TECS_HDEM_TCONST=time), own, DT)
+        if north > 900.0:
+            break
+    climb = 2.5
+    # The sampled lag is behind by its time constant x the rate, and up to a sample.
+    assert own.height_asked - own.height_demand == pytest.approx(time * climb, abs=climb * DT)
+    assert own.height_rate == pytest.approx(climb, rel=DT / time + 1e-6)
+
+
+@pytest.mark.parametrize(("end", "rate"), [(900.0, 5.0), (100.0, -4.0)])
+def test_no_more_is_asked_than_the_climb_and_sink_rates(end: float, rate: float) -> None:
+    own, (b,) = memory(), waypoints((0, 1000, end))
+    for _ in range(300):
+        demand_height(flying(0.0, 1001.0), b, parameters(TECS_SINK_MAX=4.0), own, DT)
+    assert own.height_limited == pytest.approx(500.0 + 30.0 * rate)
+    assert own.height_rate == pytest.approx(rate, rel=0.04)
+
+
+@pytest.mark.parametrize("held", [1, -1])
+def test_what_cannot_be_followed_waits(held: int) -> None:
+    end = 500.0 + held * 100.0
+    own, (b,) = memory(), waypoints((0, 1000, end))
+    for k in range(100):
+        demand_height(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
+    asked, share = own.height_asked, own.climb_share if held > 0 else own.sink_share
+    assert share == pytest.approx(1.0)
+    own.held = held
+    for k in range(100, 130):
+        demand_height(flying(0.0, 25.0 * DT * k), b, parameters(), own, DT)
+    assert own.height_asked == asked
+    # After three seconds of a lag of three, 1 / e of the rate is left.
+    assert (own.climb_share if held > 0 else own.sink_share) == pytest.approx((3.0 / 3.1) ** 30)
+    own.held = -held
+    demand_height(flying(0.0, 25.0 * 13.0), b, parameters(), own, DT)
+    assert abs(own.height_asked - 500.0) == pytest.approx(2.5 * 13.0)
+
+
+def weighed(own: Record, seen: Record, at: Record, **values: float) -> None:
+    weigh_energies(seen, at, parameters(**values), own, 25.0, 1.0, DT)
+
+
+def steady(**values: Any) -> Record:
+    """Memory of steady flight: what the sensor reads is what is demanded."""
+    return memory(**({"airspeed": 25.0, "airspeed_read": 25.0, "flown": True, "last_velocity_north": 25.0} | values))
+
+
+def reading(**values: Any) -> Record:
+    return state(**({"airspeed": 25.0 / AIRSPEED_READING} | values))
+
+
+def test_in_steady_flight_nothing_changes() -> None:
+    own = steady()
+    weighed(own, reading(), flying())
+    assert own.throttle_demand == pytest.approx(0.45)
+    assert own.pitch_demand == pytest.approx(0.0)
+    assert own.held == 0
+
+
+def test_throttle_for_missing_height() -> None:
+    # 2 m low: feed-forward, error and damping, divided by the energy rate that all of the throttle gives.
+    own = steady(height_demand=502.0)
+    weighed(own, reading(), flying())
+    missing, per_throttle = 2.0 * GRAVITY, (5.0 + 2.0) * GRAVITY / 1.0
+    damped = 0.5 * (missing / 5.0) * DT / (DT + 0.5)
+    expected = 0.45 + (missing / 5.0 + (missing + damped) / 5.0) / per_throttle
+    assert own.throttle_before == pytest.approx(min(expected, 0.45 + 1.0 * DT))
+    assert own.throttle_sum == pytest.approx(0.3 * missing * DT / (5.0 * per_throttle))
+
+
+def test_a_bank_takes_throttle() -> None:
+    own = steady()
+    weighed(own, reading(roll=math.radians(30.0)), flying())
+    # TECS_RLL2THR x (1 / cos^2 - 1): a third of it at 30 degrees.
+    assert own.throttle_demand == pytest.approx(0.45 + 10.0 / 3.0 / ((5.0 + 2.0) * GRAVITY))
+
+
+def test_pitch_for_missing_height() -> None:
+    own = steady(height_demand=501.0)
+    weighed(own, reading(), flying())
+    wanted = GRAVITY / 5.0
+    total = wanted + 0.3 * wanted + 0.3 * wanted * DT
+    expected = total / (25.0 * GRAVITY)
+    assert own.pitch_demand == pytest.approx(min(expected, 7.0 / 25.0 * DT))
+
+
+def test_pitch_moves_no_faster_than_the_vertical_acceleration_allows() -> None:
+    own = steady(height_demand=520.0)
+    weighed(own, reading(), flying(), TECS_VERT_ACC=4.0)
+    assert own.pitch_demand == pytest.approx(4.0 / 25.0 * DT)
+
+
+@pytest.mark.parametrize(("high", "degrees", "throttle"), [(50.0, 15.0, 1.0), (-50.0, -25.0, 0.1)])
+def test_pitch_and_throttle_keep_their_limits(high: float, degrees: float, throttle: float) -> None:
+    own = steady()
+    for _ in range(200):
+        own.height_demand = 500.0 + high
+        weighed(own, reading(), flying(), THR_MIN=10.0, AIRSPEED_MAX=35.0)
+    assert math.degrees(own.pitch_demand) == pytest.approx(degrees)
+    assert own.throttle_demand == throttle
+    assert own.held == (1 if high > 0.0 else -1)
+
+
+def test_too_fast_it_pitches_up_and_throttles_back() -> None:
+    own = steady(airspeed=26.0)
+    weighed(own, reading(airspeed=26.0 / AIRSPEED_READING), flying())
+    assert own.pitch_demand > 0.0
+    assert own.throttle_demand < 0.45
+
+
+def test_the_airspeed_demand_changes_within_what_the_energy_allows() -> None:
+    own = steady()
+    weigh_energies(reading(), flying(), parameters(AIRSPEED_MAX=40.0), own, 30.0, 1.0, DT)
+    assert own.airspeed_demand == pytest.approx(25.0 + 0.5 * 5.0 * GRAVITY / 25.0 * DT)
+
+
+def test_what_a_pull_up_turns_the_velocity_by_counts_as_acceleration_along_the_nose() -> None:
+    """A nose 10 degrees up, and a climb that begins with 2 m/s^2: sin 10 of that is felt along the nose."""
+    own = steady()
+    weighed(own, reading(pitch=math.radians(10.0)), flying(climb=0.2))
+    lost = 1.0 - DT / (DT + 5.0)
+    assert own.acceleration == pytest.approx(2.0 * math.sin(math.radians(10.0)) * lost)
+    # On the level it is not.
+    own = steady()
+    weighed(own, reading(), flying(climb=0.2))
+    assert own.acceleration == pytest.approx(0.0)
+
+
+def test_the_airspeed_is_a_smoothed_reading_of_before() -> None:
+    """The sensor reads 1 m/s more from now on: 0.3 of what is missing at each turn, and none of it at the first."""
+    own = steady()
+    for k in range(1, 4):
+        held = own.airspeed
+        weighed(own, reading(airspeed=26.0 / AIRSPEED_READING), flying())
+        assert own.airspeed_read == pytest.approx(26.0 - 0.7**k)
+        if k == 1:
+            assert own.airspeed == held
+
+
+@pytest.mark.parametrize(("bank_deg", "prevents", "least"), [(30.0, 1.0, 19.34), (30.0, 0.0, 18.0), (0.0, 1.0, 18.0)])
+def test_the_least_airspeed_grows_with_the_load_in_a_bank(bank_deg: float, prevents: float, least: float) -> None:
+    """18 m/s over the root of cos 30: as ArduPlane's log of a turn shows it, at once (19.32 m/s; TECS.spdem)."""
+    own = steady(airspeed_demand=18.0, side_acceleration=GRAVITY * math.tan(math.radians(bank_deg)))
+    values = parameters(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0, STALL_PREVENTION=prevents)
+    weigh_energies(reading(), flying(), values, own, 18.0, 1.0, DT)
+    assert own.airspeed_demand == pytest.approx(least, abs=0.005)
+
+
+# ----------------------------------------------------------------------
+# ArduPlane's legs: when it turns to the next, how it closes in on them, its loiters and its bank, by plain sums.
+
+RIGHT_ANGLE = math.pi / 2
+# L1's length at 25 m/s with its defaults: period x damping x speed / pi.
+LENGTH = 17.0 * 0.75 * 25.0 / math.pi
+
+
+@pytest.mark.parametrize(
+    ("acceptance", "turn", "factor", "expected"),
+    [
+        (0.0, RIGHT_ANGLE, 1.0, 90.0),  # WP_RADIUS at a right angle, and beyond
+        (0.0, math.radians(120.0), 1.0, 90.0),
+        (0.0, math.radians(30.0), 1.0, 30.0),  # a third of it at a third of a right angle
+        (0.0, math.radians(30.0), 1.05, 30.0 * 1.05**2),  # with height, by true over equivalent airspeed squared
+        (0.0, RIGHT_ANGLE, 1.2, LENGTH),  # 129.6 m: but no further than L1 looks
+        (25.0, math.radians(30.0), 1.05, 25.0),  # a stated acceptance is taken as it is
+        (25.9, math.radians(30.0), 1.0, 25.0),  # in whole metres
+        (0.9, math.radians(30.0), 1.0, 30.0),  # which leaves nothing of less than one
+        (300.0, math.radians(30.0), 1.0, 255.0),  # and no more than a byte
+    ],
+)
+def test_turn_distance(acceptance: float, turn: float, factor: float, expected: float) -> None:
+    assert turn_distance(acceptance, turn, 90.0, LENGTH, factor) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("north", "leg"), [(969.0, 0), (971.0, 1)])
+def test_it_turns_within_its_distance_of_a_waypoint(north: float, leg: int) -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (500, 1866, 500), turn=math.radians(30.0))
+    own = memory()
+    navigate_legs(flying(0.0, north), way, parameters(), own, 1.0, 0.1)
+    assert own.leg == leg
+    assert (own.from_north, own.from_up) == (1000.0 * leg, 500.0)
+
+
+@pytest.mark.parametrize(("north", "leg"), [(989.0, 0), (991.0, 1)])
+def test_it_turns_within_a_stated_acceptance(north: float, leg: int) -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE, acceptance=10.0)
+    own = memory()
+    navigate_legs(flying(0.0, north), way, parameters(), own, 1.1, 0.1)
+    assert own.leg == leg
+
+
+def test_past_the_line_across_a_waypoint_the_leg_is_over() -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
+    assert past_line(flying(300.0, 1000.1), 0.0, 0.0, way[1])
+    assert not past_line(flying(300.0, 999.9), 0.0, 0.0, way[1])
+    for north, leg in ((999.9, 0), (1000.1, 1)):
+        own = memory()
+        navigate_legs(flying(300.0, north), way, parameters(), own, 1.0, 0.1)
+        assert own.leg == leg
+
+
+def test_beyond_a_greatest_radius_it_turns_back() -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (1000, 1000, 500), turn=RIGHT_ANGLE)
+    for radius, leg in ((301.0, 1), (299.0, 0)):
+        own = memory()
+        navigate_legs(flying(300.0, 1000.1), way, parameters(WP_MAX_RADIUS=radius), own, 1.0, 0.1)
+        assert own.leg == leg
+
+
+def test_a_leg_that_is_passed_when_it_begins_is_drawn_from_where_it_is() -> None:
+    # The next leg goes back: from 50 m short of the corner its end is passed already.
+    way = waypoints((0, 0, 500), (0, 1000, 500), (0, 980, 500), turn=math.pi)
+    own = memory()
+    navigate_legs(flying(0.0, 950.0, 498.0), way, parameters(), own, 1.0, 0.1)
+    assert own.leg == 1
+    assert (own.from_north, own.from_up) == (950.0, 498.0)
+
+
+def test_its_side_acceleration_is_l1s() -> None:
+    # 10 m right of its line: 4 damping^2 V^2 / L sin(asin(10 / L)) to the left.
+    way = waypoints((0, 0, 500), (0, 5000, 500), (1000, 5000, 500))
+    own = memory()
+    navigate_legs(flying(10.0, 500.0), way, parameters(NAVL1_XTRACK_I=0.0), own, 1.0, 0.1)
+    assert own.side_acceleration == pytest.approx(-4.0 * 0.75**2 * 25.0**2 / LENGTH * 10.0 / LENGTH)
+    assert own.cross_track_sum == 0.0
+    # Within five degrees its integral grows by gain x angle x time, and not beyond.
+    for right, grows in ((8.0, True), (9.0, False)):
+        own = memory()
+        navigate_legs(flying(right, 500.0), way, parameters(), own, 1.0, 0.1)
+        expected = 0.02 * math.asin(right / LENGTH) * 0.1
+        assert own.cross_track_sum == pytest.approx(expected if grows else 0.0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_around_a_loiter_it_turns_with_its_radius(side: float) -> None:
+    # On the circle, in its direction: V^2 / R towards the centre.
+    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=side * 120.0, centre_east=side * 120.0)
+    way["centre_north"] = 900.0
+    own = memory()
+    navigate_legs(flying(0.0, 900.0), way, parameters(), own, 1.0, 0.1)
+    assert own.on_circle
+    assert own.side_acceleration == pytest.approx(side * 25.0**2 / 120.0)
+
+
+def test_far_from_a_loiter_it_flies_to_its_centre() -> None:
+    way = waypoints((0, 0, 500), (0, 1000, 500), (100, 1100, 500), circle=120.0, centre_east=0.0, centre_north=1000.0)
+    own = memory()
+    navigate_legs(flying(0.0, 0.0), way, parameters(), own, 1.0, 0.1)
+    assert not own.on_circle
+    assert own.side_acceleration == pytest.approx(0.0)
+    assert own.leg == 0
+
+
+def test_bank_is_that_of_the_acceleration_within_the_limit() -> None:
+    wide = parameters(ROLL_LIMIT_DEG=60.0, AIRSPEED_MIN=9.0)
+    assert roll_demand(5.0, 0.0, 25.0, wide) == pytest.approx(math.atan(5.0 / GRAVITY))
+    # Pitched up, the lift's share across is less.
+    assert roll_demand(5.0, 0.3, 25.0, wide) == pytest.approx(math.atan(5.0 / (GRAVITY * math.cos(0.3))))
+    limited = parameters(ROLL_LIMIT_DEG=30.0)
+    for wanted, degrees in ((100.0, 30.0), (-100.0, -30.0)):
+        assert math.degrees(roll_demand(wanted, 0.0, 25.0, limited)) == pytest.approx(degrees)
+
+
+def test_slow_flight_narrows_the_bank() -> None:
+    # At 1.2 times the least airspeed 1 / 1.2^2 of the lift must stay upright: 46 degrees; at 1.1, 34.3; at 1.0, 25.
+    limits = parameters(ROLL_LIMIT_DEG=60.0, AIRSPEED_MIN=20.0)
+    for airspeed, degrees in ((24.0, math.degrees(math.acos(1 / 1.44))), (22.0, 34.2654), (20.0, 25.0)):
+        assert math.degrees(roll_demand(100.0, 0.0, airspeed, limits)) == pytest.approx(degrees, abs=1e-3)
+
+
+# ----------------------------------------------------------------------
+# ArduPlane's law in flight: its airspeed with height, its bank's lag, its path, and what ArduPlane itself flew.
+
+# What ArduPlane flew, written by `python -m benchmarks.against_arduplane --plans 3 --from 1001 --keep FILE`.
+KEPT: list[dict[str, Any]] = json.loads(
+    (Path(__file__).parents[3] / "authorities" / "arduplane_flights.json").read_text(encoding="utf-8")
+)
+
+
+@pytest.fixture(scope="module")
+def usual(aerosonde: Aircraft) -> ArduPilotParameters:
+    return load_parameters(aerosonde)
+
+
+def test_true_airspeed_is_a_twentieth_more_at_a_thousand_metres() -> None:
+    # Density of the standard atmosphere (ISO 2533): 1.2250 at sea level, 1.1117 at 1,000 m, 0.9093 at 3,000 m.
+    for amsl, density in ((0.0, 1.2250), (1000.0, 1.1117), (3000.0, 0.9093)):
+        assert true_by_equivalent(amsl) == pytest.approx(math.sqrt(1.2250 / density), rel=2e-4)
+
+
+def test_it_holds_an_equivalent_airspeed(
+    make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters
+) -> None:
+    setup = make_setup([[0, 0, 2000.0], [0, 3000, 2000.0]], speeds=24.0)
+    track = simulate(replace(setup, parameters=usual), aerosonde).track
+    late = track.airspeed[track.time > 40.0]
+    # Standard density at 2,000 m: 1.0066.
+    assert float(late.mean()) == pytest.approx(24.0 * math.sqrt(1.2250 / 1.0066), rel=0.005)
+    assert track.speed_command[-1] == pytest.approx(24.0 * math.sqrt(1.2250 / 1.0066), rel=0.001)
+
+
+def test_a_climbing_leg_is_flown_a_time_constant_low(
+    make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters
+) -> None:
+    # 120 m in 3 km: 1 m/s of climb.
+    setup = make_setup([[0, 0, 500.0], [0, 3000, 620.0]])
+    for time in (1.0, 3.0):
+        track = simulate(replace(setup, parameters=usual.changed(TECS_HDEM_TCONST=time)), aerosonde).track
+        late = (track.time > 50.0) & (track.time < 100.0)
+        climb = float(track.velocity[late, 2].mean())
+        assert float(track.height_error[late].mean()) == pytest.approx(-time * climb, abs=0.15)
+
+
+def test_bank_follows_its_demand_late(make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters) -> None:
+    setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1600, 500.0]])
+    flight = Flight(replace(setup, parameters=usual), aerosonde)
+    demanded, flown = [], []
+    for _ in range(60 * 70):
+        rows, ended = flight.block(1)
+        if ended:
+            break
+        demanded.append(float(flight._work.ardupilot.roll_demand))
+        flown.append(float(rows["attitude"][-1][0]))
+    lag = round(ROLL_LAG * usual.roll_time * 60)
+
+    # A ramp is followed by its lag, and most of a turn is one.
+    def apart(ticks: int) -> float:
+        return float(np.abs(np.array(demanded[: -ticks or None]) - np.array(flown[ticks:])).mean())
+
+    best = min(range(60), key=apart)
+    assert best == pytest.approx(lag, abs=0.12 * 60)
+    assert math.degrees(max(flown)) < 31.0
+
+
+def test_bank_keeps_roll_limit_deg(make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters) -> None:
+    setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1000, 500.0]])
+    for limit in (20.0, 35.0):
+        track = simulate(replace(setup, parameters=usual.changed(ROLL_LIMIT_DEG=limit)), aerosonde).track
+        assert math.degrees(float(np.abs(track.attitude[:, 0]).max())) == pytest.approx(limit, abs=0.5)
+
+
+def test_a_wider_radius_turns_earlier(make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters) -> None:
+    setup = make_setup([[0, 0, 500.0], [0, 1000, 500.0], [1000, 1000, 500.0]])
+    past = []
+    for radius in (20.0, 60.0, 90.0):
+        track = simulate(replace(setup, parameters=usual.changed(WP_RADIUS=radius)), aerosonde).track
+        past.append(float(track.position[:, 1].max()) - 1000.0)
+    # Each metre of radius is a metre less overshot.
+    assert past[0] - past[1] == pytest.approx(40.0, abs=6.0)
+    assert past[1] - past[2] == pytest.approx(30.0, abs=6.0)
+
+
+def test_the_same_setup_gives_the_same_flight(
+    make_setup: MakeSetup, aerosonde: Aircraft, usual: ArduPilotParameters
+) -> None:
+    setup = replace(
+        make_setup([[0, 0, 500.0], [0, 800, 520.0], [800, 1000, 500.0]], wind=(6.0, 200.0), turbulence="moderate"),
+        parameters=usual, nav="gnss",
+    )  # fmt: skip
+    first, second = (simulate(setup, aerosonde) for _ in range(2))
+    assert first.ended == "completed"
+    assert np.array_equal(first.track.position, second.track.position)
+
+
+@pytest.mark.parametrize("kept", KEPT, ids=[str(kept["seed"]) for kept in KEPT])
+def test_it_flies_as_arduplane_flew(kept: dict[str, Any]) -> None:
+    scenario = from_spec(kept["scenario"], "kept")
+    airframe = load_airframe(scenario)
+    setup = setup_of(scenario, airframe, parse_mission(kept["mission"], "kept.waypoints"), kept["seed"])
+    law = simulate(setup, airframe.aircraft)
+    ours, real = flown_figures(setup, law.track, law.ended), kept["real"]
+    assert ours.ended == real["ended"] == "completed"
+    assert ours.clearance == pytest.approx(real["clearance"], abs=3.0)
+    ratios = [mine.overshoot / its["overshoot"] for mine, its in zip(ours.corners, real["corners"], strict=True)]
+    assert all(0.8 < ratio < 1.25 for ratio in ratios), ratios
+
+
+@pytest.mark.client
+@pytest.mark.skipif(not BINARY.exists(), reason="PLANFLY_ARDUPLANE names no ArduPlane")
+@pytest.mark.skipif(not SOAK, reason="beside flights that are kept of it, above: in make soak")
+def test_it_flies_as_arduplane_flies() -> None:
+    compared, _ = compare(7001)
+    assert compared.law.ended == compared.real.ended == "completed"
+    assert compared.law.clearance == pytest.approx(compared.real.clearance, abs=3.0)
+    assert compared.apart_across[0] < 2.0
+    assert compared.apart_up[0] < 4.0

@@ -1,0 +1,235 @@
+"""Parameter files as QGroundControl, MAVProxy and Mission Planner write them, and every fault in one line."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from aircraft.catalog import Aircraft, load_aircraft
+from flight.autopilots.arduplane.parameters import (
+    ARDUPILOT_PARAMETERS,
+    DEFINITIONS,
+    MOST_BYTES,
+    default_parameters,
+    load_parameters,
+    parameters_of,
+    parse_parameters,
+    read_parameter_file,
+    speeds_flown,
+    stored_parameters,
+    takes_speed,
+)
+from world.errors import ParameterError
+from world.kernels import field_names
+
+QGC = """# Onboard parameters for Vehicle 1
+#
+# Stack: ArduPilot
+# Vehicle: Fixed Wing Aircraft
+# Version: 4.6.0
+#
+# Vehicle-Id Component-Id Name Value Type
+1\t1\tNAVL1_PERIOD\t15.000000000000000000\t9
+1\t1\tROLL_LIMIT_DEG\t30.000000000000000000\t9
+1\t1\tFLTMODE_CH\t8\t2
+"""
+MAVPROXY = """NAVL1_PERIOD     15.000000
+ROLL_LIMIT_DEG   30.000000
+FLTMODE_CH       8
+"""
+MISSION_PLANNER = """#NOTE: 11/20/2026 7:40:00 PM Plane: my plane
+NAVL1_PERIOD,15
+ROLL_LIMIT_DEG,30
+FLTMODE_CH,8
+"""
+DEFAULTS = "NAVL1_PERIOD = 15  # s\r\nROLL_LIMIT_DEG=3.0e1\r\n\r\nFLTMODE_CH\t8"
+
+
+@pytest.mark.parametrize("text", [QGC, MAVPROXY, MISSION_PLANNER, DEFAULTS, "\ufeff" + MAVPROXY])
+def test_every_form_gives_the_same(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.param"
+    file.write_bytes(text.encode())
+    found = read_parameter_file(file)
+    assert {name: entry.value for name, entry in found.items()} == {
+        "NAVL1_PERIOD": 15.0,
+        "ROLL_LIMIT_DEG": 30.0,
+        "FLTMODE_CH": 8.0,
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("WP_RADIUS", "a.parm:1: 'WP_RADIUS': a name and a value are expected"),
+        ("WP_RADIUS 90 m", "a.parm:1: 'WP_RADIUS 90 m': a name and a value are expected"),
+        ("# x\nwp_radius 90", "a.parm:2: name 'wp_radius': up to 16 capitals, digits and _ are expected"),
+        ("A2345678901234567 1", "a.parm:1: name 'A2345678901234567': up to 16"),
+        ("WP_RADIUS nan", "a.parm:1: WP_RADIUS: 'nan': a finite number is expected"),
+        ("WP_RADIUS 1e999", "a.parm:1: WP_RADIUS: '1e999': a finite number is expected"),
+        ("1\t1\tWP_RADIUS\tinf\t9", "a.parm:1: WP_RADIUS: 'inf': a finite number is expected"),
+        ("WP_RADIUS 0x5a", "a.parm:1: WP_RADIUS: '0x5a': a finite number is expected"),
+        ("WP_RADIUS 90\nTHR_MAX 100\nWP_RADIUS 90", "a.parm:3: WP_RADIUS: already on line 1: each name is"),
+        ("# nothing\n\n", "a.parm: no parameter: lines of a name and a value are expected"),
+    ],
+)
+def test_faults_are_one_line(text: str, said: str) -> None:
+    with pytest.raises(ParameterError) as refused:
+        parse_parameters(text, "a.parm")
+    assert str(refused.value).startswith(said)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_name_of_sixteen_characters_is_one() -> None:
+    assert list(parse_parameters("A234567890123456 1", "a.parm")) == ["A234567890123456"]
+
+
+def test_what_is_no_text_file_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="cannot be read"):
+        read_parameter_file(tmp_path / "missing.parm")
+    with pytest.raises(ParameterError, match="cannot be read"):
+        read_parameter_file(tmp_path)
+    file = tmp_path / "bytes.parm"
+    file.write_bytes(b"WP_RADIUS 90\n\xff\xfe 1\n")
+    with pytest.raises(ParameterError, match=r"bytes.parm:2: not a text file in UTF-8"):
+        read_parameter_file(file)
+    file.write_bytes(b" " * (MOST_BYTES + 1))
+    with pytest.raises(ParameterError, match="has at most"):
+        read_parameter_file(file)
+
+
+# ----------------------------------------------------------------------
+# ArduPlane's parameters in SI: old and new names, units, ranges, and who states each.
+
+NEW = """AIRSPEED_CRUISE 25
+AIRSPEED_MIN 18
+AIRSPEED_MAX 31
+ROLL_LIMIT_DEG 35
+PTCH_LIM_MAX_DEG 22
+PTCH_LIM_MIN_DEG -18
+PTCH_TRIM_DEG 3.5
+RTL_ALTITUDE 120
+"""
+# The same as ArduPlane 4.4 and before had it: cm/s, centidegrees and centimetres.
+OLD = """TRIM_ARSPD_CM 2500
+ARSPD_FBW_MIN 18
+ARSPD_FBW_MAX 31
+LIM_ROLL_CD 3500
+LIM_PITCH_MAX 2200
+LIM_PITCH_MIN -1800
+TRIM_PITCH_CD 350
+ALT_HOLD_RTL 12000
+"""
+
+
+def test_the_defaults_are_arduplanes() -> None:
+    plain = default_parameters()
+    # ardupilot.org, Plane, complete parameter list of 4.6.
+    assert (plain.wp_radius, plain.wp_max_radius, plain.wp_loiter_rad) == (90.0, 0.0, 60.0)
+    assert (plain.navl1_period, plain.navl1_damping, plain.navl1_xtrack_i) == (17.0, 0.75, 0.02)
+    assert (plain.tecs_climb_max, plain.tecs_sink_min, plain.tecs_sink_max) == (5.0, 2.0, 5.0)
+    assert (plain.tecs_time, plain.tecs_height_demand_time, plain.tecs_pitch_damping) == (5.0, 3.0, 0.3)
+    assert (plain.glide_slope_min, plain.roll_time) == (15.0, 0.5)
+    assert plain.roll_limit == pytest.approx(math.radians(45.0))
+    assert plain.tecs_pitch_max == pytest.approx(math.radians(15.0))
+    assert (plain.throttle_min, plain.throttle_cruise) == pytest.approx((0.0, 0.45))
+    assert {parameter.origin for parameter in plain.values} == {"default"}
+
+
+@pytest.mark.parametrize("text", [NEW, OLD])
+def test_old_and_new_names_mean_the_same(text: str) -> None:
+    found = parameters_of(text, "mine.parm")
+    assert (found.airspeed_cruise, found.airspeed_min, found.airspeed_max) == (25.0, 18.0, 31.0)
+    degrees = [found.roll_limit, found.pitch_limit_max, found.pitch_limit_min, found.pitch_trim]
+    assert [math.degrees(angle) for angle in degrees] == pytest.approx([35.0, 22.0, -18.0, 3.5])
+    assert found.rtl_altitude == 120.0
+    assert found.unused == ()
+    assert found.by_origin("file")["ROLL_LIMIT_DEG"] == 35.0
+
+
+def test_one_parameter_under_both_names_must_agree() -> None:
+    assert parameters_of("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 35\n", "a").roll_limit == pytest.approx(math.radians(35.0))
+    with pytest.raises(ParameterError, match=r"a:2: ROLL_LIMIT_DEG: 36: the same parameter has another value"):
+        parameters_of("LIM_ROLL_CD 3500\nROLL_LIMIT_DEG 36\n", "a")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("WP_RADIUS -1", "a:1: WP_RADIUS: -1: allowed 0..32767"),
+        ("NAVL1_PERIOD 0.9", "a:1: NAVL1_PERIOD: 0.9: allowed 1..60"),
+        ("LIM_ROLL_CD 400", "a:1: LIM_ROLL_CD: 400: allowed 500..9000"),
+        ("TECS_TIME_CONST 0", "a:1: TECS_TIME_CONST: 0: allowed 1..20"),
+        ("THR_MIN 80\nTHR_MAX 75", "a: THR_MIN 80: must be below THR_MAX 75"),
+        ("AIRSPEED_MIN 30\nAIRSPEED_MAX 25", "a: AIRSPEED_MIN 30: must be below AIRSPEED_MAX 25"),
+    ],
+)
+def test_values_out_of_range_are_refused(text: str, said: str) -> None:
+    with pytest.raises(ParameterError) as refused:
+        parameters_of(text, "a")
+    assert str(refused.value) == said
+
+
+def test_the_edges_of_a_range_are_taken() -> None:
+    for definition in DEFINITIONS.values():
+        for value in (definition.low, definition.high):
+            if definition.name.startswith(("THR_M", "AIRSPEED_M")):
+                continue
+            found = parameters_of(f"{definition.name} {value}", "a")
+            assert found.by_origin("file") == {definition.name: value}
+
+
+def test_a_file_comes_before_the_aircraft_and_that_before_the_defaults(tmp_path: Path) -> None:
+    aircraft: Aircraft = replace(load_aircraft("aerosonde"), folder=tmp_path)
+    assert load_parameters(aircraft) == default_parameters()
+    (tmp_path / "ardupilot.parm").write_text("WP_RADIUS 70\nROLL_LIMIT_DEG 30\nSERVO1_FUNCTION 4\n", encoding="utf-8")
+    mine = tmp_path / "mine.param"
+    mine.write_text("WP_RADIUS 50\nFS_LONG_ACTN 0\n", encoding="utf-8")
+    found = load_parameters(aircraft, mine)
+    assert found.by_origin("file") == {"WP_RADIUS": 50.0}
+    assert found.by_origin("aircraft") == {"ROLL_LIMIT_DEG": 30.0}
+    assert found.by_origin("default")["NAVL1_PERIOD"] == 17.0
+    # Of the file that a person gave; the aircraft's own holds what its servos need, too.
+    assert (found.unused, found.source) == (("FS_LONG_ACTN",), str(mine))
+
+
+def test_the_record_holds_every_field() -> None:
+    found = parameters_of(NEW, "a")
+    record = found.record()
+    assert field_names(ARDUPILOT_PARAMETERS) == tuple(DEFINITIONS)
+    assert all(record[name] == getattr(found, name) for name in DEFINITIONS)
+    assert record.dtype == ARDUPILOT_PARAMETERS
+    assert np.isfinite([record[name] for name in DEFINITIONS]).all()
+
+
+def test_what_was_stored_comes_back_bit_for_bit() -> None:
+    found = parameters_of(OLD + "NAVL1_PERIOD 16.3\nFOO 1\n", "mine.parm")
+    again = stored_parameters([tuple(value) for value in found.values], found.unused, found.source)
+    assert again == found
+    assert again.record().tolist() == found.record().tolist()
+    with pytest.raises(ParameterError, match=r"WP_RADIUS: -5: allowed"):
+        stored_parameters([("WP_RADIUS", -5.0, "file")], (), "")
+
+
+def test_one_value_can_be_changed() -> None:
+    slow = default_parameters().changed(TECS_HDEM_TCONST=1.0)
+    assert (slow.tecs_height_demand_time, slow.wp_radius) == (1.0, 90.0)
+    with pytest.raises(ValueError, match="TECS_FOO: not a parameter"):
+        default_parameters().changed(TECS_FOO=1.0)
+
+
+# ----------------------------------------------------------------------
+# Which airspeeds ArduPlane takes up, and what it flies instead.
+
+PARAMETERS = default_parameters().changed(AIRSPEED_MIN=18.0, AIRSPEED_MAX=31.0)
+
+
+@pytest.mark.parametrize(("airspeed", "taken"), [(17.99, False), (18.0, True), (31.0, True), (31.01, False)])
+def test_speeds_within_the_limits_are_taken(airspeed: float, taken: bool) -> None:
+    assert takes_speed(airspeed, PARAMETERS) is taken
+
+
+def test_a_speed_that_is_not_taken_leaves_the_one_before() -> None:
+    commanded = np.array([17.0, 17.0, 20.0, 35.0, 31.0])
+    assert speeds_flown(commanded, 25.0, PARAMETERS).tolist() == [25.0, 25.0, 20.0, 20.0, 31.0]

@@ -1,0 +1,118 @@
+"""An autopilot's program: started with its options in a folder of its own, and never left."""
+
+import hashlib
+import os
+import tempfile
+import time
+from pathlib import Path
+
+import pytest
+
+from flight.autopilots.arduplane_sitl.process import AutopilotProcess, check_binary
+from flight.mission.items import Home
+from world.errors import FlightError
+
+HOME = Home(36.5, -84.25, 300.0)
+
+
+@pytest.fixture(autouse=True)
+def own_folder_for_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "temporary").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+
+
+def script(tmp_path: Path, text: str) -> Path:
+    program = tmp_path / "autopilot"
+    program.write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+    program.chmod(0o755)
+    return program
+
+
+def started(program: Path) -> AutopilotProcess:
+    return AutopilotProcess(program, HOME, 90.0, {"WP_RADIUS": 90.0, "NAVL1_PERIOD": 17.5}, 4001, 4002)
+
+
+def wait_for(file: Path) -> str:
+    for _ in range(500):
+        if file.exists() and file.read_text():
+            return file.read_text()
+        time.sleep(0.01)
+    raise AssertionError(f"{file} was not written")
+
+
+def test_the_program_gets_its_place_its_ports_and_its_parameters(tmp_path: Path) -> None:
+    program = script(
+        tmp_path, f'cp "$0" x; pwd > {tmp_path}/folder; cat "${{22}}" > {tmp_path}/p; echo "$@" > {tmp_path}/said'
+    )
+    with started(program):
+        said = wait_for(tmp_path / "said").split()
+        folder = Path((tmp_path / "folder").read_text().strip())
+        options = dict(zip(said[::2], said[1::2], strict=False))
+        assert options["--model"] == "JSON:127.0.0.1"
+        assert options["--home"] == "36.500000000,-84.250000000,300.000,90.00"
+        assert options["--serial0"] == "tcpclient:127.0.0.1:4002"
+        assert options["--sim-port-out"] == "4001"
+        assert len({options[name] for name in ("--base-port", "--sim-port-in", "--rc-in-port")}) == 3
+        assert Path(said[-1]).read_text() == "WP_RADIUS 90\nNAVL1_PERIOD 17.5\n"
+        assert (folder / "x").exists()
+    assert not folder.exists()
+
+
+def test_leaving_kills_a_program_that_would_stay(tmp_path: Path) -> None:
+    program = script(tmp_path, f"trap '' TERM; echo $$ > {tmp_path}/pid; while :; do sleep 0.05; done")
+    with started(program):
+        pid = int(wait_for(tmp_path / "pid"))
+        os.kill(pid, 0)
+    with pytest.raises(ProcessLookupError):
+        os.kill(pid, 0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("echo starting; echo PANIC: no storage; exit 1", "panicked: no storage"),
+        ("echo 'last  words'; exit 7", "ended with exit code 7: last words"),
+        ("kill -ABRT $$", "was ended by SIGABRT"),
+        ("exit 0", "ended with exit code 0"),
+    ],
+)
+def test_a_watch_tells_how_the_program_ended(tmp_path: Path, text: str, said: str) -> None:
+    def watch() -> None:
+        for _ in range(500):
+            process.watch()
+            time.sleep(0.01)
+
+    with started(script(tmp_path, text)) as process, pytest.raises(FlightError) as ended:
+        watch()
+    assert str(ended.value) == said
+
+
+def test_a_program_that_is_asked_to_end_closes_its_log(tmp_path: Path) -> None:
+    text = (
+        f"mkdir logs; trap 'echo end >> logs/00000001.BIN; exit' TERM; echo log > logs/00000001.BIN\n"
+        f"echo up > {tmp_path}/up; while :; do sleep 0.02; done"
+    )
+    with started(script(tmp_path, text)) as process:
+        wait_for(tmp_path / "up")
+        process.end(lambda: False)
+        assert process.keep_log(tmp_path / "kept.BIN")
+    assert (tmp_path / "kept.BIN").read_text() == "log\nend\n"
+
+
+def test_a_program_without_a_log_leaves_none(tmp_path: Path) -> None:
+    with started(script(tmp_path, "exit 0")) as process:
+        assert not process.keep_log(tmp_path / "kept.BIN")
+    assert not (tmp_path / "kept.BIN").exists()
+
+
+def test_the_digest_is_the_files(tmp_path: Path) -> None:
+    program = script(tmp_path, "exit 0")
+    assert check_binary(program) == hashlib.sha256(program.read_bytes()).hexdigest()
+
+
+def test_what_is_no_program_is_told_apart(tmp_path: Path) -> None:
+    plain = tmp_path / "plain"
+    plain.write_text("no program")
+    for path, said in ((tmp_path / "none", "no such file"), (tmp_path, "not a file"), (plain, "not executable")):
+        with pytest.raises(FlightError, match=said):
+            check_binary(path)

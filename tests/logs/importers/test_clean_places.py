@@ -1,0 +1,141 @@
+import numpy as np
+import pytest
+
+from flight.simulation.setup import Gap
+from logs.importers.clean_places import (
+    BEHIND,
+    DEGREE,
+    ROWS_BEHIND,
+    clean_places,
+    find_gaps,
+    metres_between,
+    steady_clock,
+)
+from logs.importers.raw_log import LogSeries
+
+
+def test_a_clock_that_goes_on_stays_as_it_is() -> None:
+    time = np.arange(0.0, 10.0, 0.1)
+    assert np.array_equal(steady_clock(time).time, time)
+    assert steady_clock(time).jumps == ()
+
+
+def test_one_row_fewer_than_a_jump_takes_is_late() -> None:
+    """Just inside and just outside of the number of rows that stay behind."""
+    before, after = np.arange(100.0, 120.0), np.arange(121.0, 140.0)
+    late = np.concatenate([before, 50.0 + np.arange(ROWS_BEHIND - 1), after])
+    assert steady_clock(late).jumps == ()
+    gone = np.concatenate([before, 50.0 + np.arange(ROWS_BEHIND), after])
+    assert steady_clock(gone).jumps == (119.0,)
+
+
+def test_less_than_a_second_back_is_no_jump() -> None:
+    before = np.arange(0.0, 20.0, 0.5)
+    for back, count in ((BEHIND - 0.01, 0), (BEHIND + 0.01, 1)):
+        after = before[-1] - back + np.zeros(20)
+        assert len(steady_clock(np.concatenate([before, after])).jumps) == count
+
+
+def test_two_restarts_are_two_jumps() -> None:
+    flight = np.arange(5.0, 25.0)
+    found = steady_clock(np.concatenate([flight, flight, flight]), usual=1.0)
+    assert found.time.tolist() == np.arange(5.0, 65.0).tolist()
+    assert found.jumps == (24.0, 44.0)
+
+
+# ----------------------------------------------------------------------
+# Clean places.
+
+
+def north(time: np.ndarray, speed: float = 25.0, lon: float = 8.0) -> LogSeries:
+    """A flight to the north."""
+    return LogSeries("POS", time, np.column_stack([46.0 + speed * time / DEGREE, np.full(time.size, lon), time * 0.0]))
+
+
+TIME = np.arange(0.0, 60.0, 0.2)
+
+
+def test_a_flight_in_order_stays_as_it_is() -> None:
+    found = clean_places(north(TIME))
+    assert np.array_equal(found.time, TIME)
+    assert (found.faults.doubled, found.faults.unordered, found.faults.glitches, found.gaps) == (0, 0, 0, ())
+
+
+@pytest.mark.parametrize(("pause", "count"), [(1.0, 0), (1.01, 1)])
+def test_a_pause_over_a_second_is_a_gap(pause: float, count: int) -> None:
+    time = np.concatenate([TIME, TIME + TIME[-1] + pause])
+    assert len(find_gaps(time)) == count
+
+
+def test_of_rare_rows_a_pause_is_longer() -> None:
+    """A logger of one fix in four seconds has no gap at each."""
+    time = np.arange(0.0, 400.0, 4.0)
+    assert find_gaps(time) == ()
+    assert find_gaps(np.delete(time, [50, 51])) == (Gap(196.0, 208.0),)
+
+
+def test_doubled_late_and_unusable_rows_are_counted() -> None:
+    series = north(TIME)
+    time, values = series.time.copy(), series.values.copy()
+    order = np.arange(time.size)
+    order[[100, 101]] = [101, 100]
+    time, values = np.insert(time[order], 50, time[50]), np.insert(values[order], 50, values[50], axis=0)
+    values[200] = [0.0, 0.0, 0.0]
+    values[210, 0] = np.nan
+    values[220, 0] = 95.0
+    found = clean_places(LogSeries("POS", time, values))
+    assert (found.faults.doubled, found.faults.unordered, found.faults.unusable) == (1, 1, 3)
+    assert (np.diff(found.time) > 0.0).all()
+
+
+@pytest.mark.parametrize("rows", [1, 5])
+def test_places_that_nobody_can_have_been_at_are_left_out(rows: int) -> None:
+    series = north(TIME)
+    values = series.values.copy()
+    values[100 : 100 + rows, 1] += 0.05  # 3.9 km to the east
+    found = clean_places(LogSeries("POS", TIME, values))
+    assert found.faults.glitches == rows
+    assert found.lon.max() == 8.0
+
+
+def test_a_height_that_leaps_and_comes_back_is_a_glitch() -> None:
+    series = north(TIME)
+    values = series.values.copy()
+    values[100, 2] = 3000.0
+    assert clean_places(LogSeries("POS", TIME, values)).faults.glitches == 1
+
+
+def test_a_new_place_for_good_is_no_glitch() -> None:
+    series = north(TIME)
+    values = series.values.copy()
+    values[100:, 1] += 0.05
+    assert clean_places(LogSeries("POS", TIME, values)).faults.glitches == 0
+
+
+def test_a_jump_of_the_clock_is_taken_out_and_a_gap_is_not() -> None:
+    """In both the times lack 100 s; only in the second the aircraft went on meanwhile."""
+    jumped = np.where(TIME >= 30.0, TIME + 100.0, TIME)
+    values = north(TIME).values
+    found = clean_places(LogSeries("POS", jumped, values))
+    assert found.gaps == ()
+    assert found.faults.clock_jumps == (130.0,)
+    assert found.time[-1] == pytest.approx(TIME[-1])
+    assert found.on_clock(np.array([10.0, 140.0])).tolist() == pytest.approx([10.0, 40.0])
+    gone_on = clean_places(north(jumped))
+    assert len(gone_on.gaps) == 1
+    assert gone_on.faults.clock_jumps == ()
+
+
+def test_distances_across_the_180th_meridian_are_short() -> None:
+    assert metres_between(np.zeros(2), np.array([179.9995, -179.9995]))[0] == pytest.approx(0.001 * DEGREE)
+    lat = np.array([-33.0, -33.0])
+    assert metres_between(lat, np.array([-70.0, -70.001]))[0] == pytest.approx(0.001 * DEGREE * np.cos(np.radians(33)))
+
+
+def test_a_single_row_that_is_missing_at_one_a_second_is_a_gap() -> None:
+    time = np.arange(0.0, 30.0)
+    assert find_gaps(time) == ()
+    assert find_gaps(np.delete(time, 10)) == (Gap(9.0, 11.0),)
+    # Rows that come now and then by four tenths late are none.
+    late = time + np.where(time % 5.0 == 0.0, 0.4, 0.0)
+    assert find_gaps(late) == ()

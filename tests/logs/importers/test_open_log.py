@@ -1,0 +1,71 @@
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from logs.importers.open_log import MOST_BYTES, is_field_log, open_log
+from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
+from world.errors import LogError
+
+WRITERS: dict[str, tuple[str, Callable[[Path], Path]]] = {
+    "ArduPilot dataflash log": (".BIN", dataflash),
+    "MAVLink telemetry log": (".tlog", telemetry),
+    "PX4 log": (".ulg", px4),
+    "GPX track": (".gpx", gpx),
+    "IGC flight recorder file": (".igc", igc),
+    "KML track": (".kml", kml),
+}
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_each_format_is_told_from_the_others(tmp_path: Path, name: str) -> None:
+    suffix, write = WRITERS[name]
+    path = write(tmp_path / f"a{suffix}")
+    assert is_field_log(path)
+    assert open_log(path).format == name
+
+
+@pytest.mark.parametrize("name", ["PX4 log", "ArduPilot dataflash log", "GPX track"])
+def test_by_what_is_in_it_whatever_it_is_called(tmp_path: Path, name: str) -> None:
+    path = WRITERS[name][1](tmp_path / "a.igc")
+    assert open_log(path).format == name
+
+
+def test_a_log_that_claims_ten_gigabytes_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.BIN"
+    with path.open("wb") as file:
+        file.truncate(10 * 2**30)
+    with pytest.raises(LogError, match=f"10,737,418,240 bytes: at most {MOST_BYTES:,} are read"):
+        open_log(path)
+
+
+@pytest.mark.parametrize("data", [b"", b"\x00" * 600, b"hello, this is no log at all"])
+def test_what_is_no_log_is_refused_in_a_line(tmp_path: Path, data: bytes) -> None:
+    path = tmp_path / "a.BIN"
+    path.write_bytes(data)
+    with pytest.raises(LogError) as caught:
+        open_log(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_is_no_log(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="no such file"):
+        open_log(tmp_path)
+
+
+def test_a_zipped_track_is_read_as_the_track_in_it(tmp_path: Path) -> None:
+    track, path = kml(tmp_path / "doc.kml"), tmp_path / "a.kmz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.write(track, "doc.kml")
+    one, other = open_log(track), open_log(path)
+    assert one.series["position"].values.tolist() == other.series["position"].values.tolist()
+    assert is_field_log(path)
+
+
+def test_a_log_as_text_is_refused_by_name(tmp_path: Path) -> None:
+    path = tmp_path / "a.log"
+    path.write_text("FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\nPARM, 1, RLL_P, 0.3\n")
+    with pytest.raises(LogError, match=r"a dataflash log as text: the \.BIN that it was made of is read"):
+        open_log(path)
+    assert is_field_log(path)

@@ -1,0 +1,20 @@
+import numpy as np
+import pytest
+
+from logs.importers.clean_places import metres_between
+from logs.importers.raw_log import COLUMNS, SPEED, STEP, example_raw_log
+
+
+def test_each_series_has_a_column_for_each_name() -> None:
+    for name, series in example_raw_log().series.items():
+        assert series.values.shape == (len(series.time), len(COLUMNS[name]))
+
+
+# ----------------------------------------------------------------------
+# Example raw log.
+
+
+@pytest.mark.parametrize("lon", [8.0, 179.995])
+def test_it_flies_at_its_speed(lon: float) -> None:
+    lat, east, _ = example_raw_log(-33.0, lon).series["position"].values.T
+    assert np.abs(metres_between(lat, east) / STEP - SPEED).max() < 0.2

@@ -1,0 +1,139 @@
+"""Failures: the most frequent first."""
+
+import math
+
+import numpy as np
+import pytest
+from matplotlib.text import Text
+
+from logs.figures.style import png_bytes
+from planfly.campaigns.pictures import (
+    MOST,
+    Bar,
+    Spoke,
+    covariance_ellipse,
+    draw_clearance_fan,
+    draw_crossings,
+    draw_failures,
+    draw_go_no_go,
+    draw_probability,
+    draw_tornado,
+    speed_bins,
+)
+from planfly.campaigns.statistics.decision import wilson
+
+
+def test_bars_are_as_long_as_flights_failed() -> None:
+    figure = draw_failures([("slopes", "leg 2", 3), ("clearance", "leg 8", 9)], 100)
+    assert [patch.get_width() for patch in figure.axes[0].patches] == [9, 3]
+    labels = [label.get_text() for label in figure.axes[0].get_yticklabels()]
+    assert labels == ["clearance, leg 8", "slopes, leg 2"]
+
+
+def test_none_is_said_and_many_are_cut() -> None:
+    assert "No flight of 7" in draw_failures([], 7).axes[0].texts[0].get_text()
+    many = [("turns", f"waypoint {k}", k + 1) for k in range(40)]
+    assert len(draw_failures(many, 100).axes[0].patches) == MOST
+
+
+# ----------------------------------------------------------------------
+# P against wind speed and the tornado: every mark where the data puts it.
+
+
+def test_flights_are_put_together_by_metres_a_second() -> None:
+    bins = speed_bins(np.array([0.0, 0.99, 1.0, 5.5, 5.6]), np.array([True, False, True, False, False]))
+    assert [(one.low, one.high, one.flights, one.flyable) for one in bins] == [(0, 1, 2, 1), (1, 2, 1, 1), (5, 6, 2, 0)]
+    assert bins[0].interval == wilson(1, 2)
+    assert speed_bins(np.zeros(0), np.zeros(0, dtype=bool)) == []
+
+
+def test_lines_lie_at_the_shares() -> None:
+    bins = speed_bins(np.array([0.2, 0.7, 2.5]), np.array([True, False, True]))
+    figure = draw_probability(bins, 0.9)
+    heights = {float(line.get_ydata()[0]) for line in figure.axes[0].lines}
+    assert heights == {0.5, 1.0, 0.9}
+    assert png_bytes(figure) == png_bytes(draw_probability(bins, 0.9))
+
+
+def test_bars_point_the_way_the_margin_goes() -> None:
+    figure = draw_tornado([Bar("mass", 0.6, -0.7), Bar("drag", 0.2, 0.1)], "clearance")
+    widths = [patch.get_width() for patch in figure.axes[0].patches]
+    assert widths == [pytest.approx(-0.6), pytest.approx(0.2)]
+    assert "clearance" in figure.axes[0].get_title(loc="left")
+
+
+# ----------------------------------------------------------------------
+# The fan and the crossings.
+
+
+def test_the_fan_shows_the_median_the_failures_and_what_is_required() -> None:
+    clearance = np.array([[80.0, 100.0], [90.0, 110.0], [50.0, np.nan]])
+    figure = draw_clearance_fan(clearance, np.array([False, False, True]), np.array([10.0, 20.0]), 2000.0, 60.0)
+    top = figure.axes[0]
+    lines = {str(line.get_label()): np.asarray(line.get_ydata(), dtype=float) for line in top.lines}
+    assert lines["median"].tolist() == [80.0, 105.0]
+    assert lines["required, 60 m"].tolist() == [60.0, 60.0]
+    np.testing.assert_array_equal(lines["not flyable"], clearance[2])
+    assert figure.axes[1].get_xlim() == (0.0, 2.0)
+
+
+def test_the_fans_legend_covers_no_band() -> None:
+    figure = draw_clearance_fan(np.full((9, 30), 80.0), np.zeros(9, dtype=bool), np.full(30, 10.0), 2000.0, 60.0)
+    figure.canvas.draw()
+    top = figure.axes[0]
+    box = top.get_legend().get_window_extent()
+    assert box.y0 >= top.bbox.y1
+    assert box.y1 <= figure.bbox.y1
+    # The title stands left of it.
+    (title,) = [text for text in top.findobj(Text) if text.get_text().startswith("Clearance along")]
+    assert title.get_window_extent().x1 < box.x0
+
+
+def test_the_ellipse_holds_95_percent_of_normal_points() -> None:
+    points = np.random.default_rng(1).multivariate_normal([3.0, -1.0], [[4.0, 1.5], [1.5, 1.0]], 4000)
+    ellipse = covariance_ellipse(points)
+    off = points - np.array(ellipse.get_center())
+    turn = math.radians(ellipse.angle)
+    along = off[:, 0] * math.cos(turn) + off[:, 1] * math.sin(turn)
+    across = off[:, 1] * math.cos(turn) - off[:, 0] * math.sin(turn)
+    inside = (2 * along / ellipse.width) ** 2 + (2 * across / ellipse.height) ** 2 <= 1.0
+    assert inside.mean() == pytest.approx(0.95, abs=0.01)
+
+
+def test_a_panel_a_waypoint() -> None:
+    crossings = np.random.default_rng(2).normal(size=(20, 7, 2))
+    crossings[3, 5:] = np.nan
+    figure = draw_crossings(crossings, np.arange(20) == 4)
+    shown = [axes for axes in figure.axes if axes.axison]
+    assert [axes.get_title(loc="left") for axes in shown] == [f"waypoint {k}" for k in range(7)]
+    dots, crosses = shown[0].lines[2], shown[0].lines[3]
+    assert (len(dots.get_xdata()), len(crosses.get_xdata())) == (19, 1)
+
+
+def test_ellipses_are_whole() -> None:
+    """Few points of a wide spread: the ellipse reaches further than they do."""
+    crossings = np.random.default_rng(3).normal(size=(8, 1, 2)) * [3.0, 9.0]
+    (axes,) = [axes for axes in draw_crossings(crossings, np.zeros(8, dtype=bool)).figure.axes if axes.axison]
+    points = crossings[:, 0]
+    # Half the height of an ellipse of the covariance C and the quantile q of chi squared: sqrt(q C22); 5.991 for 95 %.
+    high = points[:, 1].mean() + np.sqrt(5.991 * np.cov(points.T)[1, 1])
+    low = points[:, 1].mean() - np.sqrt(5.991 * np.cov(points.T)[1, 1])
+    assert max(high, -low) > 1.1 * np.abs(points).max()
+    assert axes.get_ylim()[0] < low < high < axes.get_ylim()[1]
+
+
+# ----------------------------------------------------------------------
+# The go/no-go chart.
+
+SPOKES = [Spoke(90.0 * k, 8.0 + k, 7.5 + k, 8.5 + k, False, ((6.0, 3, 3), (9.0, 3, 1))) for k in range(4)]
+
+
+def test_the_boundary_passes_through_each_direction() -> None:
+    figure = draw_go_no_go(SPOKES, 20.0, 0.99, 0.95, "demo", (5.0, 250.0))
+    line = next(line for line in figure.axes[0].lines if len(line.get_xdata()) > 100)
+    angle, speed = np.asarray(line.get_xdata(), dtype=float), np.asarray(line.get_ydata(), dtype=float)
+    for one in SPOKES:
+        assert abs(np.interp(np.radians(one.from_deg), angle, speed) - one.boundary) < 0.02
+    # A mark for each wind flown in, and the star.
+    assert len(figure.axes[0].lines) == 1 + 8 + 1
+    assert png_bytes(figure) == png_bytes(draw_go_no_go(SPOKES, 20.0, 0.99, 0.95, "demo", (5.0, 250.0)))

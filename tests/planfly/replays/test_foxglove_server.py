@@ -1,0 +1,177 @@
+"""``planfly replay --foxglove``, met by a client that speaks Foxglove's WebSocket protocol."""
+
+import contextlib
+import importlib.util
+import json
+import socket
+import struct
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flight.simulation.track import Track
+from logs.recording.state_channel import EPOCH_NS, state_class
+from planfly.cli import main
+from planfly.replays.live import SUBPROTOCOL
+from tests.clients import need
+from tests.logs.made_flight import make_setup, make_track, record
+
+pytestmark = pytest.mark.client
+
+
+def needed(package: str, how: str) -> None:
+    found = importlib.util.find_spec(package)
+    need(None if found is None else Path(str(found.origin)), how, f"pip package {how}")
+
+
+@pytest.fixture(scope="module")
+def track() -> Track:
+    return make_track(3.0)
+
+
+@pytest.fixture(scope="module")
+def log_path(tmp_path_factory: pytest.TempPathFactory, track: Track) -> Path:
+    return record(tmp_path_factory.mktemp("foxglove") / "a.mcap", make_setup(), track)
+
+
+class Viewer:
+    """A client of the protocol foxglove.sdk.v1: channels by topic, and what came of those subscribed to."""
+
+    def __init__(self, url: str) -> None:
+        from websockets.sync.client import connect
+
+        # No proxy stands between us and this machine.
+        self.socket = connect(url, subprotocols=["foxglove.sdk.v1"], proxy=None)  # type: ignore[list-item]  # a plain string
+        self.channels: dict[str, dict[str, Any]] = {}
+        self.topics: dict[int, str] = {}
+        self.messages: list[tuple[str, int, bytes]] = []
+        self.times: list[int] = []
+
+    def take(self, seconds: float) -> bool:
+        """Handle one message; whether one came in time."""
+        try:
+            data = self.socket.recv(timeout=seconds)
+        except TimeoutError:
+            return False
+        if isinstance(data, str):
+            message = json.loads(data)
+            for channel in message.get("channels", ()):
+                self.channels[channel["topic"]] = channel
+        elif data[0] == 1:
+            number, stamp = struct.unpack_from("<IQ", data, 1)
+            self.messages.append((self.topics[number], stamp, data[13:]))
+        elif data[0] == 2:
+            self.times.append(struct.unpack_from("<Q", data, 1)[0])
+        return True
+
+    def subscribe(self, *topics: str) -> None:
+        wanted = [{"id": len(self.topics) + k, "channelId": self.channels[t]["id"]} for k, t in enumerate(topics)]
+        self.topics |= {item["id"]: topic for item, topic in zip(wanted, topics, strict=True)}
+        self.socket.send(json.dumps({"op": "subscribe", "subscriptions": wanted}))
+
+
+@contextlib.contextmanager
+def served(*argv: str) -> Iterator[tuple[subprocess.Popen[str], Viewer]]:
+    """The server in a process of its own, and a viewer connected to the address that it prints."""
+    command = [sys.executable, "-m", "planfly", "replay", *argv, "--foxglove", "--port", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            line = process.stdout.readline()
+            assert line.startswith("foxglove  ws://127.0.0.1:"), line
+            viewer = Viewer(line.split()[1])
+            with viewer.socket:
+                yield process, viewer
+        finally:
+            process.kill()
+
+
+def test_a_viewer_is_given_the_log(log_path: Path, track: Track) -> None:
+    needed("foxglove", "foxglove-sdk")
+    needed("websockets", "websockets")
+    from websockets.exceptions import ConnectionClosed
+
+    with served(str(log_path), "--speed", "3") as (process, viewer):
+        deadline = time.monotonic() + 20.0
+        while len(viewer.channels) < 15 and time.monotonic() < deadline:
+            viewer.take(1.0)
+        assert set(viewer.channels) == {
+            "/state", "/tf", "/fix", "/log", "/scene/terrain", "/scene/threats", "/scene/zones", "/scene/plan",
+            "/scene/track", "/scene/aircraft",
+            *(f"/points/{part}" for part in ("terrain", "threats", "plan", "track", "aircraft")),
+        }  # fmt: skip
+        state = viewer.channels["/state"]
+        assert (state["encoding"], state["schemaName"], state["schemaEncoding"]) == (
+            "protobuf",
+            "planfly.State",
+            "protobuf",
+        )
+        # Nothing is played before somebody listens.
+        assert viewer.messages == []
+        viewer.subscribe("/state", "/scene/terrain", "/log")
+        late = False
+        try:
+            while time.monotonic() < deadline:
+                viewer.take(1.0)
+                if len(viewer.messages) > 60 and not late:
+                    viewer.subscribe("/scene/plan")
+                    late = True
+        except ConnectionClosed:
+            pass
+        _, errors = process.communicate(timeout=20.0)
+        assert process.returncode == 0, errors
+    rows = [(stamp, state_class().FromString(data)) for topic, stamp, data in viewer.messages if topic == "/state"]
+    assert [row.row for _, row in rows] == list(range(len(track)))
+    assert [row.up_amsl_m for _, row in rows] == track.position[:, 2].tolist()
+    assert [stamp for stamp, _ in rows] == [EPOCH_NS + round(t * 1e9) for t in track.time]
+    topics = {topic for topic, _, _ in viewer.messages}
+    # The plan was sent once, before we asked for it: who comes late is given the scene as it is.
+    assert topics == {"/state", "/scene/terrain", "/log", "/scene/plan"}
+    assert viewer.times == sorted(viewer.times)
+    assert viewer.times[-1] == rows[-1][0]
+
+
+def test_the_subprotocol_is_the_one_that_is_stated(log_path: Path) -> None:
+    """In what is printed and in the help; a viewer that asks for the older name alone is refused."""
+    needed("foxglove", "foxglove-sdk")
+    from websockets.exceptions import WebSocketException
+    from websockets.sync.client import connect
+
+    from planfly.terminal.parser import build_parser
+
+    with served(str(log_path)) as (_, viewer):
+        assert viewer.socket.subprotocol == SUBPROTOCOL == "foxglove.sdk.v1"
+        host, port = viewer.socket.remote_address[:2]
+        with pytest.raises(WebSocketException):
+            connect(f"ws://{host}:{port}", subprotocols=["foxglove.websocket.v1"], proxy=None)  # type: ignore[list-item]  # a plain string
+    commands = next(action for action in build_parser()._actions if hasattr(action, "choices") and action.choices)
+    assert SUBPROTOCOL in " ".join(commands.choices["replay"].format_help().split())
+
+
+def test_only_this_machine_is_served_and_a_port_in_use_is_said(
+    log_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    needed("foxglove", "foxglove-sdk")
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert main(["replay", str(log_path), "--foxglove", "--port", str(port)]) == 1
+    printed = capsys.readouterr().err.strip()
+    assert f"127.0.0.1:{port}" in printed
+    assert len(printed.splitlines()) == 1
+    assert main(["replay", str(log_path), "--foxglove", "--port", "0", "--wait", "0.1"]) == 2
+    assert "nobody has subscribed within 0.1 s" in capsys.readouterr().err
+
+
+def test_without_the_package_it_is_one_line(
+    log_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "foxglove", None)
+    assert main(["replay", str(log_path), "--foxglove"]) == 2
+    assert "foxglove-sdk is not installed" in capsys.readouterr().err

@@ -1,0 +1,216 @@
+"""The parameter that decides, found among flights that pass or fail by a rule of the test's own."""
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from aircraft.catalog import load_aircraft
+from flight.autopilots.arduplane.parameters import ArduPilotParameters, default_parameters, load_parameters
+from flight.simulation.setup import FlightSetup
+from logs.recording.reader import read_log
+from logs.verdict.findings import Fact, Finding, make_finding, verdict_json
+from logs.verdict.places import Place
+from logs.verdict.wording import deciding_text
+from planfly.airframe import load_airframe
+from planfly.pipeline import JudgedFlight, fly_and_judge
+from planfly.reference_flights import airframe_answer, deciding_parameter, find_deciding_parameter
+from planfly.served_flights import ServedLog
+from planfly.terminal.results import judge_log
+from tests.setups import setup_maker
+
+LEG = Place("leg", 4)
+LOW = make_finding("clearance", LEG, ok=False, reason="", flown=52.0, limit=60.0, margin=-8.0)
+HEIGHTS = make_finding("slope", LEG, ok=True, reason="", facts=[Fact("height error", -8.4, "m")])
+WIDE = make_finding("corridor", LEG, ok=False, reason="", flown=210.0, limit=180.0, margin=-30.0)
+
+
+class Flights:
+    """Flies by a test, and counts."""
+
+    def __init__(self, passes: Callable[[ArduPilotParameters], bool]) -> None:
+        self.count = 0
+        self._passes = passes
+
+    def __call__(self, parameters: ArduPilotParameters) -> bool:
+        self.count += 1
+        return self._passes(parameters)
+
+
+@pytest.mark.parametrize(
+    ("most", "passing"),
+    [(2.81, 2.8), (2.79, 2.6), (1.21, 1.2), (1.19, 1.0), (1.0, 1.0)],
+)
+def test_the_nearest_value_that_passes_is_named(most: float, passing: float) -> None:
+    flights = Flights(lambda new: new.tecs_height_demand_time <= most)
+    found = deciding_parameter(default_parameters(), (LOW, HEIGHTS), flights)
+    assert found is not None
+    assert (found.name, found.current, found.passing, found.unit) == ("TECS_HDEM_TCONST", 3.0, passing, "s")
+    assert (found.rule, found.place, found.off) == ("clearance", LEG, -8.4)
+    # The farthest value, and the nine between it and the present one by halves.
+    assert flights.count <= 5
+
+
+def test_what_failed_says_where_to_look_first() -> None:
+    passes = Flights(lambda new: new.tecs_height_demand_time < 2.0 or new.navl1_period < 15.0)
+    found = deciding_parameter(default_parameters(), (LOW,), passes)
+    assert found is not None
+    assert found.name == "TECS_HDEM_TCONST"
+    found = deciding_parameter(default_parameters(), (WIDE,), passes)
+    assert found is not None
+    assert (found.name, found.passing, found.off) == ("NAVL1_PERIOD", 14.0, 210.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "passes", "passing"),
+    [
+        ("WP_RADIUS", lambda new: new.wp_radius <= 62.0, 60.0),
+        ("WP_RADIUS", lambda new: new.wp_radius >= 118.0, 120.0),
+        ("TECS_CLMB_MAX", lambda new: new.tecs_climb_max >= 6.2, 6.5),
+    ],
+)
+def test_both_ways(name: str, passes: Callable[[ArduPilotParameters], bool], passing: float) -> None:
+    found = deciding_parameter(default_parameters(), (WIDE,), passes)
+    assert found is not None
+    assert (found.name, found.passing) == (name, passing)
+
+
+def test_none_where_none_decides() -> None:
+    flights = Flights(lambda new: False)
+    assert deciding_parameter(default_parameters(), (WIDE,), flights) is None
+    assert flights.count == 8
+    assert deciding_parameter(default_parameters(), (HEIGHTS,), flights) is None
+
+
+def test_a_value_beyond_the_farthest_is_not_tried() -> None:
+    quick = default_parameters().changed(TECS_HDEM_TCONST=1.0)
+    seen: list[float] = []
+
+    def passes(new: ArduPilotParameters) -> bool:
+        seen.append(new.tecs_height_demand_time)
+        return False
+
+    assert deciding_parameter(quick, (LOW,), passes) is None
+    assert set(seen) == {1.0}
+
+
+def test_findings_that_pass_are_not_blamed() -> None:
+    fine: Finding = make_finding("corridor", LEG, ok=True, reason="")
+    assert deciding_parameter(default_parameters(), (fine,), lambda new: True) is None
+
+
+# ----------------------------------------------------------------------
+# A climb over a hill that the aircraft clears and ArduPlane does not, for it follows a slope three seconds late.
+
+AIRCRAFT = load_aircraft("aerosonde")
+SLOPE = 0.1
+REQUIRED = 100.0
+
+
+def over_a_hill(spare: float) -> FlightSetup:
+    """A climb of 1 in 10 over a hill under its middle, that clears it by what is required and ``spare`` m more.
+
+    Line less Gaussian is least 0.1 sigma^2 / height before the peak, by half of 0.1 of that less than over the peak.
+    """
+    sigma = 300.0
+    height = 450.0 - REQUIRED - spare
+    height -= 0.5 * SLOPE * SLOPE * sigma**2 / height
+    points = [[0, 0, 300], [0, 2000, 300], [0, 5000, 600], [0, 7000, 600]]
+    peak = {"east_m": 0.0, "north_m": 3500.0, "height_m": height, "sigma_m": sigma}
+    made = setup_maker(AIRCRAFT)(
+        points, terrain={"kind": "peaks", "peak": [peak]}, limits={"min_clearance_m": REQUIRED}
+    )
+    return replace(made, parameters=load_parameters(AIRCRAFT))
+
+
+@pytest.fixture(scope="module")
+def flown(tmp_path_factory: pytest.TempPathFactory) -> tuple[JudgedFlight, Path]:
+    setup, log = over_a_hill(4.7), tmp_path_factory.mktemp("hill") / "flight.mcap"
+    return fly_and_judge(setup, load_airframe(setup.scenario), log), log
+
+
+def test_the_aircraft_can_and_arduplane_cannot(flown: tuple[JudgedFlight, Path]) -> None:
+    """2.5 m/s of climb, three seconds late, are 7.5 m: too low by 3 m; a lag of 4.7 / 2.5 = 1.9 s would pass."""
+    judged, _ = flown
+    climb = 25.0 * math.sin(math.atan(SLOPE))
+    assert [(level.name, level.flyable) for level in judged.verdict.levels] == [
+        ("geometry", True),
+        ("airframe", True),
+        ("autopilot", False),
+    ]
+    deciding = judged.verdict.deciding
+    assert deciding is not None
+    assert (deciding.name, deciding.current, deciding.rule, deciding.place.index) == (
+        "TECS_HDEM_TCONST", 3.0, "clearance", 1,
+    )  # fmt: skip
+    assert deciding.passing == pytest.approx(4.7 / climb, abs=0.4)
+    # And what the start of the climb takes.
+    assert deciding.off == pytest.approx(-3.0 * climb, abs=2.5)
+    second = judged.verdict.lines[1]
+    assert second.startswith("The aircraft can, ArduPlane with these parameters cannot: TECS_HDEM_TCONST 3 puts it ")
+    assert second.endswith(f"m low on leg 1, to item 2; {deciding.passing:g} would pass")
+
+
+def test_a_served_flight_tells_stations_which_parameter_decides(
+    flown: tuple[JudgedFlight, Path], tmp_path: Path
+) -> None:
+    judged, _ = flown
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
+    served.write(judged.track)
+    told = served.finish(judged.ended, lambda: False)
+    deciding = judged.verdict.deciding
+    assert deciding is not None
+    assert not told.flyable
+    assert deciding_text(deciding) in [text.text for text in told.texts]
+
+
+@pytest.mark.parametrize("patience", [0, 400])
+def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
+    patience: int, flown: tuple[JudgedFlight, Path], tmp_path: Path
+) -> None:
+    """At once, and after the airframe's flight of some 280 s: nothing is lost but what was not known yet."""
+    judged, _ = flown
+    asked = itertools.count()
+    served = ServedLog(tmp_path / "flight-001.mcap", judged.setup, AIRCRAFT)
+    served.write(judged.track)
+    told = served.finish(judged.ended, lambda: next(asked) >= patience)
+    assert not told.flyable
+    assert next(asked) == patience + 1
+    log = read_log(tmp_path / "flight-001.mcap")
+    assert log.complete
+    assert log.recorded_verdict is not None
+    assert log.recorded_verdict["flyable"] is False
+    assert judged.beside is not None
+    assert log.beside == (None if patience == 0 else replace(judged.beside, deciding=None))
+
+
+def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:
+    judged, path = flown
+    log = read_log(path)
+    assert log.beside == judged.beside
+    assert verdict_json(judge_log(log)) == verdict_json(judged.verdict)
+
+
+def test_nothing_is_looked_for_where_nothing_failed() -> None:
+    setup = over_a_hill(30.0)
+    judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    assert judged.verdict.flyable
+    assert judged.beside is not None
+    assert judged.beside.airframe == airframe_answer(setup, AIRCRAFT)
+    assert judged.beside.deciding is None
+    assert find_deciding_parameter(setup, AIRCRAFT, judged.verdict) is None
+
+
+def test_planflys_guidance_has_no_flight_beside_it() -> None:
+    setup = replace(over_a_hill(30.0), parameters=None)
+    judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
+    assert judged.beside is None
+    assert [level.name for level in judged.verdict.levels] == ["geometry", "airframe"]
+
+
+def test_the_airframe_knows_where_it_is_whatever_the_autopilot_does() -> None:
+    lost = replace(over_a_hill(30.0), nav="gnss", parameters=default_parameters())
+    assert airframe_answer(lost, AIRCRAFT) == airframe_answer(replace(lost, nav="perfect"), AIRCRAFT)

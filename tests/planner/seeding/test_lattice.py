@@ -1,0 +1,220 @@
+"""The cheapest way over a lattice: back out of a trap, round to climb, from and to courses, and none where none is."""
+
+import math
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from aircraft.path_limits import Limits
+from planner.evaluation.certify_kernels import turn_and_roll_lengths
+from planner.evaluation.encoding import rotated_frame
+from planner.evaluation.problem import Problem, ProblemArrays, make_problem
+from planner.seeding import lattice as lattice_routes
+from planner.seeding.lattice import (
+    LEAST_STEP,
+    MOST_LATTICE,
+    Lattice,
+    cheapest_lattice_route,
+    lattice_route,
+    make_lattice,
+    pulled_taut,
+    turning_step,
+)
+from world.kernels import Records
+from world.scenario import Scenario
+
+MakeData = Callable[..., ProblemArrays]
+
+
+@pytest.fixture
+def make_data(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> MakeData:
+    """Level ground, slopes of 20 degrees; 6 km from 150 m to 150 m."""
+
+    def make(threats: list[dict[str, float]], **ends: object) -> ProblemArrays:
+        limits = {"max_climb_deg": 20, "max_dive_deg": 20}
+        area = {"east_m": [-2000, 8000], "north_m": [-3000, 3000], "ceiling_amsl_m": 500}
+        scenario = small(terrain={"kind": "flat", "amsl_m": 0}, threats=threats, limits=limits, area=area)
+        return make_problem(scenario, make_limits(scenario)).search._replace(**ends)
+
+    return make
+
+
+def lattice(layers: int = 1, goal_layer: int = 0, pitch: float = 100.0) -> Lattice:
+    """Steps of 500 m: two places behind the start, two to either side, and two beyond the destination 3 km on."""
+    return Lattice(500.0, 2, 2, 11, 5, 8, 150.0, pitch, layers, 0, goal_layer)
+
+
+def route_of(data: ProblemArrays, made: Lattice, courses: int = 2) -> Records:
+    return cheapest_lattice_route(data, rotated_frame(data.start, data.destination), made, courses, 100_000)
+
+
+def test_in_the_open_the_way_is_straight(make_data: MakeData) -> None:
+    cells = route_of(make_data([]), lattice())
+    assert cells["along"].tolist() == list(range(7))
+    assert not cells["across"].any()
+
+
+def test_the_way_out_of_a_trap_leads_back(make_data: MakeData) -> None:
+    # Spheres ahead, and ahead on both sides, about the start: the free places are behind it.
+    trap = [
+        {"east_m": east, "north_m": north, "amsl_m": 150, "kill_radius_m": 240, "kill_scale_m": 50}
+        for east, north in ((500, 0), (500, 500), (500, -500), (0, 500), (0, -500))
+    ]
+    cells = route_of(make_data(trap), lattice())
+    assert len(cells) > 0
+    assert cells["along"].min() < 0
+    free = {(0, 0)} | {(int(a), int(b)) for a, b in zip(cells["along"], cells["across"], strict=True)}
+    assert not free & {(1, 0), (1, 1), (1, -1), (0, 1), (0, -1)}
+
+
+def test_a_climb_without_enough_way_goes_round(make_data: MakeData) -> None:
+    # A step of 500 m climbs 176 m at 19.5 degrees: one layer of 170 m, and 12 of them take 12 steps, not 6.
+    data = make_data([], ceiling=5000.0)
+    cells = route_of(data, lattice(layers=13, goal_layer=12, pitch=170.0))
+    assert cells["layer"].tolist()[-1] == 12
+    assert (np.diff(cells["layer"]) <= 1).all()
+    assert len(cells) >= 13
+    courses = np.unwrap(np.arctan2(np.diff(cells["across"]), np.diff(cells["along"])))
+    assert np.abs(np.diff(courses)).max() <= math.pi / 2.0 + 1e-9
+
+
+@pytest.mark.parametrize("course", [0.0, 0.5 * math.pi, 1.5 * math.pi])
+def test_the_first_step_turns_no_further_from_the_start_course_than_it_may(make_data: MakeData, course: float) -> None:
+    cells = route_of(make_data([], start_course=course), lattice())
+    first = math.atan2(cells["along"][1], cells["across"][1])
+    away = abs((first - course + math.pi) % (2.0 * math.pi) - math.pi)
+    assert away <= math.pi / 2.0 + 1e-9
+
+
+def test_the_last_step_arrives_on_the_course_that_is_asked_for(make_data: MakeData) -> None:
+    cells = route_of(make_data([], destination_course=1.5 * math.pi), lattice())
+    last = math.atan2(np.diff(cells["along"])[-1], np.diff(cells["across"])[-1])
+    assert abs((last - 1.5 * math.pi + math.pi) % (2.0 * math.pi) - math.pi) <= math.pi / 2.0 + 1e-9
+
+
+def test_where_all_is_closed_there_is_no_way(make_data: MakeData) -> None:
+    wall = [
+        {"east_m": 1500, "north_m": north, "amsl_m": 150, "kill_radius_m": 600, "kill_scale_m": 50}
+        for north in range(-2000, 2001, 500)
+    ]
+    assert len(route_of(make_data(wall), lattice())) == 0
+
+
+def test_a_route_is_pulled_taut_as_far_as_it_stays_free(make_data: MakeData) -> None:
+    missile = {"east_m": 1500, "north_m": 0, "amsl_m": 150, "kill_radius_m": 400, "kill_scale_m": 50}
+    corners = np.array([[0.0, 0.0], [500.0, 500.0], [1000.0, 500.0], [1500.0, 500.0], [2000.0, 500.0], [3000.0, 0.0]])
+    points = np.column_stack([corners, np.full(6, 150.0)])
+    assert len(pulled_taut(make_data([]), points)) == 2
+    taut = pulled_taut(make_data([missile]), points)
+    assert 2 < len(taut) < 6
+    np.testing.assert_array_equal(taut[[0, -1]], points[[0, -1]])
+    # 15 m are kept from the sphere.
+    for a, b in pairwise(taut):
+        near = min(math.dist(a + share * (b - a), (1500.0, 0.0, 150.0)) for share in np.linspace(0.0, 1.0, 400))
+        assert near >= 415.0 - 1e-6
+
+
+# ----------------------------------------------------------------------
+# Lattices cover the map, have steps that turns leave room in, and give routes from end to end.
+
+
+@pytest.fixture
+def pocket(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> Problem:
+    """A pocket of missiles about the start, open away from the destination."""
+    places = [(1300, north) for north in range(-1200, 1201, 400)]
+    places += [(east, north) for east in (500, 900) for north in (-1200, 1200)]
+    missiles = [
+        {"east_m": east, "north_m": north, "amsl_m": 300, "kill_radius_m": 480, "kill_scale_m": 70}
+        for east, north in places
+    ]
+    area = {"east_m": [-4000, 8000], "north_m": [-4000, 4000], "ceiling_amsl_m": 500}
+    scenario = small(terrain={"kind": "flat", "amsl_m": 0}, threats=missiles, area=area)
+    return make_problem(scenario, make_limits(scenario))
+
+
+def places_of(lattice: Lattice) -> tuple[float, float, float, float]:
+    """West, east, south and north of a lattice along the axes, from the start, m."""
+    step = lattice.step
+    return (
+        -lattice.behind * step,
+        (lattice.along - lattice.behind - 1) * step,
+        -lattice.right * step,
+        (lattice.across - lattice.right - 1) * step,
+    )
+
+
+@pytest.mark.parametrize("step", [400.0, 250.0])
+def test_a_lattice_covers_the_map_and_stands_on_both_ends(pocket: Problem, step: float) -> None:
+    data = pocket.search
+    frame = rotated_frame(data.start, data.destination)
+    lattice = make_lattice(data, frame, step)
+    assert lattice.step <= step
+    assert (lattice.goal - lattice.behind) * lattice.step == pytest.approx(frame.length)
+    west, east, south, north = places_of(lattice)
+    for covered, edge in ((west, data.west), (-east, -data.east), (south, data.south), (-north, -data.north)):
+        away = covered - (edge - (data.start[0] if edge in (data.west, -data.east) else 0.0))
+        assert 0.0 <= away + 1e-6 < lattice.step + 4000.0
+    heights = lattice.low + lattice.pitch * np.arange(lattice.layers)
+    assert heights[lattice.start_layer] == pytest.approx(data.start[2])
+    assert abs(heights[lattice.goal_layer] - data.destination[2]) <= 0.5 * lattice.pitch
+    assert heights[-1] <= data.ceiling
+
+
+def test_a_lattice_that_would_be_too_large_has_longer_steps(pocket: Problem) -> None:
+    data = pocket.search
+    lattice = make_lattice(data, rotated_frame(data.start, data.destination), 20.0)
+    assert lattice.along * lattice.across * lattice.layers * 8 <= MOST_LATTICE
+    assert lattice.step > 20.0
+
+
+def test_a_step_holds_two_right_angles(pocket: Problem) -> None:
+    data = pocket.search
+    step = turning_step(data)
+    if not data.legs_hold_turns:
+        assert step == LEAST_STEP
+        return
+    square = np.array([[0.0, 0.0, 0.0], [step, 0.0, 0.0], [step, step, 0.0], [0.0, step, 0.0]]) + data.start
+    turns, rolls = turn_and_roll_lengths(data, square)
+    assert turns[1] + rolls[1] < step
+    assert step < 1.5 * (turns[1] + rolls[1]) + 50.0
+
+
+def test_a_route_leaves_a_pocket_and_passes_no_missile(pocket: Problem) -> None:
+    data = pocket.search
+    route = lattice_route(data, rotated_frame(data.start, data.destination), 400.0)
+    np.testing.assert_array_equal(route[[0, -1]], [data.start, data.destination])
+    # Not through the missiles ahead: the way is much longer than the straight line.
+    assert np.linalg.norm(np.diff(route, axis=0), axis=1).sum() > 1.08 * math.dist(data.start, data.destination)
+    threats = pocket.scenario.threats
+    for a, b in pairwise(route):
+        for share in np.linspace(0.0, 1.0, 200):
+            point = a + share * (b - a)
+            assert min(math.dist(point, place) for place in threats.position) > 480.0
+
+
+def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = pocket.search
+    frame = rotated_frame(data.start, data.destination)
+    made = make_lattice(data, frame, 500.0)
+    whole = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
+    asked: list[int] = []
+    monkeypatch.setattr(lattice_routes, "STATES_AT_ONCE", 7)
+    sliced = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
+    assert len(whole) > 0
+    assert len(asked) > 10
+    np.testing.assert_array_equal(whole, sliced)
+    # Not one state more than is allowed: the slices that find it are as many as are needed.
+    needed = 7 * (len(asked) - 1)
+    assert len(cheapest_lattice_route(data, frame, made, 2, needed)) == 0
+    assert len(cheapest_lattice_route(data, frame, made, 2, needed + 7)) == len(whole)
+
+
+def test_what_a_pause_raises_ends_the_search(pocket: Problem) -> None:
+    def end() -> None:
+        raise KeyboardInterrupt
+
+    data = pocket.search
+    with pytest.raises(KeyboardInterrupt):
+        lattice_route(data, rotated_frame(data.start, data.destination), 500.0, end)

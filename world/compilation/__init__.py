@@ -1,1 +1,0 @@
-"""Compiling kernels: who is told of it."""

@@ -1,0 +1,284 @@
+"""Files: small text files read with one-line errors, and outputs that appear complete or not at all."""
+
+import contextlib
+import errno
+import os
+import re
+import stat
+import tempfile
+import tomllib
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from world.errors import PlanflyError
+from world.interruption import unfinished, uninterrupted
+
+# ----------------------------------------------------------------------
+# Small text files that a person names: missions, parameters, scenarios.
+
+# Names with dots between them, as of tables within tables.
+_DOTTED = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
+_MOST_DOTS = 100
+
+
+class TextLine(NamedTuple):
+    """A line of a file, as messages name it.  number: from 1.
+
+    >>> print(TextLine("a.waypoints", 4))
+    a.waypoints:4
+    """
+
+    file: str
+    number: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.number}"
+
+
+def read_small_file(path: Path, most: int, kind: str, error: type[PlanflyError]) -> bytes:
+    """Bytes of a file of this kind, of ``most`` bytes at most.
+
+    Raises ``error``, in one line, for a file that is missing, larger, or not to be read.
+
+    >>> from world.errors import MissionError
+    >>> read_small_file(Path("missing.plan"), 100, "mission", MissionError)
+    Traceback (most recent call last):
+    world.errors.MissionError: missing.plan: cannot be read: No such file or directory
+    """
+    try:
+        return read_at_most(path, most, kind)
+    except OSError as problem:
+        raise error(f"{path}: cannot be read: {problem.strerror}", file=path) from problem
+    except ValueError as problem:
+        raise error(f"{path}: {problem}", file=path) from None
+
+
+def read_at_most(path: Path, most: int, kind: str) -> bytes:
+    """Bytes of a file of this kind, of ``most`` bytes at most.
+
+    Raises OSError, and ValueError for a larger one and for what is none: a named pipe that nobody writes into would be
+    waited for, and a device has no end.  A pipe of the shell (``/dev/stdin``, ``/dev/fd/63``) is read to its end.
+
+    >>> read_at_most(Path("/dev/zero"), 100, "mission")
+    Traceback (most recent call last):
+    ValueError: not a plain file: a mission file is expected
+    """
+    status = path.stat()
+    if stat.S_ISREG(status.st_mode) and status.st_size > most:
+        raise ValueError(f"{status.st_size:,} bytes: a {kind} file has at most {most:,}")
+    given = stat.S_ISFIFO(status.st_mode) and str(path).startswith(("/dev/fd/", "/dev/stdin", "/proc/self/fd/"))
+    if not (stat.S_ISREG(status.st_mode) or stat.S_ISDIR(status.st_mode) or given):
+        raise ValueError(f"not a plain file: a {kind} file is expected")
+    with path.open("rb") as file:
+        data = file.read(most + 1)
+    if len(data) > most:
+        raise ValueError(f"more than {most:,} bytes: a {kind} file has no more")
+    return data
+
+
+def whole_path(path: Path) -> str:
+    """The absolute path of a file or folder, links followed as far as they lead: one that leads to itself stays.
+
+    >>> whole_path(Path("/usr/../none/"))
+    '/none'
+    """
+    try:
+        return os.path.realpath(path)
+    except ValueError:  # a NUL character
+        return str(path.absolute())
+
+
+def read_toml(path: Path, kind: str, most: int = 2**20) -> dict[str, Any]:
+    """The table of a TOML file of this kind.  Raises OSError, and ValueError as `read_at_most` and `toml_table` do.
+
+    >>> read_toml(Path("/dev/null"), "gains")
+    Traceback (most recent call last):
+    ValueError: not a plain file: a gains file is expected
+    """
+    return toml_table(read_at_most(path, most, kind).decode("utf-8"))
+
+
+def toml_table(text: str) -> dict[str, Any]:
+    """The table of a TOML text.
+
+    Raises ValueError for what is none, and for brackets or names within one another without end: the parser takes
+    memory by the square of how many there are.
+
+    >>> toml_table("a.b = 1")
+    {'a': {'b': 1}}
+    """
+    if any(name[0].count(".") > _MOST_DOTS for name in _DOTTED.finditer(text)):
+        raise ValueError(f"a name of more than {_MOST_DOTS} parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ValueError("tables or arrays within one another without end") from None
+
+
+def utf8_text(data: bytes, path: Path, error: type[PlanflyError]) -> str:
+    r"""A file's bytes as text, without a byte order mark; raises ``error`` with line and byte where they are none.
+
+    >>> from world.errors import MissionError
+    >>> utf8_text("\ufeffWind 3 m/s".encode(), Path("a.txt"), MissionError)
+    'Wind 3 m/s'
+    >>> utf8_text(b"one\ntwo\xff", Path("a.txt"), MissionError)
+    Traceback (most recent call last):
+    world.errors.MissionError: a.txt:2: not a text file in UTF-8 (byte 7)
+    """
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as problem:
+        line = data.count(b"\n", 0, problem.start) + 1
+        raise error(f"{path}:{line}: not a text file in UTF-8 (byte {problem.start})", file=path) from problem
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """What a message says after a name or key that is not known: the nearest that is, "" where none is near.
+
+    >>> did_you_mean("jaksboro", ["jacksboro", "tight"]), did_you_mean("valley", ["jacksboro", "tight"])
+    (": did you mean 'jacksboro'?", '')
+    """
+    # Imported here: most runs have no fault to tell.
+    from difflib import get_close_matches
+
+    by_folded = {one.casefold(): one for one in known}
+    near = get_close_matches(name.casefold(), by_folded, n=1)
+    return f": did you mean {by_folded[near[0]]!r}?" if near else ""
+
+
+# ----------------------------------------------------------------------
+# Files that are written whole or not at all, folders that do not outlive their use, targets kept to one process.
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
+
+
+def write_whole(path: Path, data: str | bytes) -> None:
+    """Write a file under a temporary name beside its target and rename it: whole, or not at all.
+
+    Text is written in UTF-8.  A target that is a link stays one: the file that it leads to is replaced.  Raises
+    OSError, which names the target, and leaves what was there.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder:
+    ...     write_whole(Path(folder) / "plan.json", "{}")
+    ...     print((Path(folder) / "plan.json").read_text())
+    {}
+    """
+    content = data.encode("utf-8") if isinstance(data, str) else data
+    try:
+        target = _led_to(path) if path.is_symlink() else path
+        # Cut by bytes, of which a name may have 255: letters may be up to four.
+        name = target.name.encode()[:200].decode("utf-8", "ignore")
+        temporary = target.with_name(f".{name}.{os.getpid()}-{os.urandom(4).hex()}")
+        with uninterrupted(), unfinished(temporary):
+            with temporary.open("xb") as file:
+                file.write(content)
+            temporary.replace(target)
+    except OSError as error:
+        if error.errno is None:
+            raise
+        # The user knows the target, not the temporary name.
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def write_folder(path: Path, files: Mapping[str, bytes]) -> None:
+    """Make a folder that is not there yet, with files by their paths within it: whole, or not at all.
+
+    Raises OSError, which names the folder, and leaves nothing.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as home:
+    ...     write_folder(Path(home) / "made", {"a.txt": b"1", "b/c.txt": b"2"})
+    ...     print((Path(home) / "made" / "b" / "c.txt").read_text())
+    2
+    """
+    temporary = path.with_name(f".{path.name[:50]}.{os.getpid()}-{os.urandom(4).hex()}")
+    try:
+        with uninterrupted(), unfinished(temporary):
+            temporary.mkdir()
+            for name, content in files.items():
+                (temporary / name).parent.mkdir(parents=True, exist_ok=True)
+                (temporary / name).write_bytes(content)
+            temporary.rename(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+def _led_to(link: Path) -> Path:
+    try:
+        return link.resolve()
+    except RuntimeError:
+        raise OSError(errno.ELOOP, os.strerror(errno.ELOOP)) from None
+
+
+@contextlib.contextmanager
+def temporary_folder(prefix: str) -> Iterator[Path]:
+    """Make a folder among the system's temporary files, and remove it with all that is in it.
+
+    >>> with temporary_folder("planfly-") as folder:
+    ...     _ = (folder / "notes").write_text("gone soon")
+    >>> folder.exists()
+    False
+    """
+    folder = Path(tempfile.gettempdir()) / f"{prefix}{os.getpid()}-{os.urandom(8).hex()}"
+    with unfinished(folder):
+        folder.mkdir(mode=0o700)
+        yield folder
+
+
+@contextlib.contextmanager
+def hold(path: Path) -> Iterator[None]:
+    """Keep a file or folder that is there to this process: another that would hold it is refused meanwhile.
+
+    The system lets go of it when the process ends, however that is.  Raises PlanflyError where another holds it, and
+    OSError where it cannot be opened.
+
+    >>> from tempfile import TemporaryDirectory
+    >>> with TemporaryDirectory() as folder, hold(Path(folder)):
+    ...     try:
+    ...         with hold(Path(folder)):
+    ...             print("never")
+    ...     except PlanflyError:
+    ...         print("held")
+    held
+    """
+    with contextlib.ExitStack() as held:
+        try:
+            held.enter_context(_locked(path))
+        except (BlockingIOError, PermissionError) as error:
+            if isinstance(error, PermissionError) and fcntl is not None:
+                raise
+            raise PlanflyError(f"{path}: another planfly is writing there; name another target", file=path) from error
+        yield
+
+
+@contextlib.contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """The system's lock on a file or folder.
+
+    Raises BlockingIOError, on Windows PermissionError, where another has it.
+    """
+    if fcntl is not None:
+        handle = os.open(path, os.O_RDONLY)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            yield
+        finally:
+            os.close(handle)
+        return
+    # Windows locks bytes of files, for readers too, and opens no folder: a file beside stands for either.
+    beside = path.with_name(f".{path.name}.planfly-lock")
+    handle = os.open(beside, os.O_RDWR | os.O_CREAT)
+    try:
+        windows: Any = import_module("msvcrt")
+        windows.locking(handle, windows.LK_NBLCK, 1)
+        yield
+    finally:
+        os.close(handle)
+        with contextlib.suppress(OSError):
+            beside.unlink()
