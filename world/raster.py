@@ -164,8 +164,8 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 # ----------------------------------------------------------------------
 # Elevation files: GeoTIFF, .hgt and .npz, read as a window at source resolution.
 #
-# The driver is explicit and chosen by the file's first bytes, so that nothing that merely names another file
-# (VRT, a URL, a `/vsi` path) is ever opened.  Heights are taken as above mean sea level and never converted.
+# The driver is explicit and chosen by the file's first bytes, so that nothing that merely names another file (VRT, a
+# URL, a `/vsi` path) is ever opened.  Heights are taken as above mean sea level and never converted.
 
 __all__ = ["EMBEDDED", "MOST_PIXELS", "RasterFile", "open_raster", "read_terrain", "tile_bounds"]
 

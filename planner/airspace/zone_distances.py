@@ -20,8 +20,7 @@ Heights = NDArray[np.float32]
 # How deep a leg is in zones, and how long: what a search is charged for it.
 #
 # What is charged is 0 only where the leg keeps out of them.  An exclusion counts along the whole part of the leg that
-# is
-# level with its shape, so that a leg may be charged that passes a hollow of it.
+# is level with its shape, so that a leg may be charged that passes a hollow of it.
 
 # A leg that leaves an inclusion is looked at this often (m), and this many times at most.
 OUTSIDE_PITCH, MOST_PLACES = 100.0, 20

@@ -21,9 +21,9 @@ Floats = NDArray[np.float64]
 # Frames of a path's inner waypoints: one straight frame for all of them, or one for each along a route.
 #
 # The idea of Yang, Tang and Lozano (CEC 2014, section III) is a frame whose axis leads where the path leads: each
-# waypoint has its own interval along it, and deviates across it.  Their axis is the line from start to destination, and
-# no path turns back along that.  Where the axis is a route instead, a chain of straight pieces, each waypoint has the
-# frame of its own piece, and along is the length of the route.
+# waypoint has its own interval along it, and deviates across it.  Their axis is the line from start to destination,
+# and no path turns back along that.  Where the axis is a route instead, a chain of straight pieces, each waypoint has
+# the frame of its own piece, and along is the length of the route.
 
 
 # A piece of a route shorter than this (m) has the course of the piece before it.

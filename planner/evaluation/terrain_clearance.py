@@ -25,11 +25,10 @@ Heights = NDArray[np.float32]
 # ----------------------------------------------------------------------
 # How far an autopilot is below or above the legs that it follows late: the height that a plan leaves it for that.
 #
-# Height follows the demand as a first-order lag of `TrackingError.lag` seconds: on a long climb it is lag x climb rate
-# low, and that far high on a descent; after a change of slope the difference decays over the lag's length, from leg to
-# leg.  A leg that changes height by less than a step is demanded at its end's height from its beginning.  So
-# ArduPlane's
-# TECS does it (ardupilot.org, Plane, TECS_HDEM_TCONST; GLIDE_SLOPE_MIN).
+# Height follows the demand as a first-order lag of `TrackingError.lag` seconds: on a long climb it is lag x climb
+# rate low, and that far high on a descent; after a change of slope the difference decays over the lag's length, from
+# leg to leg.  A leg that changes height by less than a step is demanded at its end's height from its beginning.  So
+# ArduPlane's TECS does it (ardupilot.org, Plane, TECS_HDEM_TCONST; GLIDE_SLOPE_MIN).
 
 # How far the aircraft is below a leg at a share f of it, m: steady + slant (1 - f) + rest E(f x decay), where E is the
 # decay; and the most and the least of that and 0.

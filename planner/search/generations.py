@@ -102,17 +102,17 @@ def _stagnant(bests: list[Floats]) -> bool:
 
 
 # ----------------------------------------------------------------------
-# An estimation of distribution algorithm whose samples are waypoints: what a waypoint is worth is the best path of it.
+# An estimation of distribution algorithm whose samples are waypoints: what a waypoint is worth is the best path of
+# it.
 #
 # A factorised distribution algorithm (Mühlenbein and Mahnig, "FDA - a scalable evolutionary algorithm for the
-# optimization of additively decomposed functions", Evolutionary Computation 7, 1999) of the paper's subspaces: "to find
-# one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent waypoints satisfy all
-# the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).  UMDA ranks whole paths, and a good
-# waypoint of a bad path is lost with it.  Here the populations of all intervals are joined in every way at once
-# (`planner.seeding.waypoint_chains`), each waypoint is ranked by the best path through it, and the better ones that lie
-# apart make the interval's next density (`planner.optimisers.niche_sampling`): several sides of the obstacles live
-# beside
-# each other until one is shorter.
+# optimization of additively decomposed functions", Evolutionary Computation 7, 1999) of the paper's subspaces: "to
+# find one optimal waypoint in each subspace, so that the line segments from itself to its two adjacent waypoints
+# satisfy all the constraints and objectives" (Yang, Tang and Lozano, CEC 2014, section I).  UMDA ranks whole paths,
+# and a good waypoint of a bad path is lost with it.  Here the populations of all intervals are joined in every way at
+# once (`planner.seeding.waypoint_chains`), each waypoint is ranked by the best path through it, and the better ones
+# that lie apart make the interval's next density (`planner.optimisers.niche_sampling`): several sides of the
+# obstacles live beside each other until one is shorter.
 
 # Generations at most: the last moves waypoints by decimetres.  Beside seeds, whose best path is tightened in any case,
 # fewer of fewer waypoints do: this share of the population at first.

@@ -112,8 +112,8 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
 # Other sides of the obstacles: routes that the cheapest grid routes do not take, each shortened.
 #
 # A grid says which side is shorter only as well as it sees gaps.  So grids that see obstacles smaller than they are
-# propose a route for each choice of sides, and each is shortened: what comes of it is safe and short, or it is not, and
-# only then is it known what the side is worth.
+# propose a route for each choice of sides, and each is shortened: what comes of it is safe and short, or it is not,
+# and only then is it known what the side is worth.
 
 # Stages of the grids; shares of a step by which they look at the ground, have places across, and see spheres smaller.
 STAGES, SPREAD, RATIO, SHRINKS = 50, 0.2, 1.0 / 3.0, (0.2, 0.5)
@@ -160,11 +160,12 @@ def shorten_best(search: Search) -> None:
 
 
 # ----------------------------------------------------------------------
-# Paths that turn back, or go round to climb: searched for in a frame that follows a route, where a straight one fails.
+# Paths that turn back, or go round to climb: searched for in a frame that follows a route, where a straight one
+# fails.
 #
 # The straight frame holds no path that gets further from the destination along the line to it.  A lattice search
-# finds a
-# route that may; a frame along that route then holds paths about it, and they are fitted and tightened as elsewhere.
+# finds a route that may; a frame along that route then holds paths about it, and they are fitted and tightened as
+# elsewhere.
 
 # A safe path this many times as long as the straight line may be longer than one that turns back.
 LONG_WAY = 1.25

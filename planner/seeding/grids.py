@@ -203,8 +203,7 @@ def set_prices(
 # Cheapest routes over grids in the rotated frame, stage by stage: the compiled part of `planner.seeding.grids`.
 #
 # A dynamic programme over forward steps.  It leaves out every cell through which no route is cheaper than a bound;
-# where
-# a route within the bound is found it is the cheapest of all.
+# where a route within the bound is found it is the cheapest of all.
 
 
 # Steps across a grid's cell that one stage forward may make.

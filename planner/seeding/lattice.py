@@ -26,9 +26,9 @@ Bytes = NDArray[np.int8]
 # ----------------------------------------------------------------------
 # Cheapest routes over a lattice of places, heights and courses: the compiled part of `planner.seeding.lattice`.
 #
-# A search after Hart, Nilsson and Raphael (A*, 1968) over states of a place, a layer and one of eight courses.  A step
-# goes to a place beside the last, turns by no more than a right angle, and climbs and sinks no more than the limits
-# allow; so a route that needs more way to climb than there is goes round in the lattice.
+# A search after Hart, Nilsson and Raphael (A*, 1968) over states of a place, a layer and one of eight courses.  A
+# step goes to a place beside the last, turns by no more than a right angle, and climbs and sinks no more than the
+# limits allow; so a route that needs more way to climb than there is goes round in the lattice.
 
 
 # Steps to the eight places beside a place, along and across, in the order of their courses.

@@ -35,9 +35,8 @@ Ints = NDArray[np.int64]
 # What routes over a grid cost that pass each obstacle on each of its sides: the compiled part of side routes.
 #
 # Two dynamic programmes over the same grid, from the start and from the destination, meet in every cell: their sum is
-# the
-# cost of the cheapest route through it.  The least sum to the left of an obstacle belongs to the cheapest of all routes
-# that pass it on the left, and so for every obstacle and side, of the same two programmes.
+# the cost of the cheapest route through it.  The least sum to the left of an obstacle belongs to the cheapest of all
+# routes that pass it on the left, and so for every obstacle and side, of the same two programmes.
 
 
 # Sides on which a route passes an obstacle, by the quarter of directions about its middle.
