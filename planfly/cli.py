@@ -52,13 +52,13 @@ def _outcome(argv: Sequence[str] | None) -> int:
 def _command(args: argparse.Namespace) -> int:
     # Imported here: pydantic and numba take longer than --help may.
     from planfly.commands.registry import find_command
-    from planfly.first_start import announced_kernels
+    from planfly.first_start import warm_up
     from planfly.kernel_units.unit_kernels import COMMAND_UNITS
     from planfly.terminal.answers.giving import asked_output
     from world.errors import PlanflyError
 
     try:
-        kernels = announced_kernels(*COMMAND_UNITS.get(args.command, ()))
+        kernels = warm_up(*COMMAND_UNITS.get(args.command, ()))
         with tolerate_closed_output(), asked_output(args), kernels:
             return find_command(args.command)(args)
     except PlanflyError as error:

@@ -103,7 +103,7 @@ _shared: set[str] = set()
 
 
 @contextmanager
-def announced_kernels(*units: str) -> Iterator[None]:
+def warm_up(*units: str) -> Iterator[None]:
     """Say once what is compiled meanwhile, before it begins; where all is in the cache this costs nothing.
 
     units: of `planfly.kernel_units`, longest first: what the work will call.  They are compiled in two processes, and
@@ -122,16 +122,16 @@ def announced_kernels(*units: str) -> Iterator[None]:
         yield
 
 
-def announcing(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
-    """Run a function of the public API under `announced_kernels`."""
+def with_warm_up(*units: str) -> Callable[[Callable[_Taken, _Given]], Callable[_Taken, _Given]]:
+    """Run a function of the public API under `warm_up`."""
 
     def decorate(verb: Callable[_Taken, _Given]) -> Callable[_Taken, _Given]:
         @functools.wraps(verb)
-        def announced(*args: _Taken.args, **kwargs: _Taken.kwargs) -> _Given:
-            with announced_kernels(*units):
+        def warmed(*args: _Taken.args, **kwargs: _Taken.kwargs) -> _Given:
+            with warm_up(*units):
                 return verb(*args, **kwargs)
 
-        return announced
+        return warmed
 
     return decorate
 

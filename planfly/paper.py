@@ -21,7 +21,7 @@ from planfly.pipeline import Advance, make_plan
 from planner.plan import Objective, Violation
 from planner.search.algorithms import find_algorithm
 from world.files import write_whole
-from world.interruption import deaf_children, end_children, end_when_told
+from world.interruption import children_ignore_sigint, end_children, end_with_parent
 from world.scenario import Scenario, load_scenario, with_planner
 
 Floats = NDArray[np.float64]
@@ -180,10 +180,10 @@ def _results(tasks: list[tuple[int, str, int]], count: int) -> Iterator[SeededPl
     if count == 1:
         yield from (plan_once(*task) for task in tasks[1:])
         return
-    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_when_told)
+    pool = ProcessPoolExecutor(count, mp_context=get_context("spawn"), initializer=end_with_parent)
     try:
         # All of them are started here.
-        with deaf_children():
+        with children_ignore_sigint():
             results = pool.map(_plan_task, tasks[1:])
         yield from results
     except BaseException:

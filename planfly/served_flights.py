@@ -36,7 +36,7 @@ from planfly.pipeline import make_setup
 from planfly.reference_flights import judge_with_flights_beside
 from world.errors import PlanflyError
 from world.frames import to_geo
-from world.interruption import end_when_told
+from world.interruption import end_with_parent
 from world.scenario import Scenario, load_scenario, with_flight
 
 DEFAULT_SCENARIO = "jacksboro"
@@ -94,7 +94,7 @@ def open_served(options: ServeOptions) -> ServedScenario:
 def fly_process(connection: Connection, options: ServeOptions) -> None:
     """Run the process that flies."""
     in_service = threading.Event()
-    end_when_told(in_service)
+    end_with_parent(in_service)
     factory = ServedFlights(options)
     factory.warm()
     # A signal to the whole group reaches the link too, which orders this process to end: its log is closed first.

@@ -127,13 +127,13 @@ def _remove(path: Path) -> bool:
 
 
 @contextlib.contextmanager
-def deaf_children() -> Iterator[None]:
+def children_ignore_sigint() -> Iterator[None]:
     """Processes that are started inside never hear Ctrl-C, which reaches all of a terminal's: their parent ends them.
 
     A signal that comes meanwhile is not lost: this process hears it at the end.
 
     >>> from multiprocessing import Process
-    >>> with deaf_children():
+    >>> with children_ignore_sigint():
     ...     child = Process(target=print)
     """
     # Imported here: few commands have children, and --help answers at once.
@@ -152,13 +152,13 @@ def deaf_children() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def end_when_told(in_service: threading.Event | None = None) -> None:
+def end_with_parent(in_service: threading.Event | None = None) -> None:
     """Have SIGTERM, and the end of its parent, end this process at once; its unfinished files are removed.
 
     For a child process.  in_service: once it is set, the process notices its parent's end by itself.
 
     >>> import multiprocessing
-    >>> child = multiprocessing.get_context("spawn").Process(target=end_when_told)
+    >>> child = multiprocessing.get_context("spawn").Process(target=end_with_parent)
     """
     # Imported here: few processes are children, and --help answers at once.
     import multiprocessing

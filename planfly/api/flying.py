@@ -14,7 +14,7 @@ from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.api.planning import Wind, changed_scenario
 from planfly.crash_safe_log import MOST_HOURS, MOST_MEGABYTES, FlightLimits
-from planfly.first_start import announcing
+from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.open_mission import (
     NamedFences,
@@ -108,7 +108,7 @@ class ExportedFiles:
 FencePaths = str | Path | Sequence[str | Path]
 
 
-@announcing(*FLYING)
+@with_warm_up(*FLYING)
 def fly(
     mission: Plan | str | Path,
     *,
@@ -164,7 +164,7 @@ def fly(
     return FlownMission(flown.setup, flown.track, flown.verdict, flown.ended, flown.events, kept)
 
 
-@announcing()
+@with_warm_up()
 def check(
     what: FlightLog | FlownMission | Plan | str | Path,
     *,

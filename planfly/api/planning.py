@@ -8,7 +8,7 @@ from typing import overload
 from aircraft.catalog import Aircraft, aircraft_names, find_aircraft, load_aircraft
 from planfly import pipeline
 from planfly.airframe import choose_seed, load_airframe
-from planfly.first_start import announcing
+from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import BOTH, PLANNING
 from planner.plan import Plan, plan_json
 from planner.search.plan_path import plan_path
@@ -68,10 +68,10 @@ def _named(aircraft: str | Path) -> str:
 # ----------------------------------------------------------------------
 # Plan a path.
 
-plan_then_fly = announcing(*BOTH)(pipeline.plan_then_fly)
+plan_then_fly = with_warm_up(*BOTH)(pipeline.plan_then_fly)
 
 
-@announcing(*PLANNING)
+@with_warm_up(*PLANNING)
 def plan(
     scenario: Scenario | str | Path,
     *,

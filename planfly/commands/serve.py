@@ -19,7 +19,7 @@ from planfly.served_flights import ServeOptions, fly_process, open_served
 from planfly.terminal.options import flight_entries, link_access, stop_signals
 from world.errors import PlanflyError
 from world.frames import to_geo
-from world.interruption import deaf_children, end_children
+from world.interruption import children_ignore_sigint, end_children
 from world.scenario import Scenario
 
 # A process that has been told to end may take this long to do so before it is killed, s.
@@ -81,7 +81,7 @@ class _FlightPool:
         self._children = [child for child in self._children if child.is_alive()]
         ours, theirs = self._context.Pipe()
         child = self._context.Process(target=fly_process, args=(theirs, self._options), daemon=True)
-        with deaf_children():
+        with children_ignore_sigint():
             child.start()
         theirs.close()
         self._children.append(child)

@@ -35,25 +35,25 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
     """
     read, write = _signal_pipe()
     heard: list[int] = []
-    deaf = False
+    ended = False
 
     def hear(number: int, frame: FrameType | None = None) -> None:
         # The first interrupts; whatever ends the work then is not to be interrupted.
-        nonlocal deaf
-        if deaf:
+        nonlocal ended
+        if ended:
             return
         if _called_by_compiled_code(frame):
             threading.Timer(_AGAIN, signal.raise_signal, (number,)).start()
             return
-        deaf = True
+        ended = True
         heard.append(number)
         interrupt(number)
 
     def hear_again(lost: "sys.UnraisableHookArgs") -> None:
         # Raised where nobody could take it, in a library's callback: tried again, a little later.
-        nonlocal deaf
+        nonlocal ended
         if isinstance(lost.exc_value, Interrupted):
-            deaf = False
+            ended = False
             threading.Timer(_AGAIN, signal.raise_signal, (lost.exc_value.number,)).start()
         else:
             sys.__unraisablehook__(lost)
@@ -69,7 +69,7 @@ def ended_by_signals(grace: float = GRACE) -> Iterator[list[int]]:
         yield heard
     finally:
         # What a signal would interrupt from here on is the end itself.
-        deaf = True
+        ended = True
 
 
 def _called_by_compiled_code(frame: FrameType | None) -> bool:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numba
 import pytest
 
-from planfly import first_start as announcing
-from planfly.first_start import announced_kernels
+from planfly import first_start
+from planfly.first_start import warm_up
 from planfly.kernel_units.unit_kernels import kernels_of
 from planfly.terminal.output import silent_progress
 from world.compile_events import kernel_is_compiled
@@ -17,9 +17,9 @@ from world.compile_events import kernel_is_compiled
 ROOT = Path(__file__).parents[2]
 CODE = """
 import sys, numpy as np
-from planfly.first_start import announced_kernels
+from planfly.first_start import warm_up
 from world.terrain import steepest_slopes
-with announced_kernels():
+with warm_up():
     for _ in range(2):
         steepest_slopes(np.zeros((2, 2), np.float32), 1.0)
 """
@@ -38,15 +38,15 @@ def shared(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> list[list[str]]:
             assert callable(tell)
             tell(done)
 
-    monkeypatch.setattr(announcing, "compile_units", compile_units)
-    monkeypatch.setattr(announcing, "_shared", set())
+    monkeypatch.setattr(first_start, "compile_units", compile_units)
+    monkeypatch.setattr(first_start, "_shared", set())
     monkeypatch.setattr("world.kernels.cache_folder", lambda: tmp_path)
     return asked
 
 
 def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     whole = len(kernels_of(("scores", "paper")))
-    with announced_kernels("scores", "paper"):
+    with warm_up("scores", "paper"):
         assert capsys.readouterr().err == ""
         assert numba.njit(lambda a: a + 1)(1) == 2
         begun, done = capsys.readouterr().err.splitlines()
@@ -56,18 +56,18 @@ def test_units_are_counted_before_the_work_goes_on(shared: list[list[str]], caps
     assert done.endswith(f" s: 2 of {whole}")
     assert capsys.readouterr().err == ""
     # What this process has shared out it does not share out again.
-    with announced_kernels("scores", "flight"):
+    with warm_up("scores", "flight"):
         kernel_is_compiled()
-    with announced_kernels("scores"):
+    with warm_up("scores"):
         kernel_is_compiled()
     assert shared == [["scores", "paper"], ["flight"]]
 
 
 def test_nothing_is_said_in_silence(shared: list[list[str]], capsys: pytest.CaptureFixture[str]) -> None:
-    with silent_progress(), announced_kernels("scores"):
+    with silent_progress(), warm_up("scores"):
         kernel_is_compiled()
     assert shared == [["scores"]]
-    with silent_progress(), announced_kernels():
+    with silent_progress(), warm_up():
         kernel_is_compiled()
     assert capsys.readouterr().err == ""
 
@@ -82,7 +82,7 @@ def test_a_cache_that_cannot_be_written_is_named(
 ) -> None:
     folder = Path("/proc/none/kernels")
     monkeypatch.setattr("world.kernels.cache_folder", lambda: folder)
-    with announced_kernels("scores"):
+    with warm_up("scores"):
         kernel_is_compiled()
     said = f"compiling the numeric kernels: {folder} cannot be written, and keeps none of them\n"
     assert (capsys.readouterr().err, shared) == (said, [])

@@ -10,7 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from world.interruption import Interrupted, deaf_children, interrupt, remove_unfinished, unfinished, uninterrupted
+from world.interruption import (
+    Interrupted,
+    children_ignore_sigint,
+    interrupt,
+    remove_unfinished,
+    unfinished,
+    uninterrupted,
+)
 
 
 def test_a_signal_waits_for_the_end_of_what_is_done_whole() -> None:
@@ -69,10 +76,10 @@ def test_what_is_gone_is_forgotten(tmp_path: Path) -> None:
 PARENT = """
 import multiprocessing, sys, time
 from pathlib import Path
-from world.interruption import deaf_children, end_children, end_when_told, unfinished
+from world.interruption import children_ignore_sigint, end_children, end_with_parent, unfinished
 
 def work(folder):
-    end_when_told()
+    end_with_parent()
     with unfinished(Path(folder) / "half"):
         (Path(folder) / "half").write_text("")
         Path(folder, "begun").write_text("")
@@ -80,7 +87,7 @@ def work(folder):
 
 if __name__ == "__main__":
     child = multiprocessing.get_context("spawn").Process(target=work, args=(sys.argv[1],), daemon=True)
-    with deaf_children():
+    with children_ignore_sigint():
         child.start()
     print(child.pid, flush=True)
     try:
@@ -127,5 +134,5 @@ def test_children_do_not_hear_ctrl_c_and_go_with_their_parent(number: signal.Sig
 
 def test_children_are_started_where_signals_cannot_be_blocked(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(signal, "pthread_sigmask")
-    with deaf_children():
+    with children_ignore_sigint():
         pass

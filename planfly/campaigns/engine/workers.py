@@ -17,7 +17,7 @@ from urllib.parse import urlsplit
 from planfly.pipeline import Advance
 from world.errors import PlanflyError
 from world.files import temporary_folder
-from world.interruption import Interrupted, deaf_children, end_children, end_when_told
+from world.interruption import Interrupted, children_ignore_sigint, end_children, end_with_parent
 
 # ----------------------------------------------------------------------
 # Workers of this machine stay as many as were asked for, no fewer and no more, whichever of them die.
@@ -125,7 +125,7 @@ def connected(workers: Workers) -> Iterator[Any]:
             number = workers.count or os.cpu_count() or 1
             start_tracker()
             # Ctrl-C in the middle of a worker's imports would have it say so.
-            with deaf_children():
+            with children_ignore_sigint():
                 cluster = stack.enter_context(_local_cluster(cluster_types, number, folder))
             stack.enter_context(kept_workers(cluster, number))
             client = stack.enter_context(cluster_types.Client(cluster, set_as_default=False))
@@ -229,7 +229,7 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
     start_tracker()
     here, there = multiprocessing.get_context("spawn").Pipe(duplex=False)
     child = multiprocessing.get_context("spawn").Process(target=_work, args=(there, work, args, options), daemon=True)
-    with deaf_children():
+    with children_ignore_sigint():
         child.start()
     there.close()
     try:
@@ -250,7 +250,7 @@ def in_own_process(work: Callable[..., Made], *args: Any, advance: Advance | Non
 
 
 def _work(tell: Connection, work: Callable[..., Any], args: tuple[Any, ...], options: dict[str, Any]) -> None:
-    end_when_told()
+    end_with_parent()
     try:
         tell.send(("done", work(*args, advance=lambda *told: tell.send(("told", told)), **options)))
     except Exception as error:
