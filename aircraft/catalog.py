@@ -18,7 +18,7 @@ from world.scenario_tables import names_folder
 # The aircraft we know: metadata read from each model's TOML file, in SI units and radians.
 
 # An aircraft's XML file; JSBSim's own largest is 200 kB.
-MOST_MODEL_BYTES = 32 * 2**20
+MAX_MODEL_BYTES = 32 * 2**20
 _ROOT = Path(__file__).parent
 _DEGREE = math.pi / 180.0
 
@@ -231,7 +231,7 @@ def _hash_files(files: tuple[Path, ...], stamps: tuple[tuple[int, int], ...]) ->
     # The stamps only tell the cache when a file has changed.
     digest = hashlib.sha256()
     for file in files:
-        data = read_at_most(file, MOST_MODEL_BYTES, "model")
+        data = read_at_most(file, MAX_MODEL_BYTES, "model")
         digest.update(f"{file.name}\n{len(data)}\n".encode())
         digest.update(data)
     return digest.hexdigest()

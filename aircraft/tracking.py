@@ -151,7 +151,7 @@ _FIRST_SHARE, _SHARE_STEP = float(SPEED_SHARES[0]), float(SPEED_SHARES[1] - SPEE
 
 # m.  Half width where a scenario states none: the overshoot of an autopilot that follows the legs at ordinary corners,
 # three times over.  The real ArduPlane overshot corners of up to 25 degrees in 5 m/s of wind by at most 10 m.
-LEAST_CORRIDOR = 30.0
+MIN_CORRIDOR = 30.0
 # Radii.  An autopilot that turns as soon as it is a radius from its waypoint cuts a right-angled corner by up to 0.7 of
 # that, and swings out beyond the next leg by as much when it turns too late; the rest is for the wind.
 CORRIDOR_RADII = 2.0
@@ -168,4 +168,4 @@ def corridor_half_width(stated: float | None, acceptance_radius: float | None) -
     """
     if stated is not None:
         return stated
-    return max(LEAST_CORRIDOR, CORRIDOR_RADII * (acceptance_radius or 0.0))
+    return max(MIN_CORRIDOR, CORRIDOR_RADII * (acceptance_radius or 0.0))

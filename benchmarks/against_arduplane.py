@@ -37,7 +37,7 @@ Floats = NDArray[np.float64]
 
 BINARY = Path(os.environ.get("PLANFLY_ARDUPLANE", Path(__file__).parents[2] / "shared" / "autopilot" / "arduplane"))
 # Corners that count: they turn by this much at least (rad), onto a leg of this length at least (m).
-LEAST_TURN, LEAST_LEG = math.radians(10.0), 250.0
+MIN_TURN, MIN_LEG = math.radians(10.0), 250.0
 # Of the leg after a corner, how much of it is looked at: the next corner begins on the rest.
 LOOKED_AT = 0.75
 # Of TECS_CLMB_MAX, what plans climb with, and in turbulence what it leaves of that.
@@ -160,7 +160,7 @@ def _corners(setup: FlightSetup, track: Track) -> tuple[Corner, ...]:
         turn = math.atan2(
             courses[i - 1, 0] * courses[i, 1] - courses[i - 1, 1] * courses[i, 0], float(courses[i - 1] @ courses[i])
         )
-        if abs(turn) < LEAST_TURN or runs[i] < LEAST_LEG:
+        if abs(turn) < MIN_TURN or runs[i] < MIN_LEG:
             continue
         away = track.position[:, :2] - starts[i]
         passed = int(np.argmin(np.hypot(away[:, 0], away[:, 1])))

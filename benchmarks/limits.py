@@ -34,7 +34,7 @@ SPEED_HELD, HEIGHT_HELD = 0.25, 1.0
 # more, but no more than so much.  Guidance may not slow down for arcs here: that would hold the bank in turns too tight
 # for the airspeed.
 FAR = 4000.0
-CROSS_HELD, BANK_HELD, BANK_MOST = 2.0, math.radians(0.5), BANK + math.radians(1.3)
+CROSS_HELD, BANK_HELD, MAX_BANK = 2.0, math.radians(0.5), BANK + math.radians(1.3)
 _BISECTIONS = 7
 
 
@@ -171,7 +171,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
     apart = fly(FAR)
     if apart is None:
         return Limit("leg", wind, wind_from, math.nan, math.nan, same_way)
-    bank = min(max(_held_bank(apart), BANK) + BANK_HELD, BANK_MOST)
+    bank = min(max(_held_bank(apart), BANK) + BANK_HELD, MAX_BANK)
 
     def holds(leg: float) -> bool:
         track = fly(leg)

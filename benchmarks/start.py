@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 ROUNDS = 5
 # What a first start may take, s by the clock on two quiet cores, and a first safe path in a new process, CPU s.
-MOST_COLD, MOST_WARM = 30.0, 0.6
+MAX_COLD, MAX_WARM = 30.0, 0.6
 COLD = {
     "planfly plan jacksboro": ("plan", "jacksboro", "--seed", "1", "--out", "plan.json"),
     "planfly run jacksboro": ("run", "jacksboro", "--seed", "1", "--out", "run"),
@@ -60,12 +60,10 @@ def run() -> dict[str, dict[str, float]]:
             cache = folder / f"kernels-{command[0]}"
             spent = spent_on(("-m", "planfly", *command), folder, NUMBA_CACHE_DIR=str(cache))
             record[f"{title}, empty cache"] = spent._asdict()
-            print(f"  {title}, empty cache: {spent.wall:.1f} (at most {MOST_COLD:g}); {spent.cpu:.1f}")
+            print(f"  {title}, empty cache: {spent.wall:.1f} (at most {MAX_COLD:g}); {spent.cpu:.1f}")
         cache = folder / "kernels-plan"
         warm = [spent_on(("-c", FIRST_SAFE), folder, NUMBA_CACHE_DIR=str(cache)) for _ in range(ROUNDS + 1)][1:]
         spent = Spent(statistics.median(one.wall for one in warm), statistics.median(one.cpu for one in warm))
         record["a first safe path of jacksboro, full cache"] = spent._asdict()
-        print(
-            f"  a first safe path of jacksboro, full cache: {spent.wall:.2f}; {spent.cpu:.2f} (at most {MOST_WARM:g})"
-        )
+        print(f"  a first safe path of jacksboro, full cache: {spent.wall:.2f}; {spent.cpu:.2f} (at most {MAX_WARM:g})")
     return record

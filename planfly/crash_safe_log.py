@@ -20,7 +20,7 @@ from world.interruption import uninterrupted
 # How long a simulated flight may take, how large its log may grow, and what both come to by prediction.
 
 # Longer than the aircraft that planfly has can stay up; a log of 60 rows a second grows by some 20 MB an hour.
-MOST_HOURS, MOST_MEGABYTES = 6.0, 256.0
+MAX_HOURS, MAX_MEGABYTES = 6.0, 256.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class FlightLimits:
     'log limit: 20 MB are written; --max-log raises it'
     """
 
-    hours: float = MOST_HOURS
-    megabytes: float = MOST_MEGABYTES
+    hours: float = MAX_HOURS
+    megabytes: float = MAX_MEGABYTES
 
     def most_ticks(self, dt: float) -> int:
         """Guidance ticks of dt s that are flown at most."""

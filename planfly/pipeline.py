@@ -38,7 +38,7 @@ Advance = Callable[[float, float, str], None]
 # Seconds of flight that are written at a time: some thirty milliseconds of a simulated flight.
 BATCH = 60
 # A mission that by prediction takes this many times the energy carried is not flown: hours would show no more.
-MOST_STORES = 2.0
+MAX_ENERGY_RATIO = 2.0
 _USUAL_LIMITS = FlightLimits()
 
 
@@ -197,12 +197,12 @@ def fly_and_judge(
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
     one passes, flights with other parameters.
 
-    A flight that cannot begin, or that needs more than `MOST_STORES` times the energy carried, has no row and no log:
-    its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it to its
-    end; no log is left then.
+    A flight that cannot begin, or that needs more than `MAX_ENERGY_RATIO` times the energy carried, has no row and no
+    log: its verdict is its route's, and that it did not begin.  Raises FlightError for a program that does not fly it
+    to its end; no log is left then.
     """
     stores = _stores_needed(setup)
-    if stores > MOST_STORES:
+    if stores > MAX_ENERGY_RATIO:
         return _unflown(setup, log, f"not started: it takes {stores:.0f} times the energy carried")
     try:
         if autopilot is None:
@@ -218,7 +218,7 @@ def _stores_needed(setup: FlightSetup) -> float:
     """How many times the energy carried a route takes by prediction; 0 where not even full power all the way would."""
     seconds, full = setup.path.length / float(setup.route.airspeed.min()), setup.envelope.power_full
     most = float(np.nanmax(full, initial=0.0)) * seconds / 3600.0
-    return needed_energy(setup) / setup.battery if most > MOST_STORES * setup.battery else 0.0
+    return needed_energy(setup) / setup.battery if most > MAX_ENERGY_RATIO * setup.battery else 0.0
 
 
 def _fly_program(

@@ -24,7 +24,7 @@ ZONE_BUFFER = 5.0
 # Where a limit is already the aircraft's and the flight failed all the same, this share of it is left.
 TIGHTENED_SHARE = 0.9
 # Bank (deg) below which it is not tightened further.
-LEAST_BANK_DEG = 5.0
+MIN_BANK_DEG = 5.0
 # What follows a round that another follows.
 GO_ON = "tightened and planned again"
 
@@ -113,7 +113,7 @@ def _turns(spec: Spec, scenario: Scenario, failed: list[Finding]) -> list[Tighte
     # Larger arcs to plan with, while the flight keeps its bank.
     bank = scenario.flight.max_bank_deg
     tighter = round(TIGHTENED_SHARE * bank, 2)
-    if tighter < LEAST_BANK_DEG:
+    if tighter < MIN_BANK_DEG:
         return []
     spec.setdefault("flight", {})["max_bank_deg"] = tighter
     return [Tightening("max_bank_deg", bank, tighter)]

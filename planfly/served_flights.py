@@ -41,7 +41,7 @@ from world.scenario import Scenario, load_scenario, with_flight
 
 DEFAULT_SCENARIO = "jacksboro"
 # Most texts about one verdict; the log has the rest.
-_MOST_TEXTS = 4
+_MAX_TEXTS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,7 +203,7 @@ def mission_texts(setup: FlightSetup, verdict: Verdict) -> tuple[StatusText, ...
     route = setup.route
     length = float(np.linalg.norm(np.diff(route.waypoints[:, :2], axis=0), axis=1).sum()) / 1000.0
     size = StatusText(f"mission: {len(route.waypoints)} waypoints, {length:.1f} km; {route.started}", INFO)
-    notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MOST_TEXTS])
+    notes = tuple(StatusText(f"note: {note}", NOTICE) for note in route.notes[:_MAX_TEXTS])
     return (size, *verdict_texts("geometry", verdict), *notes)
 
 
@@ -213,9 +213,9 @@ def verdict_texts(level: str, verdict: Verdict) -> tuple[StatusText, ...]:
     if verdict.flyable:
         return (StatusText(f"verdict ({level}): FLYABLE", INFO),)
     deciding = () if verdict.deciding is None else (StatusText(deciding_text(verdict.deciding), WARNING),)
-    lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MOST_TEXTS]]
-    if len(failed) > _MOST_TEXTS:
-        lines.append(StatusText(f"and {len(failed) - _MOST_TEXTS} more findings", WARNING))
+    lines = [StatusText(f"{_heading(item)}: {item.reason}", WARNING) for item in failed[:_MAX_TEXTS]]
+    if len(failed) > _MAX_TEXTS:
+        lines.append(StatusText(f"and {len(failed) - _MAX_TEXTS} more findings", WARNING))
     return (StatusText(f"verdict ({level}): NOT FLYABLE", WARNING), *deciding, *lines)
 
 

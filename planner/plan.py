@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 
 PLAN_SCHEMA = "planfly.plan/1"
 # Ten thousand waypoints among as many threats are 4 MB.
-MOST_BYTES = 64 * 2**20
+MAX_BYTES = 64 * 2**20
 
 
 class Violation(IntEnum):
@@ -301,7 +301,7 @@ def read_plan(path: Path, *, terrain: str | None = None) -> Plan:
     Raises MissionError or the scenario's errors.
     """
     try:
-        text = read_small_file(path, MOST_BYTES, "plan", MissionError).decode("utf-8")
+        text = read_small_file(path, MAX_BYTES, "plan", MissionError).decode("utf-8")
     except UnicodeDecodeError as error:
         raise MissionError(f"{path}: not a text file in UTF-8 (byte {error.start})", file=path) from error
     return parse_plan(text, str(path), base=path.parent, terrain=terrain)

@@ -21,7 +21,7 @@ from world.scenario import Scenario, from_spec
 Floats = NDArray[np.float64]
 
 GROUND, AIRSPEED = 200.0, 25.0
-LEGS, RUNS, MOST_TURN, MOST_SLOPE = (6, 9), (600.0, 1600.0), math.radians(60.0), math.radians(4.0)
+LEGS, RUNS, MAX_TURN, MAX_SLOPE = (6, 9), (600.0, 1600.0), math.radians(60.0), math.radians(4.0)
 # What an ordinary mission has around it, m.
 ROOM, LOWEST, HIGHEST = 3000.0, 120.0, 600.0
 # What a close mission is close to, and by how much at least and at most: m, and a share of the battery.
@@ -79,10 +79,10 @@ def _waypoints(random: np.random.Generator) -> Floats:
     course = float(random.uniform(0.0, 2.0 * math.pi))
     way = [np.array([0.0, 0.0, GROUND + float(random.uniform(200.0, 400.0))])]
     for leg in range(count):
-        course += float(random.uniform(-MOST_TURN, MOST_TURN)) if leg else 0.0
+        course += float(random.uniform(-MAX_TURN, MAX_TURN)) if leg else 0.0
         run = float(random.uniform(*RUNS))
         low, high = GROUND + LOWEST - way[-1][2], GROUND + HIGHEST - way[-1][2]
-        rise = float(np.clip(run * math.tan(random.uniform(-MOST_SLOPE, MOST_SLOPE)), low, high))
+        rise = float(np.clip(run * math.tan(random.uniform(-MAX_SLOPE, MAX_SLOPE)), low, high))
         way.append(way[-1] + np.array([run * math.sin(course), run * math.cos(course), rise]))
     return np.array(way)
 

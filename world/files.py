@@ -20,7 +20,7 @@ from world.interruption import unfinished, uninterrupted
 
 # Names with dots between them, as of tables within tables.
 _DOTTED = re.compile(r"""[\w"'-]+(?:[ \t]*\.[ \t]*[\w"'-]+)*""")
-_MOST_DOTS = 100
+_MAX_DOTS = 100
 
 
 class TextLine(NamedTuple):
@@ -109,8 +109,8 @@ def toml_table(text: str) -> dict[str, Any]:
     >>> toml_table("a.b = 1")
     {'a': {'b': 1}}
     """
-    if any(name[0].count(".") > _MOST_DOTS for name in _DOTTED.finditer(text)):
-        raise ValueError(f"a name of more than {_MOST_DOTS} parts")
+    if any(name[0].count(".") > _MAX_DOTS for name in _DOTTED.finditer(text)):
+        raise ValueError(f"a name of more than {_MAX_DOTS} parts")
     try:
         return tomllib.loads(text)
     except RecursionError:

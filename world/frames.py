@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 # Terms along each axis of the largest polynomial of a `PolyMap`: of degree 9.
-MOST_TERMS = 10
+MAX_TERMS = 10
 # A polynomial map of the plane: with a and b the position from the centre in half-widths of its rectangle, the sums of
 # u[i, j] * a**i * b**j and of v[i, j] * a**i * b**j over i + j < size.
 POLYMAP = np.dtype(
@@ -31,8 +31,8 @@ POLYMAP = np.dtype(
         ("half_x", np.float64),
         ("half_y", np.float64),
         ("size", np.int64),
-        ("u", np.float64, (MOST_TERMS, MOST_TERMS)),
-        ("v", np.float64, (MOST_TERMS, MOST_TERMS)),
+        ("u", np.float64, (MAX_TERMS, MAX_TERMS)),
+        ("v", np.float64, (MAX_TERMS, MAX_TERMS)),
     ],
     align=True,
 )
@@ -162,7 +162,7 @@ class PolyMap:
 
     @staticmethod
     def from_rows(rows: Floats, residual: float) -> "PolyMap":
-        """Make a map of the rows that `rows` gave; n is at most `MOST_TERMS`."""
+        """Make a map of the rows that `rows` gave; n is at most `MAX_TERMS`."""
         size = rows.shape[1]
         return PolyMap(_record(rows[0, :2], rows[1, :2], rows[2 : 2 + size], rows[2 + size :]), residual)
 
@@ -207,7 +207,7 @@ def fit_polymap(
     check_u, check_v = grid(23)
     wanted, checked = targets(nodes_u, nodes_v), targets(check_u, check_v)
     best: PolyMap | None = None
-    for size in range(2, MOST_TERMS + 1):
+    for size in range(2, MAX_TERMS + 1):
         powers = [(i, j) for i, j in itertools.product(range(size), repeat=2) if i + j < size]
         basis = np.stack([nodes_u**i * nodes_v**j for i, j in powers], axis=1)
         blocks = np.zeros((2, size, size))

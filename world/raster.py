@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 ToSource = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 # A window, or an .npz file, with more pixels than this is refused before it is allocated.
-MOST_PIXELS = 120_000_000
+MAX_PIXELS = 120_000_000
 # Rows of the tile that we ship (matplotlib does, too), and what it states as xmin, xmax, ymin and ymax, deg; a copy of
 # it under another name is known by them, to a hundredth of a pixel.
 _TILE_ROWS, _TILE_EDGES, _SAME_EDGE = 344, (-84.41375, -84.07791667, 36.73291667, 36.44625), 1e-5
@@ -142,8 +142,8 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
         with zipfile.ZipFile(file) as archive:
             # A few kilobytes of zeros unpack to gigabytes: ask before unpacking.
             size = max((entry.file_size for entry in archive.infolist()), default=0)
-        if size > 8 * MOST_PIXELS:
-            allowed = f"at most {8 * MOST_PIXELS:,} are read"
+        if size > 8 * MAX_PIXELS:
+            allowed = f"at most {8 * MAX_PIXELS:,} are read"
             raise TerrainError(f"{name}: {size:,} bytes unpacked: {allowed}", file=name, value=size, allowed=allowed)
         with np.load(file, allow_pickle=False) as data:
             for key in ("elevation", *edges):
@@ -167,7 +167,7 @@ def _read_npz(file: Path, name: str) -> tuple[NDArray[np.generic], list[float]]:
 # The driver is explicit and chosen by the file's first bytes, so that nothing that merely names another file (VRT, a
 # URL, a `/vsi` path) is ever opened.  Heights are taken as above mean sea level and never converted.
 
-__all__ = ["EMBEDDED", "MOST_PIXELS", "RasterFile", "open_raster", "read_terrain", "tile_bounds"]
+__all__ = ["EMBEDDED", "MAX_PIXELS", "RasterFile", "open_raster", "read_terrain", "tile_bounds"]
 
 
 # Elevation that we ship, by name: files of `world/elevation`, whose README says where they are from.
@@ -179,7 +179,7 @@ LOWEST_GROUND, HIGHEST_GROUND = -12_000.0, 9000.0
 PIXEL_TOLERANCE = 1e-3
 METRES = ("m", "metre", "metres", "meter", "meters")
 # A block is unpacked whole, however small the window: larger ones (here, 128 MiB of float32) are refused, pixels.
-MOST_BLOCK = 32 * 2**20
+MAX_BLOCK = 32 * 2**20
 # Pixels of a window that are read before the next ones: numbers and masks take several times the heights' own memory.
 _PIXELS_AT_ONCE = 2**22
 # Pixels without data that are looked at before the next ones: one inside the area is enough.
@@ -250,10 +250,10 @@ def read_terrain(raster: RasterFile, origin: GeoOrigin, bounds: ArrayLike, buffe
     c0, c1, r0, r1 = _outline_window(raster, origin, box, buffer)
     left, right = max(0, math.floor(c0) - 1), min(cols, math.ceil(c1) + 2)
     top, bottom = max(0, math.floor(r0) - 1), min(rows, math.ceil(r1) + 2)
-    if (right - left) * (bottom - top) > MOST_PIXELS:
+    if (right - left) * (bottom - top) > MAX_PIXELS:
         raise TerrainError(
             f"{raster.name}: the area needs {(right - left) * (bottom - top):,} pixels;"
-            f" at most {MOST_PIXELS:,} are read",
+            f" at most {MAX_PIXELS:,} are read",
             file=raster.name,
         )
     heights = raster.read(top, bottom, left, right)
@@ -409,8 +409,8 @@ def _open_rasterio(file: Path, driver: str) -> RasterFile:
         raise TerrainError(f"{file}: no coordinate reference system and position are stated", file=file)
     if (unit or "m").lower() not in METRES or metres != 1.0:
         raise TerrainError.at(file, "unit of heights", stated if metres != 1.0 else unit, "metres are expected")
-    if block > MOST_BLOCK:
-        allowed = f"at most {MOST_BLOCK:,} are; tile the file"
+    if block > MAX_BLOCK:
+        allowed = f"at most {MAX_BLOCK:,} are; tile the file"
         raise TerrainError.at(file, "pixels of a block, read whole", block, allowed, shown=f"{block:,}")
     if min(rows, cols) < 2:
         raise TerrainError.at(file, "rows, columns", (rows, cols), "at least 2 x 2 pixels are expected")

@@ -20,7 +20,7 @@ from world.frames import GeoOrigin, to_geo, to_map
 from world.raster import EMBEDDED, RasterFile, open_raster, read_terrain, tile_bounds
 from world.scenario_file import check_scenario, checked_table, parse_scenario, read_scenario_text
 from world.scenario_tables import (
-    MOST_ZONES,
+    MAX_ZONES,
     AreaTable,
     FlightTable,
     LimitsTable,
@@ -483,8 +483,8 @@ def with_zones(scenario: Scenario, tables: Sequence[ZoneTable], source: str) -> 
     >>> [zone.name for zone in with_zones(load_scenario("tight"), [mast], "masts.geojson").zones]
     ['mast']
     """
-    if len(scenario.zones) + len(tables) > MOST_ZONES:
-        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MOST_ZONES:,} in all", file=source)
+    if len(scenario.zones) + len(tables) > MAX_ZONES:
+        raise ScenarioError(f"{source}: {len(tables):,} zones more: at most {MAX_ZONES:,} in all", file=source)
     zones = make_zones(tables, source, scenario.origin, scenario.terrain)
     ends = (("start", scenario.start), ("destination", scenario.destination))
     check_ends(zones, source, () if scenario.external else ends, scenario.terrain)

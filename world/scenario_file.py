@@ -15,7 +15,7 @@ from world.scenario_tables import ScenarioFile
 Table = TypeVar("Table", bound=BaseModel)
 
 # Twenty thousand threats are 3 MB.
-MOST_BYTES = 16 * 2**20
+MAX_BYTES = 16 * 2**20
 
 
 def parse_scenario(text: str, source: str) -> ScenarioFile:
@@ -61,7 +61,7 @@ def checked_table(make: Callable[[], Table], source: str) -> Table:
 
 def read_scenario_text(path: Path) -> str:
     """Read the text of a scenario file.  Raises ScenarioError if it is missing, too large or not UTF-8."""
-    data = read_small_file(path, MOST_BYTES, "scenario", ScenarioError)
+    data = read_small_file(path, MAX_BYTES, "scenario", ScenarioError)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

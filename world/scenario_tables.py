@@ -68,9 +68,9 @@ class ScenarioTable(BaseModel):
 # [[zones]] of a scenario file as a pydantic model.
 
 # Corners of a ring, and rings of a zone, at most.
-MOST_CORNERS, MOST_RINGS = 20_000, 1_000
+MAX_CORNERS, MAX_RINGS = 20_000, 1_000
 # Zones of a scenario at most, those of its files included.
-MOST_ZONES = 20_000
+MAX_ZONES = 20_000
 
 
 def _latitude_first(corner: list[float]) -> list[float]:
@@ -83,8 +83,8 @@ def _latitude_first(corner: list[float]) -> list[float]:
 _MetreCorner = Annotated[list[Metres], Field(min_length=2, max_length=2)]
 _Degrees = Annotated[float, within(-180.0, 180.0)]
 _DegreeCorner = Annotated[list[_Degrees], Field(min_length=2, max_length=2), AfterValidator(_latitude_first)]
-_MetreRing = Annotated[list[_MetreCorner], Field(max_length=MOST_CORNERS)]
-_DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MOST_CORNERS)]
+_MetreRing = Annotated[list[_MetreCorner], Field(max_length=MAX_CORNERS)]
+_DegreeRing = Annotated[list[_DegreeCorner], Field(max_length=MAX_CORNERS)]
 
 
 class ZoneTable(ScenarioTable):
@@ -101,8 +101,8 @@ class ZoneTable(ScenarioTable):
     kind: Literal["inclusion", "exclusion"]
     polygon_m: _MetreRing | None = None
     polygon_deg: _DegreeRing | None = None
-    rings_m: Annotated[list[_MetreRing], Field(max_length=MOST_RINGS)] | None = None
-    rings_deg: Annotated[list[_DegreeRing], Field(max_length=MOST_RINGS)] | None = None
+    rings_m: Annotated[list[_MetreRing], Field(max_length=MAX_RINGS)] | None = None
+    rings_deg: Annotated[list[_DegreeRing], Field(max_length=MAX_RINGS)] | None = None
     east_m: Metres | None = None
     north_m: Metres | None = None
     lat_deg: Latitude | None = None
@@ -409,7 +409,7 @@ class ScenarioFile(ScenarioTable):
     start: EndTable
     destination: EndTable
     threats: list[ThreatTable] = Field(default_factory=list, max_length=20_000)
-    zones: Annotated[list[ZoneTable], Field(max_length=MOST_ZONES)] | None = None
+    zones: Annotated[list[ZoneTable], Field(max_length=MAX_ZONES)] | None = None
     zones_file: FilePath | Annotated[list[FilePath], Field(max_length=100)] | None = None
     limits: LimitsTable = LimitsTable()
     planner: PlannerTable = PlannerTable()

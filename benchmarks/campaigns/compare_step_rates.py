@@ -24,7 +24,7 @@ from world.scenario import Scenario
 from world.wind import Wind
 
 # A track may be so far from that at 120 steps a second, m.
-MOST_APART = 0.1
+MAX_DIFFERENCE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +99,7 @@ def compare_all(seeds: range, aircraft: str = "aerosonde", *, loud: bool = False
     found: list[StepRates] = []
     for one in _each(seeds, aircraft):
         found.append(one)
-        if loud and (not one.same or max(one.calm, one.windy) > MOST_APART):
+        if loud and (not one.same or max(one.calm, one.windy) > MAX_DIFFERENCE):
             print(f"{one.name}: flyable {one.flyable}, same findings {one.same}, {one.calm:.3f}, {one.windy:.3f} m")
     return {
         "missions": len(found),

@@ -25,7 +25,7 @@ Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
 # Between the lattice's places, m; and steps that climb or sink so many layers at most.
-PITCH, LAYER, MOST_LAYERS = 66.0, 20.0, 4
+PITCH, LAYER, MAX_LAYERS = 66.0, 20.0, 4
 # Steps on the map: to the eight neighbours, and a knight's.
 STEPS = np.array([(i, j) for i in range(-2, 3) for j in range(-2, 3) if math.gcd(i, j) == 1])
 # Ways that are tightened, and how much longer than the best on the lattice they may be.
@@ -80,8 +80,8 @@ def _lengths(free: Flags, steps: Ints, home: Ints, climb: float, dive: float, fo
             if x < 0 or y < 0 or x >= columns or y >= rows:
                 continue
             run = PITCH * math.sqrt(steps[s, 0] ** 2 + steps[s, 1] ** 2)
-            up = min(MOST_LAYERS, int((climb if forward else dive) * run / LAYER))
-            down = min(MOST_LAYERS, int((dive if forward else climb) * run / LAYER))
+            up = min(MAX_LAYERS, int((climb if forward else dive) * run / LAYER))
+            down = min(MAX_LAYERS, int((dive if forward else climb) * run / LAYER))
             for z in range(max(0, k - down), min(layers - 1, k + up) + 1):
                 if not free[x, y, z]:
                     continue
@@ -105,8 +105,8 @@ def _descend(lengths: Floats, steps: Ints, place: Ints, climb: float, dive: floa
             if x < 0 or y < 0 or x >= columns or y >= rows:
                 continue
             run = PITCH * math.sqrt(steps[s, 0] ** 2 + steps[s, 1] ** 2)
-            up = min(MOST_LAYERS, int((dive if forward else climb) * run / LAYER))
-            down = min(MOST_LAYERS, int((climb if forward else dive) * run / LAYER))
+            up = min(MAX_LAYERS, int((dive if forward else climb) * run / LAYER))
+            down = min(MAX_LAYERS, int((climb if forward else dive) * run / LAYER))
             for z in range(max(0, k - down), min(layers - 1, k + up) + 1):
                 total = lengths[x, y, z] + math.sqrt(run * run + (LAYER * (z - k)) ** 2)
                 if total < best:

@@ -13,7 +13,7 @@ from functools import cache
 from pathlib import Path
 from xml.parsers import expat
 
-from aircraft.catalog import MOST_MODEL_BYTES, Aircraft, model_hash
+from aircraft.catalog import MAX_MODEL_BYTES, Aircraft, model_hash
 from world.errors import FlightError
 from world.files import read_at_most
 
@@ -59,7 +59,7 @@ class _Reader:
 
     def read(self) -> None:
         try:
-            self.data = read_at_most(self.file, MOST_MODEL_BYTES, "model")
+            self.data = read_at_most(self.file, MAX_MODEL_BYTES, "model")
             self._parser.Parse(self.data, True)
         except OSError as error:
             raise FlightError(

@@ -28,7 +28,7 @@ WAYPOINT = record_dtype(
 # ArduPlane's WP_RADIUS where a mission states no acceptance, m.
 WAYPOINT_RADIUS = 90.0
 # L1 integrates only this near to its line (rad), and up to this much (rad).
-_INTEGRATES, _MOST_INTEGRAL = math.radians(5.0), 0.1
+_INTEGRATES, _MAX_INTEGRAL = math.radians(5.0), 0.1
 # Steepest that L1 closes in on its line: sine of 45 degrees.
 _CAPTURE = math.sqrt(0.5)
 # L1 heads back to a waypoint that it passed this long ago, s.
@@ -71,7 +71,7 @@ def l1_integrate(aim: float, total: float, gain: float, dt: float) -> float:  # 
     """The integral after a tick, rad."""
     if math.isnan(aim) or abs(aim) >= _INTEGRATES:
         return total
-    return min(_MOST_INTEGRAL, max(-_MOST_INTEGRAL, total + aim * gain * dt))
+    return min(_MAX_INTEGRAL, max(-_MAX_INTEGRAL, total + aim * gain * dt))
 
 
 @compiled

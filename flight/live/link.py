@@ -68,7 +68,7 @@ SIGNATURE = 13
 _CRC = struct.Struct("<H")
 # Largest datagram that is looked at, and most frames in it.
 LARGEST = 4096
-MOST_FRAMES = 64
+MAX_FRAMES = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ def split_frames(data: bytes) -> list[MavlinkFrame]:
     found: list[MavlinkFrame] = []
     data = data[:LARGEST]
     at = 0
-    while at < len(data) and len(found) < MOST_FRAMES:
+    while at < len(data) and len(found) < MAX_FRAMES:
         frame = _frame_at(data, at) if data[at] in (MAGIC_V1, MAGIC_V2) else None
         if frame is None:
             at += 1
@@ -150,8 +150,8 @@ def _frame_at(data: bytes, at: int) -> MavlinkFrame | None:
 # Timestamps count 10 us from 2015-01-01; a stream that is new may lag by a minute.
 EPOCH = 1_420_070_400.0
 _UNITS = 100_000
-_MOST_LAG = 60 * _UNITS
-_MOST_STREAMS = 64
+_MAX_LAG = 60 * _UNITS
+_MAX_STREAMS = 64
 _LARGEST_KEY = 1024
 
 
@@ -232,9 +232,9 @@ class Signing:
         last = self._streams.get(stream)
         if last is None:
             # By our clock, not by others' timestamps: a station whose clock runs ahead locks nobody out.
-            if stamp + _MOST_LAG < _stamp(wall):
+            if stamp + _MAX_LAG < _stamp(wall):
                 return Refused.OLD
-            if len(self._streams) >= _MOST_STREAMS:
+            if len(self._streams) >= _MAX_STREAMS:
                 return Refused.STREAMS
         elif stamp <= last:
             return Refused.REPLAYED
@@ -262,13 +262,13 @@ def _stamp(wall: float) -> int:
 Address = tuple[str, int]
 
 SYSTEM, COMPONENT = 1, mavlink.MAV_COMP_ID_AUTOPILOT1
-MOST_PEERS = 16
+MAX_PEERS = 16
 # A station that has sent no heartbeat for so long is gone, s.
 SILENCE = 15.0
 # Strangers that the log names.
-_MOST_NAMED = 16
+_MAX_NAMED = 16
 # Datagrams handled before telemetry has its turn again.
-_MOST_AT_ONCE = 200
+_MAX_AT_ONCE = 200
 
 
 @dataclass(slots=True)
@@ -404,7 +404,7 @@ class Link:
     def receive(self) -> list[tuple[Any, Peer]]:
         """Messages that have come from stations, each with its sender; everything else has vanished."""
         found: list[tuple[Any, Peer]] = []
-        for _ in range(_MOST_AT_ONCE):
+        for _ in range(_MAX_AT_ONCE):
             try:
                 data, source = self._socket.recvfrom(LARGEST)
             except BlockingIOError:
@@ -450,10 +450,10 @@ class Link:
 
     def _name_stranger(self, message: Any, host: str) -> None:
         """Have it said once that an address is not answered, and why."""
-        if host in self._strangers or len(self._strangers) >= _MOST_NAMED or not self._for_us(message):
+        if host in self._strangers or len(self._strangers) >= _MAX_NAMED or not self._for_us(message):
             return
         self._strangers.add(host)
-        full = "" if len(self.peers) < MOST_PEERS else f", and {MOST_PEERS} stations are served already"
+        full = "" if len(self.peers) < MAX_PEERS else f", and {MAX_PEERS} stations are served already"
         self._notices.append(f"{host} sends {message.get_type()} and no HEARTBEAT{full}: it is not answered")
 
     def notices(self) -> list[str]:
@@ -474,7 +474,7 @@ class Link:
         self.peers = {key: peer for key, peer in self.peers.items() if now - peer.heard < SILENCE}
         peer = self.peers.get(source)
         if peer is None:
-            if len(self.peers) >= MOST_PEERS:
+            if len(self.peers) >= MAX_PEERS:
                 return None
             # One count of frames a station: a second one reads as lost packets there.
             peer = Peer(source, system, component, now, self._counter(source))

@@ -207,7 +207,7 @@ def flown_from(mission: Mission, first: int) -> Mission:
 
 
 # Most items that an upload may announce: bounds what a station can make the vehicle hold (some 2 MB a list).
-MOST_UPLOADED = 5_000
+MAX_UPLOADED = 5_000
 # A request is sent again after `RETRY` s, or half as long again as the item before took, then after twice as long each
 # time, up to `SLOWEST_RETRY`.  A station that is only slow counts them: MAVSDK gives up at the sixth for an item.
 RETRY, SLOWEST_RETRY = 0.05, 0.4
@@ -345,8 +345,8 @@ class MissionServer:
         refusal = self._refusal(station, kind, now)
         if refusal:
             return [self._ack(station, mavlink.MAV_MISSION_DENIED, kind, refusal)]
-        if count > MOST_UPLOADED:
-            text = f"{count} items: at most {MOST_UPLOADED} are stored"
+        if count > MAX_UPLOADED:
+            text = f"{count} items: at most {MAX_UPLOADED} are stored"
             return [self._ack(station, mavlink.MAV_MISSION_NO_SPACE, kind, text)]
         self._drop_other_uploads(station)
         if count == 0:

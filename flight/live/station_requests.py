@@ -122,7 +122,7 @@ def _text(name: bytes | str) -> str:
 _SHORTEST = 0.02
 _LONGEST = 3600.0
 # Arm commands that wait for a verdict.
-_MOST_WAITING = 16
+_MAX_WAITING = 16
 
 
 class PeerMessage(NamedTuple):
@@ -180,7 +180,7 @@ class Requests:
         if number == _ARM:
             reply = self.arming.arm(message.param1 == 1.0, message.param2)
             if reply.result == IN_PROGRESS:
-                if len(self._waiting) < _MOST_WAITING:
+                if len(self._waiting) < _MAX_WAITING:
                     self._waiting.append(_Waiting(peer, system, component, message.param1, message.param2))
                 else:
                     reply = CommandResult(mavlink.MAV_RESULT_TEMPORARILY_REJECTED)

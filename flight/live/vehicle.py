@@ -199,7 +199,7 @@ class MissionProgress:
 _NAP = 0.02
 # Time that the process that flies has to close its log when the vehicle is shut down, s.
 CLOSING = 0.8
-_MOST_DEATHS = 3
+_MAX_CRASHES = 3
 # Within this time (s) the same text is sent once.
 _SAME_TEXT = 3.0
 
@@ -406,7 +406,7 @@ class Vehicle:
         """Start another process in place of one that has died: JSBSim can abort, and that must not end the vehicle."""
         self._flight.close()
         self._deaths += 1
-        if self._deaths >= _MOST_DEATHS:
+        if self._deaths >= _MAX_CRASHES:
             raise ChildProcessError(errno.ECHILD, "keeps dying", "the process that flies")
         self._flight = self._spawn()
         self._ready = False

@@ -49,8 +49,8 @@ def _ranges(numbers: list[int]) -> str:
 
 
 # Most items that a mission file may hold, and the largest file (bytes): far beyond what any autopilot stores.
-MOST_ITEMS = 20_000
-MOST_BYTES = 16 * 2**20
+MAX_ITEMS = 20_000
+MAX_BYTES = 16 * 2**20
 
 # The largest number that MAVLink can carry in a parameter, a float32.
 _FLOAT32 = 3.4028234663852886e38

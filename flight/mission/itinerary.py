@@ -21,8 +21,8 @@ from flight.mission.items import (
 from world.errors import MissionError
 
 # A mission unrolls to no more places than this, and no more items are walked through on the way.
-MOST_STOPS = 10_000
-_MOST_STEPS = 200_000
+MAX_STOPS = 10_000
+_MAX_STEPS = 200_000
 
 # A loiter without end is flown for this long, s, and the mission ends there.
 UNLIMITED = 60.0
@@ -112,16 +112,16 @@ def make_itinerary(mission: Mission) -> Itinerary:
     """Walk through the mission as an autopilot would.
 
     Raises MissionError for a mission without a position, a jump to an item that is not there, and a mission that
-    unrolls to more than `MOST_STOPS` places.
+    unrolls to more than `MAX_STOPS` places.
     """
     walk = _Walk(mission)
     reached = set()
     for item in _in_flying_order(mission, walk):
         reached.add(item.seq)
         walk.visit(item)
-        if len(walk.stops) > MOST_STOPS:
+        if len(walk.stops) > MAX_STOPS:
             raise MissionError(
-                f"{mission.source}: item {item.seq}: more than {MOST_STOPS:,} places to fly to, jumps unrolled",
+                f"{mission.source}: item {item.seq}: more than {MAX_STOPS:,} places to fly to, jumps unrolled",
                 file=mission.source,
                 field=f"item {item.seq}",
             )
@@ -144,9 +144,9 @@ def _in_flying_order(mission: Mission, walk: "_Walk") -> Iterator[MissionItem]:
     while k < len(mission.items):
         item = mission.items[k]
         steps += 1
-        if steps > _MOST_STEPS:
+        if steps > _MAX_STEPS:
             raise MissionError(
-                f"{mission.source}: item {item.seq}: jumps lead through more than {_MOST_STEPS:,} items",
+                f"{mission.source}: item {item.seq}: jumps lead through more than {_MAX_STEPS:,} items",
                 file=mission.source,
                 field=f"item {item.seq}",
             )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.mission.items import Notes
-from flight.mission.itinerary import MOST_STOPS, ItineraryStop, Loiter
+from flight.mission.itinerary import MAX_STOPS, ItineraryStop, Loiter
 from world.errors import MissionError
 
 Floats = NDArray[np.float64]
@@ -99,9 +99,9 @@ def lay_circles(
             laid.insert(0, RoutePoint(node.stop, (*_rim(node, into), laid[0].position[2])))
         up = laid[-1].position[2]
         points += laid
-        if len(points) > MOST_STOPS:
+        if len(points) > MAX_STOPS:
             item = f"item {node.stop.item}"
-            message = f"{source}: {item}: more than {MOST_STOPS:,} places, circles laid out"
+            message = f"{source}: {item}: more than {MAX_STOPS:,} places, circles laid out"
             raise MissionError(message, file=source, field=item)
     return points
 
@@ -196,8 +196,8 @@ def _around(
     if onward is not None:
         part = (side * (onward - into)) % (2.0 * math.pi)
         sweep = part + 2.0 * math.pi * max(0, math.ceil((wanted - part) / (2.0 * math.pi) - 1e-9))
-    if sweep > MOST_STOPS * CORNER:
-        turns, allowed = sweep / (2.0 * math.pi), f"at most {MOST_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
+    if sweep > MAX_STOPS * CORNER:
+        turns, allowed = sweep / (2.0 * math.pi), f"at most {MAX_STOPS * CORNER / (2.0 * math.pi):,.0f} are flown"
         item = f"item {node.stop.item}"
         raise MissionError.at(source, item, turns, allowed, shown=f"{turns:,.0f} turns to loiter")
     count = max(1, math.ceil(sweep / CORNER - 1e-9))

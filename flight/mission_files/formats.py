@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
-from flight.mission.items import MOST_BYTES, Mission, MissionItem
+from flight.mission.items import MAX_BYTES, Mission, MissionItem
 from flight.mission_files.qgc_plan import parse_plan_file, plan_file_text
 from flight.mission_files.wpl import (
     fence_text,
@@ -124,7 +124,7 @@ def mission_text(mission: Mission, kind: FileKind) -> str:
 
 
 def _read_text(path: Path) -> str:
-    data = read_small_file(path, MOST_BYTES, "mission", MissionError)
+    data = read_small_file(path, MAX_BYTES, "mission", MissionError)
     if not data.strip():
         raise MissionError(f"{path}: empty: a mission is expected", file=path)
     if data.startswith(_UTF16):

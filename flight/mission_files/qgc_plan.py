@@ -14,7 +14,7 @@ from flight.mission.fences import INCLUSIONS, POLYGONS, fence_shapes
 from flight.mission.items import (
     AMSL,
     LANDINGS,
-    MOST_ITEMS,
+    MAX_ITEMS,
     OVER_HOME,
     PLACES,
     Command,
@@ -164,7 +164,7 @@ class _Mission(_Table):
     version: Annotated[int, Field(ge=2, le=2)]
     cruiseSpeed: Annotated[float, Field(ge=0.0, le=_FASTEST)] | None = None
     plannedHomePosition: Annotated[list[_Unset], Field(min_length=3, max_length=3)] | None = None
-    items: Annotated[list[_Item], Field(max_length=MOST_ITEMS)]
+    items: Annotated[list[_Item], Field(max_length=MAX_ITEMS)]
 
 
 class _Disc(_Table):

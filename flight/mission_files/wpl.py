@@ -10,7 +10,7 @@ from flight.mission.fences import fence_shapes, numbered
 from flight.mission.items import (
     FENCES,
     LANDINGS,
-    MOST_ITEMS,
+    MAX_ITEMS,
     PLACES,
     Command,
     Frame,
@@ -35,7 +35,7 @@ from world.files import TextLine
 
 HEADER = "QGC WPL 110"
 # Lines of a file, comments and empty ones included: ten an item.
-MOST_LINES = 10 * MOST_ITEMS
+MAX_LINES = 10 * MAX_ITEMS
 
 _COLUMNS = (
     "seq",
@@ -73,8 +73,8 @@ def parse_waypoints(text: str, source: str) -> Mission:
     value and what is allowed.
     """
     breaks = max(text.count("\n"), text.count("\r"))
-    if breaks > MOST_LINES:
-        raise MissionError(f"{source}: {breaks:,} lines: at most {MOST_LINES:,} are read", file=source)
+    if breaks > MAX_LINES:
+        raise MissionError(f"{source}: {breaks:,} lines: at most {MAX_LINES:,} are read", file=source)
     lines = [
         (number, line.strip())
         for number, line in enumerate(re.split(r"\r\n|\n|\r", text.removeprefix("\ufeff")), 1)
@@ -91,8 +91,8 @@ def parse_waypoints(text: str, source: str) -> Mission:
             f"{source}:{number}: header {_shown(header)}: '{HEADER}' is expected",
             file=source, field="header", value=header, allowed=HEADER,
         )  # fmt: skip
-    if len(lines) - 1 > MOST_ITEMS:
-        raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MOST_ITEMS:,} are read", file=source)
+    if len(lines) - 1 > MAX_ITEMS:
+        raise MissionError(f"{source}: {len(lines) - 1:,} items: at most {MAX_ITEMS:,} are read", file=source)
     rows = [_row(TextLine(source, number), line) for number, line in lines[1:]]
     if not rows:
         raise MissionError(f"{source}: no items after the header", file=source)
@@ -248,7 +248,7 @@ def _shown(text: str) -> str:
 # last.
 
 # Corners of such a fence at most: ArduPilot numbered them in a byte.
-MOST_POINTS = 255
+MAX_POINTS = 255
 
 
 def is_point_list(text: str) -> bool:
@@ -275,8 +275,8 @@ def parse_fence_points(text: str, source: str) -> tuple[MissionItem, ...]:
     [(5001, 4.0, 36.5), (5001, 4.0, 36.5), (5001, 4.0, 36.51), (5001, 4.0, 36.51)]
     """
     points = [_point(TextLine(source, number), line) for number, line in _fence_lines(text)]
-    if len(points) > MOST_POINTS:
-        raise MissionError(f"{source}: {len(points)} points: at most {MOST_POINTS} are read", file=source)
+    if len(points) > MAX_POINTS:
+        raise MissionError(f"{source}: {len(points)} points: at most {MAX_POINTS} are read", file=source)
     ring = points if points[0] == points[-1] else points[1:]
     if len(ring) < 4 or ring[0] != ring[-1]:
         raise MissionError(

@@ -16,7 +16,7 @@ from world.geometry import leg_slopes
 Floats = NDArray[np.float64]
 
 _HEIGHT, _TOP, _BOTTOM = 4.9, 0.62, 1.2
-_MOST_DOTS = 4000
+_MAX_DOTS = 4000
 
 
 def draw_envelope_and_flight(setup: FlightSetup, track: Track | None) -> Figure:
@@ -90,7 +90,7 @@ class FlownMoments:
     bank: Floats
 
 
-def flown_moments(track: Track, most: int = _MOST_DOTS) -> FlownMoments:
+def flown_moments(track: Track, most: int = _MAX_DOTS) -> FlownMoments:
     """At most so many moments of a track, those that are numbers."""
     rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), most)).astype(np.intp))
     air = (track.velocity[rows] - track.wind[rows]).astype(np.float64)

@@ -268,7 +268,7 @@ def track_distance(waypoints: Floats, track: Track) -> Floats:
 # What fails, named beside its place and, of threats, drawn where the flight was inside them.
 
 # More labels than these would cover what they tell of.
-_MOST = 16
+_MAX_LABELS = 16
 
 
 def write_fail_labels(
@@ -291,7 +291,7 @@ def write_fail_labels(
         "edgecolor": style.FAIL,
         "linewidth": 0.9,
     }
-    for text, x, y in labels[:_MOST]:
+    for text, x, y in labels[:_MAX_LABELS]:
         placer.place(text, float(x), float(y), size=7.0, gap=gap, color=style.FAIL, bbox=frame)
 
 

@@ -188,11 +188,11 @@ def _wind_text(named: NamedWind) -> str:
 # Inches: the map's own width, and what stands around it.
 _LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55
 _RIGHT_COLUMN = 8.72
-_LEAST_HEIGHT = 3.6
+_MIN_HEIGHT = 3.6
 # Height over width of the map: a longer or flatter area is drawn with ground around it.
 _ASPECTS = (0.4, 1.25)
 # Beyond these numbers, labels would be a grey mat: names of threats go, waypoints are numbered in steps.
-_MOST_NAMES, _MOST_NUMBERS, _MOST_DOTS = 80, 40, 80
+_MAX_NAMES, _MAX_NUMBERS, _MAX_DOTS = 80, 40, 80
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,7 +309,7 @@ def _extent(scenario: Scenario, route: Floats | None, tracks: Sequence[DrawnTrac
 def _frame(extent: MapExtent, scenario: Scenario, subject: str) -> tuple[Figure, Any, float]:
     """Figure, axes, and the height (inches) under which the legend stands."""
     height = _MAP_WIDTH * extent.aspect
-    tall = max(height, _LEAST_HEIGHT)
+    tall = max(height, _MIN_HEIGHT)
     legend_height = 1.0
     total = _TOP + tall + _BOTTOM + legend_height
     figure = style.new_figure(total)
@@ -368,8 +368,8 @@ def _paths(axes: Any, route: Floats, plan: Floats | None, placer: LabelPlacer) -
         "o",
         color="white",
         markeredgecolor=style.BLUE,
-        markersize=4.2 if len(route) <= _MOST_DOTS else 1.5,
-        markeredgewidth=1.0 if len(route) <= _MOST_DOTS else 0.5,
+        markersize=4.2 if len(route) <= _MAX_DOTS else 1.5,
+        markeredgewidth=1.0 if len(route) <= _MAX_DOTS else 0.5,
         zorder=7,
     )
     marker = Line2D(
@@ -452,7 +452,7 @@ def _same(a: Floats, b: Floats) -> bool:
 
 
 def _number_waypoints(scenario: Scenario, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    step = max(1, -(-len(route) // _MOST_NUMBERS))
+    step = max(1, -(-len(route) // _MAX_NUMBERS))
     last = len(route) - 1
     hidden = {k for k, end in ((0, scenario.start), (last, scenario.destination)) if _same(route[k], end)}
     for number in range(len(route)):
@@ -463,7 +463,7 @@ def _number_waypoints(scenario: Scenario, route: Floats, failed: Failures, place
 
 def _name_threats(axes: Any, threats: Threats, failed: Failures, placer: LabelPlacer) -> None:
     """Name each threat in the picture, as far as there is room; those that fail have labels of their own."""
-    if len(threats) > _MOST_NAMES:
+    if len(threats) > _MAX_NAMES:
         return
     labelled = failed.threat_names()
     size = 6.0 if len(threats) <= 30 else 5.0

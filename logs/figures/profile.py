@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 
 _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 6.0, 0.78, 0.25, 0.5, 1.45
 _GROUND, _BAND = "#cdbf9f", "#E69F00"
-_MOST_NUMBERS, _MOST_NAMES, _MOST_DOTS = 40, 24, 80
+_MAX_NUMBERS, _MAX_NAMES, _MAX_DOTS = 40, 24, 80
 
 
 def draw_profile(
@@ -89,7 +89,7 @@ def draw_profile(
         if not straight:
             _numbers(axes, at, route, failed, placer)
         _name_spheres(names, scenario.threats, set(failed.threat_names()), placer)
-        for name, middle, amsl in zone_names[:_MOST_NAMES]:
+        for name, middle, amsl in zone_names[:_MAX_NAMES]:
             placer.place(name, middle, amsl, size=6.0, gap=0.0, prefer=(0, 0), optional=True, color=style.ZONE)
         write_fail_labels(failed, np.column_stack([at / 1000.0, route[:, 2]]), entered, placer, gap=18.0)
         _label_axes(figure, axes, scenario, straight)
@@ -159,7 +159,7 @@ def _plan(axes: Any, at: Floats, route: Floats) -> list[Any]:
     look: dict[str, Any] = {
         "color": "white",
         "markeredgecolor": style.BLUE,
-        "markersize": 4.2 if len(route) <= _MOST_DOTS else 1.5,
+        "markersize": 4.2 if len(route) <= _MAX_DOTS else 1.5,
     }
     axes.plot(kilometres, route[:, 2], "o", zorder=7, clip_on=False, **look)
     axes.vlines(kilometres, axes.get_ylim()[0], route[:, 2], color="#777777", linewidth=0.4, alpha=0.6, zorder=3.5)
@@ -222,7 +222,7 @@ def _ceiling(axes: Any, scenario: Scenario) -> list[Any]:
 
 
 def _numbers(axes: Any, at: Floats, route: Floats, failed: Failures, placer: LabelPlacer) -> None:
-    step = max(1, -(-len(route) // _MOST_NUMBERS))
+    step = max(1, -(-len(route) // _MAX_NUMBERS))
     for number in range(len(route)):
         if number % step == 0 or number in failed.waypoints or number == len(route) - 1:
             point = (float(at[number]) / 1000.0, float(route[number, 2]))
@@ -231,7 +231,7 @@ def _numbers(axes: Any, at: Floats, route: Floats, failed: Failures, placer: Lab
 
 def _name_spheres(names: list[SphereName], threats: Threats, labelled: set[int], placer: LabelPlacer) -> None:
     """Write each sphere's name at its outline, in its colour; those that fail have labels of their own."""
-    for name in names[:_MOST_NAMES]:
+    for name in names[:_MAX_NAMES]:
         if name.index not in labelled:
             text = style.shorten(threats.names[name.index], 20)
             placer.place(text, *name.at, size=6.5, gap=3.0, prefer=name.prefer, optional=True, color=name.colour)

@@ -31,7 +31,7 @@ Floats = NDArray[np.float64]
 # Ground, threats and plan as the data of the 3-D pictures; for the report's page as what JSON can hold.
 
 
-MOST_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536
+MAX_GROUND = 250  # vertices a side: index numbers of the mesh stay below 65,536
 MISSING = 65535
 
 
@@ -100,7 +100,7 @@ def scene_data(setup: FlightSetup, track: Track | None, failed: Failures) -> dic
     Lengths are in m; heights of the ground are 16-bit shares of their range, little-endian, in base64.
     """
     bounds = scene_bounds(setup, track)
-    grid = ground_grid(setup.scenario.terrain, bounds, MOST_GROUND)
+    grid = ground_grid(setup.scenario.terrain, bounds, MAX_GROUND)
     threats = setup.scenario.threats
     return {
         "name": setup.scenario.name,
@@ -151,11 +151,11 @@ def _ground(grid: GroundGrid) -> dict[str, object]:
 
 _LEFT, _RIGHT, _TOP, _BOTTOM = 0.15, 0.15, 0.5, 0.8
 _ELEVATION = math.radians(36.0)
-_MOST_CELLS, _MOST_TRACK = 130, 1600
+_MAX_CELLS, _MAX_TRACK = 130, 1600
 # Of the ground drawn, the shorter side of the longer one, at least; what is narrower is seen from this much further
 # round, rad.
-_LEAST_SIDE, _ASLANT = 0.3, math.radians(45.0)
-_MOST_NUMBERS, _MOST_NAMES = 40, 30
+_MIN_SIDE, _ASLANT = 0.3, math.radians(45.0)
+_MAX_NUMBERS, _MAX_NAMES = 40, 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +196,7 @@ def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None)
     bounds = _widened(all_of_it)
     narrow = not np.array_equal(bounds, all_of_it)
     terrain = setup.scenario.terrain
-    grid = ground_grid(terrain, bounds, _MOST_CELLS)
+    grid = ground_grid(terrain, bounds, _MAX_CELLS)
     route = setup.route.waypoints
     projection = _projection(route, bounds, exaggeration(setup, bounds, grid), narrow)
     failed = failures(verdict, len(route))
@@ -219,7 +219,7 @@ def draw_scene(setup: FlightSetup, track: Track | None, verdict: Verdict | None)
 def _widened(bounds: Floats) -> Floats:
     """Ground about a narrow scene, (2, 2) m: no side is less than a share of the other."""
     sides = np.ptp(bounds, axis=1)
-    more = 0.5 * np.maximum(_LEAST_SIDE * sides.max() - sides, 0.0)
+    more = 0.5 * np.maximum(_MIN_SIDE * sides.max() - sides, 0.0)
     return np.asarray(bounds + np.stack([-more, more], axis=1))
 
 
@@ -384,7 +384,7 @@ def _paths(
     _line(axes, projection, terrain, samples, style.PLANNED, 3.6, 5)
     handles: list[Any] = [Line2D([], [], color=style.PLANNED, linewidth=3.6, label="planned path")]
     if track is not None:
-        _line(axes, projection, terrain, track.position[drawn_rows(track, _MOST_TRACK)], style.FLOWN, 1.2, 6)
+        _line(axes, projection, terrain, track.position[drawn_rows(track, _MAX_TRACK)], style.FLOWN, 1.2, 6)
         handles.append(Line2D([], [], color=style.FLOWN, linewidth=1.2, label="flown track"))
     corners = projection.project(route)
     placer.avoid(*projection.project(samples)[:, :2].T)
@@ -415,7 +415,7 @@ def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: F
     last = len(route) - 1
     for k, name in ((0, "start"), (last, "destination")):
         placer.place(name, *corners[k, :2].tolist(), size=8.0, gap=10.0, fontweight="bold")
-    step = max(1, -(-len(route) // _MOST_NUMBERS))
+    step = max(1, -(-len(route) // _MAX_NUMBERS))
     for k in range(1, last):
         if k % step == 0 or k in failed.waypoints:
             colour = style.FAIL if k in failed.waypoints else style.BLUE
@@ -424,7 +424,7 @@ def _labels(setup: FlightSetup, projection: Projection, route: Floats, failed: F
     entered = failed.threat_names()
     named = list(zip(threats.names, projection.project(threats.position), strict=True))
     # Entered ones first: they have the best places.
-    for k in sorted(range(min(len(named), _MOST_NAMES)), key=lambda k: k not in entered):
+    for k in sorted(range(min(len(named), _MAX_NAMES)), key=lambda k: k not in entered):
         name, point = named[k]
         look: dict[str, Any] = {"color": style.FAIL, "fontweight": "bold"} if k in entered else {"optional": True}
         placer.place(style.shorten(name, 20), *point[:2].tolist(), size=6.5, gap=2.0, **look)

@@ -226,7 +226,7 @@ def draw_threat_cuts(
 
 _HATCH = "////"
 # Beyond this number, names of zones would be a grey mat.
-_MOST_NAMES = 40
+_MAX_NAMES = 40
 
 
 def zone_label(zone: Zone) -> str:
@@ -282,7 +282,7 @@ def _shape(zone: Zone) -> Path:
 
 def name_zones(axes: Any, zones: tuple[Zone, ...], placer: LabelPlacer) -> None:
     """Write exclusions' names and heights in their middles, inclusions' at their northernmost corner."""
-    if len(zones) > _MOST_NAMES:
+    if len(zones) > _MAX_NAMES:
         return
     for zone in zones:
         ring = zone_rings(zone)[0]

@@ -376,7 +376,7 @@ def _wind_speed(track: Track) -> NDArray[np.float64]:
 # Exposure along the flown track: its strength, from missiles and from radars, and its sum over time.
 
 # Segments that the track is joined to for the curve; the sums stay those of straight segments.
-_MOST = 12_000
+_MAX_ROWS = 12_000
 
 
 def exposure_rates(position: Floats, centres: Floats, radii: Floats, scales: Floats) -> Floats:
@@ -416,7 +416,7 @@ def exposure_stack(setup: FlightSetup, track: Track) -> Stack | None:
     threats = setup.scenario.threats
     if not len(threats) or len(track) < 2:
         return None
-    rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MOST)).astype(np.intp))
+    rows = np.unique(np.linspace(0, len(track) - 1, min(len(track), _MAX_ROWS)).astype(np.intp))
     rows = rows[np.isfinite(track.position[rows]).all(axis=1)]
     if rows.size < 2:
         return None

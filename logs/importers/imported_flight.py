@@ -150,7 +150,7 @@ _REFUSED: dict[VehicleKind, str] = {
     "tracker": "an antenna tracker's", "blimp": "a blimp's",
 }  # fmt: skip
 _HELD: tuple[Quantity, ...] = ("velocity", "attitude", "airspeed", "wind", "battery", "throttle")
-_MOST_ROWS = 4_000_000
+_MAX_ROWS = 4_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,8 +205,8 @@ def make_flight(raw: RawLog, number: int | None = None) -> FieldFlight:
             f"{raw.source}: {_REFUSED[raw.vehicle]} log{named}: flights of aeroplanes are judged", file=raw.source
         )
     series = raw.series["position"]
-    if len(series.time) > _MOST_ROWS:
-        raise LogError(f"{raw.source}: {len(series.time):,} places: at most {_MOST_ROWS:,} are read", file=raw.source)
+    if len(series.time) > _MAX_ROWS:
+        raise LogError(f"{raw.source}: {len(series.time):,} places: at most {_MAX_ROWS:,} are read", file=raw.source)
     places = clean_places(series, raw.clock_jumps)
     spans = flown_spans(places.time, places.lat, places.lon)
     if not spans:
@@ -335,7 +335,7 @@ def with_flown_heights(mission: Mission, lat: Floats, lon: Floats, up: Floats) -
 # The wind of a flight, as its autopilot estimated it.
 
 # m/s.  The most that a scenario's wind may have.
-_MOST = 30.0
+_MAX_WIND = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,7 +365,7 @@ def mean_wind(flight: FieldFlight) -> MeanWind | None:
     if not chosen.size:
         return None
     east, north = wind[chosen[len(chosen) // 5 :]].mean(axis=0).tolist()
-    speed = min(_MOST, math.hypot(east, north))
+    speed = min(_MAX_WIND, math.hypot(east, north))
     return MeanWind(speed, math.atan2(-east, -north) % (2.0 * math.pi), flight.raw.series["wind"].source)
 
 

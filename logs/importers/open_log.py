@@ -9,7 +9,7 @@ from logs.importers.raw_log import RawLog
 from world.errors import LogError
 
 # A day of a vehicle that logs all it can takes less.
-MOST_BYTES = 2 * 2**30
+MAX_BYTES = 2 * 2**30
 SUFFIXES = (".bin", ".tlog", ".ulg", ".gpx", ".igc", ".kml", ".kmz")
 # Refused by name.
 _NAMED = (".log",)
@@ -37,8 +37,8 @@ def open_log(path: Path) -> RawLog:
         if not path.is_file():
             raise LogError(f"{path}: no such file: a log ({', '.join(SUFFIXES)}) is expected", file=path)
         size = path.stat().st_size
-        if size > MOST_BYTES:
-            raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read", file=path)
+        if size > MAX_BYTES:
+            raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read", file=path)
         with path.open("rb") as file:
             head = file.read(_HEAD)
         if not head:

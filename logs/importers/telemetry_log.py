@@ -145,7 +145,7 @@ NUMBERS = {
     "BATTERY_STATUS": ("current_battery", "energy_consumed"),
 }
 # Of each other kind this many are kept.
-_MOST = 200_000
+_MAX_MESSAGES = 200_000
 
 
 class BootClock(NamedTuple):
@@ -180,7 +180,7 @@ class SystemMessages:
         fields = NUMBERS.get(name)
         if fields is None:
             kept = self._named.setdefault(name, [])
-            if len(kept) < _MOST:
+            if len(kept) < _MAX_MESSAGES:
                 kept.append((number, message))
             return
         rows = self._rows.setdefault(name, array("d"))
@@ -221,7 +221,7 @@ _MISSION = ("MISSION_ITEM", "MISSION_ITEM_INT", "MISSION_COUNT")
 _WANTED = frozenset((*_KEPT, *_MISSION, *NUMBERS))
 _NUMBERS = frozenset(number for number, kind in dialect.mavlink_map.items() if kind.msgname in _WANTED)
 # Items that are kept: far more than a station sends.
-_MOST_ITEMS = 200_000
+_MAX_ITEMS = 200_000
 # MAV_TYPE; what is not listed says nothing of what it is.
 _TYPES: dict[int, VehicleKind] = {
     1: "plane", 16: "plane", 19: "plane", 20: "plane", 21: "plane", 22: "plane", 23: "plane", 24: "plane", 25: "plane",
@@ -244,7 +244,7 @@ def read_telemetry(path: Path) -> RawLog:
     items: list[tuple[float, Any]] = []
     for stamp, message in reader.messages():
         systems.setdefault(message.get_srcSystem(), SystemMessages()).add(stamp, message)
-        if message.get_type() in _MISSION and len(items) < _MOST_ITEMS:
+        if message.get_type() in _MISSION and len(items) < _MAX_ITEMS:
             items.append((stamp, message))
     vehicles = [found for found in systems.values() if any(_is_vehicle(one) for _, one in found.named("HEARTBEAT"))]
     if not vehicles:

@@ -23,7 +23,7 @@ from world.errors import LogError
 # The text of a track file: of a size that can be read, and without the traps of XML.
 
 # A track of a day at ten points a second takes less.
-MOST_BYTES = 256 * 2**20
+MAX_BYTES = 256 * 2**20
 # A document type can hold entities that grow without bound, or that name other files.
 _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 
@@ -31,12 +31,12 @@ _DOCUMENT_TYPE = re.compile(r"<!(DOCTYPE|ENTITY)", re.IGNORECASE)
 def track_text(path: Path, *, xml: bool) -> str:
     """The text of a file, bytes that are no UTF-8 replaced.
 
-    Of a zipped file (`.kmz`) it is that of its first `.kml`.  Raises LogError for a file of more than `MOST_BYTES`, and
+    Of a zipped file (`.kmz`) it is that of its first `.kml`.  Raises LogError for a file of more than `MAX_BYTES`, and
     for XML with a document type.
     """
     size = path.stat().st_size
-    if size > MOST_BYTES:
-        raise LogError(f"{path}: {size:,} bytes: at most {MOST_BYTES:,} are read of a track", file=path)
+    if size > MAX_BYTES:
+        raise LogError(f"{path}: {size:,} bytes: at most {MAX_BYTES:,} are read of a track", file=path)
     text = _bytes_of(path).decode("utf-8-sig", errors="replace")
     if xml and _DOCUMENT_TYPE.search(text):
         raise LogError(
@@ -56,12 +56,12 @@ def _bytes_of(path: Path) -> bytes:
                 raise LogError(f"{path}: a zipped file without a .kml in it", file=path)
             with archive.open(entry) as file:
                 # What it claims to hold is not what it holds.
-                data = file.read(MOST_BYTES + 1)
+                data = file.read(MAX_BYTES + 1)
     except (zipfile.BadZipFile, zlib.error, NotImplementedError, RuntimeError, EOFError) as error:
         why = " ".join(str(error).split())[:120]
         raise LogError(f"{path}: a zipped file that cannot be read: {why}", file=path) from error
-    if len(data) > MOST_BYTES:
-        message = f"{path}: more than {MOST_BYTES:,} bytes unpacked: at most as many are read of a track"
+    if len(data) > MAX_BYTES:
+        message = f"{path}: more than {MAX_BYTES:,} bytes unpacked: at most as many are read of a track"
         raise LogError(message, file=path)
     return data
 

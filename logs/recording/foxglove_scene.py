@@ -38,7 +38,7 @@ Singles = NDArray[np.float32]
 
 MAP, AIRCRAFT = "map", "aircraft"
 LEVELS = {"debug": Log.DEBUG, "info": Log.INFO, "warning": Log.WARNING, "error": Log.ERROR, "fatal": Log.FATAL}
-MOST_VERTICES = 80  # a side of the terrain mesh
+MAX_VERTICES = 80  # a side of the terrain mesh
 
 
 _XYZ, _RGBA = "xyz", "rgba"
@@ -59,7 +59,7 @@ _KEEP_OUT, _STAY_IN = (0.75, 0.15, 0.15, 1.0), (0.95, 0.85, 0.30, 1.0)
 # A name stands so far above the ground within this of its place, m.
 _LIFT, _NEAR = 40.0, 300.0
 # Upright lines of one outline of a zone, about.
-MOST_POSTS = 24
+MAX_POSTS = 24
 
 
 def timestamp(time_ns: int) -> Timestamp:
@@ -93,7 +93,7 @@ def log_message(time_ns: int, text: str, level: str, name: str = "planfly") -> L
 
 
 def terrain_scene(time_ns: int, scenario: Scenario) -> bytes:
-    """Draw the ground of the area as a coloured mesh of at most `MOST_VERTICES` a side."""
+    """Draw the ground of the area as a coloured mesh of at most `MAX_VERTICES` a side."""
     entity = _entity(time_ns, "terrain")
     mesh = b"" if scenario.terrain is None else _mesh(scenario.terrain, scenario.bounds)
     return length_delimited(2, entity.SerializeToString(deterministic=True) + mesh)
@@ -103,7 +103,7 @@ def _ground(terrain: Terrain, bounds: Floats) -> tuple[Floats, Floats, NDArray[n
     """(n, m, 3) corners of the mesh, (n, m, 3) their colours, and (n, m) which are known; none of them may be."""
 
     def axis(low: float, high: float) -> Floats:
-        return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MOST_VERTICES)))
+        return np.linspace(low, high, int(np.clip((high - low) / terrain.spacing, 2, MAX_VERTICES)))
 
     east, north = axis(*bounds[0]), axis(*bounds[1])
     ground_e, ground_n = np.meshgrid(east, north)
@@ -238,7 +238,7 @@ def zones_scene(time_ns: int, scenario: Scenario, waypoints: Floats) -> bytes:
     for zone in scenario.zones:
         walls = zone_walls(zone, scenario.terrain, low, top)
         for wall in walls:
-            step = max(1, (len(wall) - 1) // MOST_POSTS)
+            step = max(1, (len(wall) - 1) // MAX_POSTS)
             for path in (wall[:, 0], wall[:, 1], *wall[:-1:step]):
                 entity.lines.append(_line(_KEEP_OUT if zone.kind == "exclusion" else _STAY_IN))
                 entity.lines[-1].points.extend(_points(path))

@@ -44,14 +44,14 @@ Ints = NDArray[np.int64]
 # s between messages.
 EVERY = 2
 # Points of one message: when there are so many, they are thinned to so few.
-MOST_POINTS, THINNED = 96, 64
+MAX_POINTS, THINNED = 96, 64
 
 
 class TrackSoFar:
     """Points of the track so far, the oldest first."""
 
     def __init__(self) -> None:
-        self._points = np.zeros((MOST_POINTS + 1, 3))
+        self._points = np.zeros((MAX_POINTS + 1, 3))
         self._count = 0
 
     def add(self, position: Floats) -> Floats:
@@ -60,12 +60,12 @@ class TrackSoFar:
         >>> track = TrackSoFar()
         >>> for k in range(500):
         ...     points = track.add(np.array([float(k), 0.0, 100.0]))
-        >>> len(points) <= MOST_POINTS, points[0].tolist(), points[-1].tolist()
+        >>> len(points) <= MAX_POINTS, points[0].tolist(), points[-1].tolist()
         (True, [0.0, 0.0, 100.0], [499.0, 0.0, 100.0])
         """
         self._points[self._count] = position
         self._count += 1
-        if self._count > MOST_POINTS:
+        if self._count > MAX_POINTS:
             self._points[:THINNED] = thinned(self._points, THINNED)
             self._count = THINNED
         return self._points[: self._count]
@@ -167,7 +167,7 @@ _TYPES = {"f": PackedElementField.FLOAT32, "u": PackedElementField.UINT8}
 _PLAN, _TRACK, _AIRCRAFT = (25, 90, 230, 255), (245, 245, 245, 255), (255, 200, 40, 255)
 _KILL, _DETECTION = (217, 26, 26, 255), (242, 166, 26, 255)
 # m between points of a line, at most so many of them; points of a sphere; points along each side of a triangle.
-_STEP, _MOST, _SPHERE, _SIDE = 30.0, 4000, 150, 7
+_STEP, _MAX_SAMPLES, _SPHERE, _SIDE = 30.0, 4000, 150, 7
 
 
 def cloud(time_ns: int, frame: str, points: Floats, colours: NDArray[np.uint8] | Colour) -> bytes:
@@ -241,7 +241,7 @@ def threats_cloud(time_ns: int, threats: Threats) -> bytes:
 def along(waypoints: Floats) -> Floats:
     """Points of the straight legs between waypoints (w, 3), the waypoints among them, evenly on each leg."""
     lengths = np.sqrt((np.diff(waypoints, axis=0) ** 2).sum(axis=1))
-    step = max(_STEP, float(lengths.sum()) / _MOST)
+    step = max(_STEP, float(lengths.sum()) / _MAX_SAMPLES)
     legs = [
         np.linspace(start, end, max(1, math.ceil(length / step)), endpoint=False)
         for start, end, length in zip(waypoints[:-1], waypoints[1:], lengths.tolist(), strict=True)

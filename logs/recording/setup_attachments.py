@@ -41,8 +41,8 @@ from logs.recording.setup_schema import (
 )
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
-from world.frames import MOST_TERMS, PolyMap
-from world.raster import MOST_PIXELS
+from world.frames import MAX_TERMS, PolyMap
+from world.raster import MAX_PIXELS
 from world.scenario import Scenario, from_spec
 from world.scenario_file import first_fault
 from world.scenario_tables import Guidance, Navigation
@@ -108,7 +108,7 @@ class _File(BaseModel):
     datum: str
     vertical_error_m: float | None
     map_to_pixel: Annotated[
-        list[list[Annotated[float, Field(allow_inf_nan=False)]]], Field(min_length=4, max_length=2 + 2 * MOST_TERMS)
+        list[list[Annotated[float, Field(allow_inf_nan=False)]]], Field(min_length=4, max_length=2 + 2 * MAX_TERMS)
     ]
     map_residual_pixels: float
     parts: list[str]
@@ -146,9 +146,9 @@ def unpack_terrain(attachments: dict[str, bytes], source: str) -> Terrain:
         file = _File.model_validate_json(attachments[TERRAIN_FILE])
     except ValidationError as error:
         raise LogError(**first_fault(error).at(source, TERRAIN_FILE)) from error
-    if file.rows * file.cols > MOST_PIXELS:
+    if file.rows * file.cols > MAX_PIXELS:
         raise LogError(
-            f"{source}: {TERRAIN_FILE}: {file.rows} x {file.cols} pixels: at most {MOST_PIXELS:,} are read", file=source
+            f"{source}: {TERRAIN_FILE}: {file.rows} x {file.cols} pixels: at most {MAX_PIXELS:,} are read", file=source
         )
     blocks = _row_blocks(file.rows, file.cols)
     if len(blocks) != len(file.parts) or any(name not in attachments for name in file.parts):

@@ -16,7 +16,7 @@ from logs.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs,
 
 Floats = NDArray[np.float64]
 
-LEAST_WIDTH = 64
+MIN_WIDTH = 64
 # All of a frame, and the line below it, fit a terminal of 24 lines.
 _HORIZON_ROWS, _HORIZON_COLUMNS = 7, 25
 _DEGREES_A_ROW = 5.0
@@ -33,11 +33,11 @@ class Instruments:
     limits: tuple[tuple[str, float], ...]
 
     def frame(self, time: float, *, width: int = 80) -> list[str]:
-        """Lines of at most ``width`` columns (at least `LEAST_WIDTH`) for the newest row at or before ``time`` (s).
+        """Lines of at most ``width`` columns (at least `MIN_WIDTH`) for the newest row at or before ``time`` (s).
 
         Before the first row, that row is shown.
         """
-        columns = max(LEAST_WIDTH, width)
+        columns = max(MIN_WIDTH, width)
         log = self.log
         k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
         left, right = self._horizon(k), self._numbers(k)

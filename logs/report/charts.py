@@ -176,13 +176,13 @@ def _layer_json(layer: Layer) -> Json:
 # ----------------------------------------------------------------------
 # The flight moment by moment: what slider, read-out and the map's line say of it.
 
-MOST_MOMENTS = 2000
+MAX_MOMENTS = 2000
 
 
 def flight_moments(
     setup: FlightSetup, track: Track, *, name: str = "flown", look: str = "flown", dashed: bool = False
 ) -> dict[str, Any]:
-    """Columns of at most `MOST_MOMENTS` rows of a flight, from its first to its last known place.
+    """Columns of at most `MAX_MOMENTS` rows of a flight, from its first to its last known place.
 
     time (s); east, north, up (m AMSL), above (m above ground, null without terrain); airspeed, climb (m/s); bank (right
     positive), pitch, heading (°); leg.  What is not a number is null.  Beside them legs: what each leg is called.
@@ -194,7 +194,7 @@ def flight_moments(
     >>> len(moments["time"]) == len(moments["leg"]), moments["name"]
     (True, 'flown')
     """
-    rows = drawn_rows(track, MOST_MOMENTS)
+    rows = drawn_rows(track, MAX_MOMENTS)
     position, terrain = track.position[rows], setup.scenario.terrain
     east, north, up = position.T
     above = np.full(len(rows), np.nan) if terrain is None else up - terrain.height(east, north)
@@ -424,7 +424,7 @@ def compare_charts(flights: tuple[NamedFlight, NamedFlight]) -> dict[str, Any]:
 # ----------------------------------------------------------------------
 # The chart of the aircraft's envelope with a flight in it.
 
-_MOST_DOTS = 1000
+_MAX_DOTS = 1000
 
 
 def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
@@ -440,7 +440,7 @@ def envelope_chart(setup: FlightSetup, track: Track | None) -> Chart:
             named = f"steepest {name} at {line.amsl} m"
             slopes.append(Layer("line", named, look, line.airspeed, angle, width=2.0, dashed=dashed))
     if track is not None and len(track):
-        flown = flown_moments(track, _MOST_DOTS)
+        flown = flown_moments(track, _MAX_DOTS)
         slopes.append(Layer("dots", "flown, moment by moment", "flown", flown.airspeed, flown.angle, width=3.0))
         banks.append(Layer("dots", "flown, moment by moment", "flown", flown.airspeed, flown.bank, width=3.0))
     legs = np.degrees(leg_slopes(setup.route.waypoints))

@@ -325,7 +325,7 @@ def _page(
         scenario=tables.scenario_facts(setup),
         flight=tables.flight_facts(setup, track, ended or ""),
         events=tables.event_rows(events),
-        more_events=max(0, len(events) - tables.MOST_EVENTS),
+        more_events=max(0, len(events) - tables.MAX_EVENTS),
         energy=tables.energy_facts(setup, track),
         command=command,
         origin=tables.origin_facts(setup, versions),

@@ -30,7 +30,7 @@ from world.scenario import Scenario
 # The chart of the profile: terrain, plan, flight, spheres and zones in the vertical plane along the path.
 
 # Samples along the path, of the flight, and the least span of heights that is shown, m.
-_SAMPLES, _BLOCKS, _LEAST = 800, 800, 50.0
+_SAMPLES, _BLOCKS, _MIN_SPAN = 800, 800, 50.0
 
 
 def profile_chart(setup: FlightSetup, track: Track | None, failed: Failures) -> Chart:
@@ -74,7 +74,7 @@ def _span(scenario: Scenario, route: Floats, track: Track | None, ground: Floats
     together = np.concatenate(heights)
     together = together[np.isfinite(together)]
     low, high = float(together.min()), float(together.max())
-    span = max(high - low, _LEAST)
+    span = max(high - low, _MIN_SPAN)
     if high < scenario.ceiling <= high + 1.2 * span:
         high = scenario.ceiling
     return low - 0.12 * span, high + 0.14 * span

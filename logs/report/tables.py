@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 Facts = list[tuple[str, str]]
 
 # A page with more events than this would be read by nobody.
-MOST_EVENTS = 200
+MAX_EVENTS = 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,8 +216,8 @@ def _standing(feasible: bool, safe: bool) -> str:
 
 
 def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
-    """List the first `MOST_EVENTS` events as time (s), text and level."""
-    return [(number(event.time, digits=2), event.text, event.level) for event in events[:MOST_EVENTS]]
+    """List the first `MAX_EVENTS` events as time (s), text and level."""
+    return [(number(event.time, digits=2), event.text, event.level) for event in events[:MAX_EVENTS]]
 
 
 def notes_of(setup: FlightSetup) -> list[str]:

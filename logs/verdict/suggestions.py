@@ -29,7 +29,7 @@ from logs.verdict.tolerances import (
     BUFFER_ANGLE,
     BUFFER_LENGTH,
     BUFFER_SPEED,
-    LEAST_RISE,
+    MIN_RISE,
     ROUNDING,
     SPEED_STEP,
     TRIES,
@@ -164,7 +164,7 @@ def slope_suggestions(demands: RouteDemands, leg: int, item: Finding) -> tuple[S
     place, sign = demands.leg(leg), 1.0 if demands.slopes[leg] >= 0.0 else -1.0
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
     alternatives: list[_Sized] = []
-    if gentler >= LEAST_RISE:
+    if gentler >= MIN_RISE:
         change = Change("rise", place, sign * rise, sign * math.floor(gentler), "m")
         alternatives.append((1.0 - gentler / rise, (change,)))
     speed = _slope_speed(demands, leg, planned + BUFFER_ANGLE) if source == "aircraft" else None

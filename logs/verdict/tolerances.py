@@ -116,7 +116,7 @@ SHORTEST_COURSE, SHORTEST_SLOPE = 60.0, 100.0
 # s.  Shortest time that a slope is measured over: shorter ones over-read by degrees.
 SHORTEST_TIME = 4.0
 # rad.  What a fit in calm air cannot resolve, of a course and a slope, and the most that unsteadiness adds.
-COURSE_FLOOR, SLOPE_FLOOR, MOST_UNSTEADY = math.radians(0.02), math.radians(0.1), math.radians(0.5)
+COURSE_FLOOR, SLOPE_FLOOR, MAX_UNSTEADY = math.radians(0.02), math.radians(0.1), math.radians(0.5)
 # rad.  Uncertainty of a course, a slope that was not fitted.
 ROUGH_COURSE, ROUGH_SLOPE = math.radians(0.75), math.radians(0.5)
 
@@ -140,7 +140,7 @@ GUST_TIME = 10.0
 # Standard deviations.  How far the gusts of a leg may carry its mean airspeed.
 GUST_SIGMAS = 2.0
 # rad.  Bank beyond this is a departure.  The simulation's own threshold (flight/simulation/tick.py).
-MOST_BANK = math.radians(75.0)
+MAX_BANK = math.radians(75.0)
 # m/s.  Airspeed below this is a departure of the Aerosonde, and this share of its slowest level speed, which for the
 # Aerosonde is the same, of every other aircraft.
 SLOWEST, SLOWEST_SHARE = 15.0, 0.94
@@ -174,14 +174,14 @@ PARTLY_FLOWN = 2.0
 ANOTHER_PLACE = 1000.0
 # m.  How near to a waypoint counts as having passed it, where the order of waypoints is asked: the corridor's half
 # width, within these.
-NEAR_AT_LEAST, NEAR_AT_MOST = 50.0, 150.0
+MIN_NEAR, MAX_NEAR = 50.0, 150.0
 # Share.  Of the waypoints that were passed at all this many were passed in the plan's order, if the plan is the one
 # that was flown.
 IN_ORDER = 0.8
 # m, m/s.  No position or speed of ours is larger; what is, is garbage.
 FARTHEST, FASTEST = 1e7, 1e4
 # rad, deflection, m/s.  Nor is an attitude, a control or a wind larger.
-MOST_PLAUSIBLE = 1e3
+MAX_PLAUSIBLE = 1e3
 # s.  Stays in a sphere on neighbouring segments that touch to within this are one.  Rounding.
 TOUCH = 1e-6
 # Diagonals of a block of segments.  From this far from a sphere's centre the segments are joined to longer ones, which
@@ -205,7 +205,7 @@ PX4_BETWEEN_WAYPOINTS = 900.0
 # m.  A condition gate nearer than this to a waypoint is at the same position.
 PX4_GATE_APART = 0.05
 # Highest actuator number and value of DO_SET_SERVO.
-PX4_MOST_SERVO, PX4_MOST_PWM = 5, 2000.0
+PX4_MAX_SERVO, PX4_MAX_PWM = 5, 2000.0
 
 # Suggestions
 
@@ -216,6 +216,6 @@ SPEED_STEP = 0.5
 # Share by which a suggested speed stays above the slowest level one.
 ABOVE_SLOWEST = 1.1
 # m.  Least rise that is worth suggesting.
-LEAST_RISE = 1.0
+MIN_RISE = 1.0
 # How often a gentler turn is tried, and a larger shift past a zone, which comes nearer by a third or more each time.
 TRIES, ZONE_TRIES = 6, 40

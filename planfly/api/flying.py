@@ -13,7 +13,7 @@ from logs.recording.reader import FlightLog, LogEvent, read_log
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
 from planfly.api.planning import Wind, changed_scenario
-from planfly.crash_safe_log import MOST_HOURS, MOST_MEGABYTES, FlightLimits
+from planfly.crash_safe_log import MAX_HOURS, MAX_MEGABYTES, FlightLimits
 from planfly.first_start import with_warm_up
 from planfly.kernel_units.unit_kernels import FLYING
 from planfly.open_mission import (
@@ -126,8 +126,8 @@ def fly(
     nav: Navigation | None = None,
     autopilot: str | Path | None = None,
     log_hz: Literal[10, 20, 30, 60] = 60,
-    max_hours: float = MOST_HOURS,
-    max_log: float = MOST_MEGABYTES,
+    max_hours: float = MAX_HOURS,
+    max_log: float = MAX_MEGABYTES,
 ) -> FlownMission:
     """Fly a plan or a mission file in JSBSim, and judge the flight.
 

@@ -71,7 +71,7 @@ def _text(value: object) -> str:
 
 
 # Flights of a campaign that says no number, and the most of one that stops by itself.
-USUAL_FLIGHTS, MOST_FLIGHTS = 300, 5000
+USUAL_FLIGHTS, MAX_FLIGHTS = 300, 5000
 
 
 @dataclass(frozen=True, repr=False)
@@ -210,7 +210,7 @@ def make_goal(flights: int | None, prove: float | None, at_least: float | None, 
             raise ValueError(f"{name}: {value}: at least 0.5 and below 1 is expected")
     if flights is not None and not 1 <= flights <= 10_000_000:
         raise ValueError(f"flights: {flights}: 1 to 10,000,000 is expected")
-    number = flights or (USUAL_FLIGHTS if prove is None else MOST_FLIGHTS)
+    number = flights or (USUAL_FLIGHTS if prove is None else MAX_FLIGHTS)
     return Goal(prove if prove is not None else at_least, prove is not None, number, confidence or USUAL_CONFIDENCE)
 
 

@@ -25,7 +25,7 @@ ACCURACY, FEWEST = 0.25, 150
 _POPULATION = 4096
 # Flights of a round, about, where few directions are open, and the fewest and the most of one direction: workers wait
 # for each round.
-_ROUND, _FEWEST_EACH, _MOST_EACH = 48, 3, 6
+_ROUND, _FEWEST_EACH, _MAX_EACH = 48, 3, 6
 # A direction that is not settled is looked at again with so many times as many flights: a posterior takes a while.
 _LOOK_AGAIN = 1.04
 # Of a spread, what the wind that is asked about takes the place of.
@@ -136,7 +136,7 @@ class _Search:
     def next_round(self) -> list[AskedFlight]:
         """The flights to fly next; none where all is known or used up."""
         self.open = [number for number in self.open if self._is_open(number)]
-        each = max(_FEWEST_EACH, min(_MOST_EACH, _ROUND // max(1, len(self.open))))
+        each = max(_FEWEST_EACH, min(_MAX_EACH, _ROUND // max(1, len(self.open))))
         asked: list[AskedFlight] = []
         for number in self.open:
             for speed, draw in next_flights(self.directions[number], each):

@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 # Failures by rule and place.
 
 # Most bars, of the most frequent.
-MOST = 14
+MAX_BARS = 14
 
 
 def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figure:
@@ -28,7 +28,7 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
     counts: rule's title, place in words, flights.  flights: all of them.
     """
     with clean_style():
-        shown = sorted(counts, key=lambda one: -one[2])[:MOST]
+        shown = sorted(counts, key=lambda one: -one[2])[:MAX_BARS]
         tall = 1.4 + 0.32 * max(1, len(shown))
         figure = new_figure(tall)
         axes = figure.add_axes((0.27, 0.6 / tall, 0.69, 1.0 - 1.1 / tall))
@@ -59,7 +59,7 @@ def draw_failures(counts: Sequence[tuple[str, str, int]], flights: int) -> Figur
 
 
 # Speeds are put together in steps of so many m/s, or wider where that would make more than so many.
-_STEP, _MOST_BINS = 1.0, 20
+_STEP, _MAX_BINS = 1.0, 20
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def speed_bins(speed: Floats, flyable: NDArray[np.bool_], confidence: float = 0.
     """
     if not speed.size:
         return []
-    width = max(_STEP, float(np.ptp(speed)) / _MOST_BINS)
+    width = max(_STEP, float(np.ptp(speed)) / _MAX_BINS)
     group = np.floor(speed / width).astype(int)
     bins = []
     for number in np.unique(group):

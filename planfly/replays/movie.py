@@ -24,7 +24,7 @@ from world.files import temporary_folder, write_whole
 
 # A film lasts this long unless a speed is given, s.
 _LASTS = 20.0
-_MOST_FRAMES = 5000
+_MAX_FRAMES = 5000
 # The last frame of a GIF stands, ms.
 _REST = 2000
 # The colour number that lets the frame before show.
@@ -50,8 +50,8 @@ def write_movie(log: FlightLog, args: argparse.Namespace, start: float, end: flo
         allowed = "an .mp4 needs ffmpeg, which is not installed; a .gif or a folder does not"
         raise PlanflyError.at(target, "--movie", kind, allowed, shown="")
     film = MovieFrames(log.setup, log.track, start, end, args.speed or max(1.0, (end - start) / _LASTS))
-    if len(film) > _MOST_FRAMES:
-        allowed = f"at most {_MOST_FRAMES:,}; raise --speed"
+    if len(film) > _MAX_FRAMES:
+        allowed = f"at most {_MAX_FRAMES:,}; raise --speed"
         raise PlanflyError.at(target, "--movie", len(film), allowed, shown=f"{len(film):,} frames")
     if not kind:
         return _write_folder(target, film)

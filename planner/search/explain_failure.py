@@ -178,7 +178,7 @@ def highest_allowed(problem: Problem) -> tuple[float, str]:
 # Places looked at along and across the way.
 ALONG, ACROSS = 200, 400
 # Names of zones that are said, at most; and between places of a path that is looked at for them, m.
-MOST_NAMES, ZONE_PITCH = 4, 20.0
+MAX_NAMES, ZONE_PITCH = 4, 20.0
 
 
 def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
@@ -205,11 +205,11 @@ def what_blocks(plan: Plan, limits: Limits | None = None) -> list[str]:
         lines += narrow_bands(problem) or ([] if lines else _reserve_walls(problem))
     closed = closing_zones(scenario)
     if closed is not None:
-        names = ", ".join(closed.zones[:MOST_NAMES]) + (" and more" if len(closed.zones) > MOST_NAMES else "")
+        names = ", ".join(closed.zones[:MAX_NAMES]) + (" and more" if len(closed.zones) > MAX_NAMES else "")
         lines.append(f"zones close the whole way (gaps narrower than {closed.pitch:.0f} m count as closed): {names}")
     violated_zones = zones_entered(scenario, plan.waypoints)
     if violated_zones:
-        lines.append(f"the best path does not keep to: {', '.join(violated_zones[:MOST_NAMES])}")
+        lines.append(f"the best path does not keep to: {', '.join(violated_zones[:MAX_NAMES])}")
     elif not lines:
         violated = [item.name.lower() for item in Violation if plan.violations[item]]
         if violated:

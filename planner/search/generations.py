@@ -27,7 +27,7 @@ Ints = NDArray[np.int64]
 
 # A seeded search ends when this many generations have shortened its best path by less than this share of the straight
 # line: the pattern search at the end is faster at the rest.
-STALLED_GENERATIONS, LEAST_GAIN = 10, 2e-4
+STALLED_GENERATIONS, MIN_GAIN = 10, 2e-4
 # Of the evaluations that the paper's planner makes, the share that a seeded search's generations spend: while it has no
 # safe path, and once it has.
 SEARCH_SHARE, SAFE_SHARE = 0.3, 0.1
@@ -98,7 +98,7 @@ def _stagnant(bests: list[Floats]) -> bool:
         return False
     before, after = bests[-1 - STALLED_GENERATIONS], bests[-1]
     same = np.array_equal(before[:LENGTH], after[:LENGTH]) and before[KILL] == after[KILL]
-    return bool(same and before[LENGTH] - after[LENGTH] < LEAST_GAIN)
+    return bool(same and before[LENGTH] - after[LENGTH] < MIN_GAIN)
 
 
 # ----------------------------------------------------------------------
@@ -116,11 +116,11 @@ def _stagnant(bests: list[Floats]) -> bool:
 
 # Generations at most: the last moves waypoints by decimetres.  Beside seeds, whose best path is tightened in any case,
 # fewer of fewer waypoints do: this share of the population at first.
-MOST_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
+MAX_GENERATIONS, SEEDED_GENERATIONS, SEEDED_SHARE = 10, 6, 0.4
 # Of the first generation's waypoints an interval, the share that later ones have, and the fewest.
 LATER_SHARE, FEWEST = 0.2, 24
 # Legs that one generation may be able to join, so many that they fit the memory of a small machine.
-MOST_LEGS = 6_000_000
+MAX_LEGS = 6_000_000
 # First deviations about a kept waypoint, as shares of the interval, along and across, and up, m; what is left of them
 # after each generation.
 FIRST_ALONG, FIRST_ACROSS, FIRST_UP, SHRINK = 0.4, 0.5, 60.0, 0.5
@@ -140,7 +140,7 @@ MENDING = 100
 def waypoint_generations(search: Search, population: int, generations: int) -> None:
     """Search with this many waypoints an interval at first; the archive takes the paths that are found.
 
-    generations: at most `MOST_GENERATIONS` are made, or `SEEDED_GENERATIONS`.
+    generations: at most `MAX_GENERATIONS` are made, or `SEEDED_GENERATIONS`.
     """
     encoding, space = search.encoding, search.problem.space
     inner = encoding.waypoints - 2
@@ -148,7 +148,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
     data = search.problem.search
     sampling = NicheSampling(lower, upper, lambda rows, _: open_places(data, frame.restore(rows)), search.rng)
-    seeded, most = search.algorithm.seeded, int(math.sqrt(MOST_LEGS / (inner + 1)))
+    seeded, most = search.algorithm.seeded, int(math.sqrt(MAX_LEGS / (inner + 1)))
     first = max(2, min(int(population * (SEEDED_SHARE if seeded else 1.0)), most))
     later = min(first, max(FEWEST, int(LATER_SHARE * first)))
     interval = frame.length / inner
@@ -157,7 +157,7 @@ def waypoint_generations(search: Search, population: int, generations: int) -> N
     if not len(search.archive.vectors):
         # Something to show, whenever the search is asked to end.
         search.evaluate(_as_vectors(rows[:, :1]))
-    steps = min(generations, SEEDED_GENERATIONS if seeded else MOST_GENERATIONS)
+    steps = min(generations, SEEDED_GENERATIONS if seeded else MAX_GENERATIONS)
     slack_at_first = SEEDED_SLACK if seeded else FIRST_SLACK
     for step in range(steps):
         rows[:, 0] = search.archive.vectors[0].reshape(inner, 3)

@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 PARTS = ("scores", "certificates", "shortening", "routes", "paper")
 WAYPOINTS = 8
-STAGES, MOST_ROUTES, FEW = 12, 2, 4
+STAGES, MAX_ROUTES, FEW = 12, 2, 4
 # How far the path passes aside of the middle, and above it, m.
 ASIDE, ABOVE = 300.0, 20.0
 
@@ -74,7 +74,7 @@ def _route(task: _Task) -> None:
     for route in [found] if isinstance(found, GridRoute) else []:
         fit_waypoints(data, frame, route.points, WAYPOINTS)
     grid = optimistic_grid(data, frame, span, STAGES, shrink=0.5, spread=0.2, ratio=0.5)
-    side_routes(data, frame, grid, 2.0 * frame.length, MOST_ROUTES)
+    side_routes(data, frame, grid, 2.0 * frame.length, MAX_ROUTES)
 
 
 def _score_as_the_paper(task: _Task) -> None:

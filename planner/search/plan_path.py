@@ -37,9 +37,9 @@ LAST_SEARCH = 200
 # Moves that tighten the best path at the end, each of so many rounds, as shares of the first that fit a seed.
 LAST_MOVES, LAST_ROUNDS = (1.0, 0.5, 0.25, 0.12), 4
 # Of the airspeed: in more wind no path is searched for.
-MOST_WIND = 0.8
+MAX_WIND = 0.8
 # Numbers a population may hold.
-MOST_NUMBERS = 30_000_000
+MAX_NUMBERS = 30_000_000
 
 
 def plan_path(
@@ -126,20 +126,20 @@ def _attempts(search: Search, previous: Floats | None) -> tuple[Floats, Certific
 
 
 def _check_options(scenario: Scenario, airspeed: float) -> None:
-    if scenario.wind.speed > MOST_WIND * airspeed:
+    if scenario.wind.speed > MAX_WIND * airspeed:
         raise ScenarioError.at(
             scenario.name,
             "wind.speed_mps",
             scenario.wind.speed,
-            f"a path is searched for in at most {MOST_WIND:.0%} of the airspeed {airspeed:g}, to make way on every"
+            f"a path is searched for in at most {MAX_WIND:.0%} of the airspeed {airspeed:g}, to make way on every"
             " course",
             shown=f"{scenario.wind.speed:g}",
         )
     table = scenario.planner
-    if table.population * 3 * table.waypoints > MOST_NUMBERS:
+    if table.population * 3 * table.waypoints > MAX_NUMBERS:
         raise ScenarioError(
             f"{scenario.name}: planner.population: {table.population} of {table.waypoints} waypoints: "
-            f"too large; allowed: population x 3 x waypoints up to {MOST_NUMBERS:,}",
+            f"too large; allowed: population x 3 x waypoints up to {MAX_NUMBERS:,}",
             file=scenario.name,
             field="planner.population",
         )

@@ -73,7 +73,7 @@ ARCHIVE_SIZE = 24
 # Room beside spheres and above ground that a path is shortened with until it is certified, m.
 SPARES = (0.1, 2.0)
 # Evaluations that moving all waypoints may take: with less left of a budget they are not moved.
-MOST_TIGHTENING = 600
+MAX_TIGHTENING = 600
 # Waypoints of paths that are evaluated before the search may end: some 10 ms.
 WAYPOINTS_AT_ONCE = 4000
 # Certificates that are made of the archive before the search may end: some 10 ms where none is to be had.
@@ -217,7 +217,7 @@ class Search:
 
     def tighten(self, vector: Floats, rounds: int, scale: float, most: int) -> Floats:
         """Move all waypoints of a vector (d,) at once, then `improve` it.  Gives the best scores (8,)."""
-        if self._budget() - self.evaluations < MOST_TIGHTENING:
+        if self._budget() - self.evaluations < MAX_TIGHTENING:
             return self.improve(vector, most)
         moved, made = tighten(self.problem.search, self.encoding, vector, rounds, scale)
         self.evaluations += made

@@ -119,11 +119,11 @@ def _routes(search: Search, grids: tuple[tuple[int, int], ...]) -> list[GridRout
 STAGES, SPREAD, RATIO, SHRINKS = 50, 0.2, 1.0 / 3.0, (0.2, 0.5)
 # Routes of one grid, and what they may cost: over the best path, or where none is safe over the straight line.  Grids
 # know few courses, and their routes are longer by some percent.
-MOST_ROUTES, SLACK, MOST_DETOUR = 8, 1.08, 1.8
+MAX_ROUTES, SLACK, MAX_DETOUR = 8, 1.08, 1.8
 # A best path that is longer than the straight line by less than this share has no other side worth looking for.
-LEAST_DETOUR = 0.004
+MIN_DETOUR = 0.004
 # Of a path shortened again, from waypoints at equal distances: times, and the least gain for another, as a share.
-AGAIN, LEAST_GAIN = 3, 2e-5
+AGAIN, MIN_GAIN = 3, 2e-5
 
 
 def search_other_sides(search: Search) -> None:
@@ -133,14 +133,14 @@ def search_other_sides(search: Search) -> None:
     encoding, space, data = search.encoding, search.problem.space, search.problem.search
     frame = rotated_frame(space.start, space.destination)
     straight, found_one = math.dist(space.start, space.destination), search.has_safe()
-    length = search.length_ratio() if found_one else MOST_DETOUR
-    if is_limited(data.airspace) or length < 1.0 + LEAST_DETOUR:
+    length = search.length_ratio() if found_one else MAX_DETOUR
+    if is_limited(data.airspace) or length < 1.0 + MIN_DETOUR:
         return
     span = (float(encoding.lower[1::3].min()), float(encoding.upper[1::3].max()))
     for shrink in SHRINKS:
         grid = optimistic_grid(data, frame, span, STAGES, shrink=shrink, spread=SPREAD, ratio=RATIO)
-        bound = straight * (SLACK * search.length_ratio() if search.has_safe() else MOST_DETOUR)
-        for route in side_routes(data, frame, grid, bound, MOST_ROUTES):
+        bound = straight * (SLACK * search.length_ratio() if search.has_safe() else MAX_DETOUR)
+        for route in side_routes(data, frame, grid, bound, MAX_ROUTES):
             if search.over():
                 return
             search.shorten(evenly(frame.restore(route.points), encoding.waypoints))
@@ -155,7 +155,7 @@ def shorten_best(search: Search) -> None:
         before = path_length(search.shortest[0])
         search.shorten(evenly(search.shortest[0], search.encoding.waypoints))
         search.shorten(search.shortest[0])
-        if path_length(search.shortest[0]) > (1.0 - LEAST_GAIN) * before:
+        if path_length(search.shortest[0]) > (1.0 - MIN_GAIN) * before:
             return
 
 

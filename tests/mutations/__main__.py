@@ -2,7 +2,7 @@
 
 Each mutant is tried in a copy of the sources with the tests that cover it, two at a time; the list and its order are
 the same each time.  Printed: killed and alive by room; ``runs/mutations.json`` holds every trial as it ends, so that
-``--go-on`` goes on with a run of the same sources that was stopped.  Exit code 1 where more than `MOST_ALIVE` of them
+``--go-on`` goes on with a run of the same sources that was stopped.  Exit code 1 where more than `MAX_SURVIVAL` of them
 survive, or any change of a limit.
 """
 
@@ -27,7 +27,7 @@ from world.files import write_whole
 
 TARGET = Path("runs") / "mutations.json"
 # Share of the mutants that may survive: some change nothing that anyone could see.
-MOST_ALIVE = 0.05
+MAX_SURVIVAL = 0.05
 
 
 def main() -> int:
@@ -113,7 +113,7 @@ def _report(trials: list[Trial]) -> int:
     _keep(trials)
     print(f"written to {TARGET}")
     limits = any(trial.mutant.room == "limits" for trial in alive)
-    return int(limits or len(alive) > MOST_ALIVE * len(trials))
+    return int(limits or len(alive) > MAX_SURVIVAL * len(trials))
 
 
 def _keep(trials: list[Trial]) -> None:

@@ -12,7 +12,7 @@ LIMITS = "logs/verdict/tolerances.py"
 STEP = 1.3
 # Of bounds on garbage, condition numbers and rounding only the order of magnitude matters.
 ORDERS = 1000.0
-BY_ORDERS = ("FARTHEST", "FASTEST", "MOST_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CHORD_TIME", "FAR")
+BY_ORDERS = ("FARTHEST", "FASTEST", "MAX_PLAUSIBLE", "SINGULAR", "TOUCH", "U_TURN", "CHORD_TIME", "FAR")
 # Numbers that decide how much is computed, where more costs nothing but time: how each is changed.
 EFFORTS = {"CHORD_TIME": "*", "FAR": "/", "TRIES": ""}
 

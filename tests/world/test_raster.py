@@ -74,7 +74,7 @@ def test_damaged_and_bloated_npz(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert_refused(tmp_path / "bad.npz", "not a readable")
     (tmp_path / "half.npz").write_bytes(data[: len(data) // 2])
     assert_refused(tmp_path / "half.npz", "not a readable")
-    monkeypatch.setattr("world.raster.MOST_PIXELS", 1_000_000)
+    monkeypatch.setattr("world.raster.MAX_PIXELS", 1_000_000)
     np.savez_compressed(tmp_path / "bomb.npz", elevation=np.zeros((1001, 1000)), xmin=0, xmax=1, ymin=0, ymax=1)
     assert_refused(tmp_path / "bomb.npz", "unpacked: at most")
 

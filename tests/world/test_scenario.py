@@ -398,7 +398,7 @@ def test_more_zones_hold_no_end_but_of_a_scenario_made_around_a_mission(
 
 
 def test_zones_are_counted_with_those_that_are_there(scenario: Scenario, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("world.scenario.MOST_ZONES", 2)
+    monkeypatch.setattr("world.scenario.MAX_ZONES", 2)
     tables = [ZoneTable(name="mill", kind="exclusion", east_m=9000.0, north_m=9000.0, radius_m=5.0)]
     two = with_zones(with_zones(scenario, tables, "a"), tables, "b")
     assert len(two.zones) == 2

@@ -10,7 +10,7 @@ from xml.etree import ElementTree
 from world.airspace.zones import holes_lie_inside
 from world.errors import ScenarioError
 from world.scenario_file import checked_table
-from world.scenario_tables import MOST_ZONES, ZoneTable
+from world.scenario_tables import MAX_ZONES, ZoneTable
 
 # ----------------------------------------------------------------------
 # What files of zones say beside their shapes: kind, floor and ceiling, as entries of a [[zones]] table.
@@ -316,7 +316,7 @@ def _extended(placemark: _Element, source: str) -> dict[str, Any]:
 _READERS = {".geojson": geojson_zones, ".json": geojson_zones, ".kml": kml_zones}
 SUFFIXES = tuple(_READERS)
 # Bytes of a file at most.
-MOST_BYTES = 16 * 2**20
+MAX_BYTES = 16 * 2**20
 
 
 def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) -> list[ZoneTable]:
@@ -328,9 +328,9 @@ def read_zone_files(files: str | Sequence[str], source: str, base: Path | None) 
     tables = []
     for file in [files] if isinstance(files, str) else files:
         tables += read_zone_file(Path(base or "", file), f"{source}: zones_file: {file}")
-    if len(tables) > MOST_ZONES:
+    if len(tables) > MAX_ZONES:
         raise ScenarioError(
-            f"{source}: zones_file: {len(tables):,} zones in all: at most {MOST_ZONES:,}",
+            f"{source}: zones_file: {len(tables):,} zones in all: at most {MAX_ZONES:,}",
             file=source,
             field="zones_file",
         )
@@ -368,9 +368,9 @@ def _text(path: Path, source: str) -> str:
     try:
         if not path.is_file():
             raise ScenarioError(f"{source}: no such file", file=source)
-        if path.stat().st_size > MOST_BYTES:
+        if path.stat().st_size > MAX_BYTES:
             raise ScenarioError(
-                f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MOST_BYTES:,}", file=source
+                f"{source}: {path.stat().st_size:,} bytes: a file of zones has at most {MAX_BYTES:,}", file=source
             )
         return path.read_text(encoding="utf-8-sig")
     except OSError as error:

@@ -19,7 +19,7 @@ Datum = Literal["amsl", "ground"]
 Ring = tuple[tuple[float, float], ...]
 
 # m^2.  A polygon with less inside is empty.
-LEAST_AREA = 1.0
+MIN_AREA = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,8 +108,8 @@ def make_polygon(rings: Sequence[Sequence[tuple[float, float]]]) -> Polygon:
 
 
 def _check_area(inside: float) -> None:
-    if not inside >= LEAST_AREA:
-        raise ValueError(f"nothing inside: {inside:.3g} m2; at least {LEAST_AREA:g} m2 are needed")
+    if not inside >= MIN_AREA:
+        raise ValueError(f"nothing inside: {inside:.3g} m2; at least {MIN_AREA:g} m2 are needed")
 
 
 def _cross(one: shapely.Polygon, other: shapely.Polygon) -> bool:

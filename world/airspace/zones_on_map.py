@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 # along a parallel at 46 degrees bends by so much over 2.2 km.
 EDGE_BEND = 0.1
 # Pieces that an edge is cut into at most.
-_MOST_PIECES = 2_000
+_MAX_PIECES = 2_000
 
 
 def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[tuple[float, float]]:
@@ -47,7 +47,7 @@ def ring_on_map(origin: GeoOrigin, corners: Sequence[Sequence[float]]) -> list[t
     middle = to_map(origin, lat + 0.5 * step_lat, lon + 0.5 * step_lon)
     off = np.hypot(middle[0] - 0.5 * (east + np.roll(east, -1)), middle[1] - 0.5 * (north + np.roll(north, -1)))
     # The bend of a piece falls with the square of its length.
-    pieces = np.clip(np.ceil(np.sqrt(off / EDGE_BEND)), 1, _MOST_PIECES).astype(int)
+    pieces = np.clip(np.ceil(np.sqrt(off / EDGE_BEND)), 1, _MAX_PIECES).astype(int)
     lats, lons = [], []
     for k, count in enumerate(pieces.tolist()):
         shares = np.arange(count) / count

@@ -66,9 +66,9 @@ ARDUPILOT_MEMORY = record_dtype(
 # `flight.guidance.lateral_reference_laws`.  ArduPlane navigates ten times a second: what it demands stays until then.
 
 # An acceptance is sent as whole metres in a byte.
-MOST_ACCEPTANCE = 255.0
+MAX_ACCEPTANCE = 255.0
 # Least that the roll limit is narrowed to by low airspeed, rad.
-_LEAST_ROLL_LIMIT = math.radians(25.0)
+_MIN_ROLL_LIMIT = math.radians(25.0)
 
 
 @compiled
@@ -81,7 +81,7 @@ def turn_distance(
     turn: rad, positive.  radius: WP_RADIUS, m.  length: of L1, m.
     air_density_factor: true by equivalent airspeed; with height a turn takes its square more room.
     """
-    stated = math.floor(min(MOST_ACCEPTANCE, acceptance))
+    stated = math.floor(min(MAX_ACCEPTANCE, acceptance))
     if stated > 0.0:
         return stated
     whole: float = min(radius * air_density_factor * air_density_factor, length)
@@ -228,7 +228,7 @@ def roll_demand(
     if parameters.stall_prevention <= 0.0:
         return wanted
     spare = max(1.0, airspeed / parameters.airspeed_min)
-    limit = max(_LEAST_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
+    limit = max(_MIN_ROLL_LIMIT, math.acos(min(1.0, 1.0 / (spare * spare))))
     demanded: float = min(limit, max(-limit, wanted))
     return demanded
 

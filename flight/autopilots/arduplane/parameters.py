@@ -32,7 +32,7 @@ Floats = NDArray[np.float64]
 # a comment (ArduPilot's documentation, "Saving and Loading Parameters"; QGroundControl's, "Plain-Text File Format").
 
 # A vehicle has some 1,500 parameters in lines of 40 bytes.
-MOST_BYTES = 4 * 2**20
+MAX_BYTES = 4 * 2**20
 # ArduPilot's names have at most sixteen characters (MAVLink, PARAM_VALUE).
 _NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
@@ -59,7 +59,7 @@ def read_parameter_file(path: Path) -> dict[str, Entry]:
 
     Raises ParameterError, in one line, for a file that cannot be read and as `parse_parameters` does.
     """
-    data = read_small_file(path, MOST_BYTES, "parameter", ParameterError)
+    data = read_small_file(path, MAX_BYTES, "parameter", ParameterError)
     return parse_parameters(utf8_text(data, path, ParameterError), str(path))
 
 

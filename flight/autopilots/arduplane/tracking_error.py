@@ -15,7 +15,7 @@ from aircraft.envelope import GRAVITY
 from aircraft.tracking import SPEED_SHARES, TURNS, TrackingError
 from flight.autopilots.arduplane.law import (
     ARDUPILOT_MEMORY,
-    MOST_ACCEPTANCE,
+    MAX_ACCEPTANCE,
     NAVIGATION_TICK,
     ROLL_LAG,
     navigate_legs,
@@ -37,7 +37,7 @@ _LEG, _BEFORE = 4000.0, 200.0
 # Acceptances that are tried: so many, and again about the best.
 _TRIED, _ROUNDS = 9, 2
 # Least acceptance, m: that of a straight leg, which navigation and gusts leave it far inside.
-LEAST_ACCEPTANCE = 15.0
+MIN_ACCEPTANCE = 15.0
 # What wind made of still air's excursion at the highest ground speed: of 200 corners of 15 to 90 degrees at 25 m/s, in
 # 5 and 10 m/s from anywhere, at most 1.17 up to 45 degrees, 1.22 at 60 and 1.54 at 90.
 WIND_SPREAD = 1.1, 0.5
@@ -121,9 +121,9 @@ def _fill(
         for j in range(speeds.size):
             corner = corners[i, j]
             if turns[i] == 0.0:
-                corner.acceptance = LEAST_ACCEPTANCE
+                corner.acceptance = MIN_ACCEPTANCE
                 continue
-            low, high = LEAST_ACCEPTANCE, MOST_ACCEPTANCE
+            low, high = MIN_ACCEPTANCE, MAX_ACCEPTANCE
             best, least = low, math.inf
             for _ in range(1 if fly_over else _ROUNDS):
                 step = (high - low) / (_TRIED - 1)
@@ -133,7 +133,7 @@ def _fill(
                     if flown[0] < least:
                         best, least = acceptance, flown[0]
                         corner.excursion, corner.after = flown
-                low, high = max(LEAST_ACCEPTANCE, best - step), min(MOST_ACCEPTANCE, best + step)
+                low, high = max(MIN_ACCEPTANCE, best - step), min(MAX_ACCEPTANCE, best + step)
             corner.acceptance = best
             corner.before = 0.0 if fly_over else best
 

@@ -16,8 +16,8 @@ from logs.verdict.tolerances import (
     ARRIVED,
     CAPTURE_RADIUS,
     IN_ORDER,
-    NEAR_AT_LEAST,
-    NEAR_AT_MOST,
+    MAX_NEAR,
+    MIN_NEAR,
     PARTLY_FLOWN,
 )
 
@@ -194,7 +194,7 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     nearest, when = _closest(points, flown)
     if nearest.min() > ANOTHER_PLACE:
         return PlanMismatch("place", distance=float(nearest.min()))
-    near = min(NEAR_AT_MOST, max(NEAR_AT_LEAST, setup.corridor))
+    near = min(MAX_NEAR, max(MIN_NEAR, setup.corridor))
     passed = nearest <= near
     if passed.sum() < 3:
         return None

@@ -19,7 +19,7 @@ from logs.verdict.tolerances import (
     IDLE,
     INDEPENDENT,
     KNOWN_TO,
-    MOST_UNSTEADY,
+    MAX_UNSTEADY,
     NO_CURRENT,
     ROUGH_COURSE,
     ROUGH_SLOPE,
@@ -138,7 +138,7 @@ def leg_slope(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> LegFit 
 
 def _unsteady(floor: float, rest: float, run: float) -> float:
     """Tolerance of a fitted angle: what is left beside the line, at the ends of the run, turns it this far."""
-    return min(floor + math.atan2(2.0 * rest, run), MOST_UNSTEADY)
+    return min(floor + math.atan2(2.0 * rest, run), MAX_UNSTEADY)
 
 
 @dataclass(frozen=True, slots=True)

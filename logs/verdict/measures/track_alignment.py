@@ -16,7 +16,7 @@ from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
 from logs.verdict.measures.route_requirements import RouteDemands, route_demands
-from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MOST_PLAUSIBLE
+from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MAX_PLAUSIBLE
 from world.kernels import compiled
 
 Floats = NDArray[np.float64]
@@ -150,9 +150,9 @@ def _usable(track: Track, *, own: bool) -> NDArray[np.bool_]:
             good &= np.isfinite(getattr(track, name))
         plausible = (
             *plausible,
-            ("attitude", MOST_PLAUSIBLE),
-            ("controls", MOST_PLAUSIBLE),
-            ("wind", MOST_PLAUSIBLE),
+            ("attitude", MAX_PLAUSIBLE),
+            ("controls", MAX_PLAUSIBLE),
+            ("wind", MAX_PLAUSIBLE),
         )
     for name, largest in plausible:
         # A NaN is not within any bound.

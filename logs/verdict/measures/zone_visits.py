@@ -169,7 +169,7 @@ VISIT = record_dtype(
 DEPTH_PRECISION, EDGE_PRECISION = 0.01, 1e-3
 # Parts at a time: halves of halves, of which a way of 1,000 km comes down to `EDGE_PRECISION` in 34, the whole move,
 # and one to swap two by.
-_MOST_PARTS = 64
+_MAX_PARTS = 64
 # s.  Two stays that are no further apart are one.
 _TOUCH = 1e-6
 
@@ -205,7 +205,7 @@ def _path_zones(
             for b in range(blocks.shape[0]):
                 block = blocks[b]
                 apart[z] = min(apart[z], box_distance(records, z, block.west, block.east, block.south, block.north))
-    parts = np.zeros(_MOST_PARTS, PART)
+    parts = np.zeros(_MAX_PARTS, PART)
     known = -math.inf
     # The nearest first: what is known of them says of the others that they are further away.
     for z in np.argsort(apart, kind="mergesort"):
@@ -344,9 +344,9 @@ def _cut_move(
             exclusion, earlier.away, earlier.off
         ):
             # The half that may be deeper is to lie on top: what is found there spares the other.
-            copy_part(part, parts[_MOST_PARTS - 1])
+            copy_part(part, parts[_MAX_PARTS - 1])
             copy_part(earlier, part)
-            copy_part(parts[_MOST_PARTS - 1], earlier)
+            copy_part(parts[_MAX_PARTS - 1], earlier)
         left += 1
 
 

@@ -10,7 +10,7 @@ from logs.verdict.findings import Finding, Message, make_finding, message, reaso
 from logs.verdict.measures.route_requirements import RouteDemands
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
-from logs.verdict.tolerances import MOST_BANK, SLOWEST, SLOWEST_SHARE
+from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
 
 Floats = NDArray[np.float64]
 
@@ -27,8 +27,8 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
         faults.append(
             message(f"{aligned.bad_rows} rows without usable numbers, the first {_time_text(aligned.first_bad)}")
         )
-    if (bank > MOST_BANK).any():
-        k = int(np.argmax(bank > MOST_BANK))
+    if (bank > MAX_BANK).any():
+        k = int(np.argmax(bank > MAX_BANK))
         faults.append(message(f"bank {math.degrees(bank[k]):.0f}° at {track.time[k]:.1f} s"))
     faults += slow
     if (aligned.low <= 0.0).any():
@@ -45,10 +45,10 @@ def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> l
             reason=reason_of(faults) if faults else steady,
             faults=faults,
             flown=math.degrees(most),
-            limit=math.degrees(MOST_BANK),
+            limit=math.degrees(MAX_BANK),
             source="check",
             tolerance=0.0,
-            margin=math.degrees(MOST_BANK - most),
+            margin=math.degrees(MAX_BANK - most),
             unit="deg",
             method="every row",
         )

@@ -34,8 +34,8 @@ from logs.verdict.tolerances import (
     PX4_FIRST_WAYPOINT,
     PX4_GATE_APART,
     PX4_LANDING_ANGLE_DEG,
-    PX4_MOST_PWM,
-    PX4_MOST_SERVO,
+    PX4_MAX_PWM,
+    PX4_MAX_SERVO,
     PX4_STEEPEST_LANDING,
     PX4_TAKEOFF_BUFFER,
 )
@@ -112,13 +112,13 @@ def _validity(mission: Mission) -> Iterator[_Remark]:
                 item.seq,
                 f"{name} in frame {item.frame}, above terrain, which PX4 does not take; ArduPlane does",
             )
-        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MOST_SERVO:
-            yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MOST_SERVO}"
-        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MOST_PWM:
+        elif item.command == C.DO_SET_SERVO and not 0 <= item.params[0] <= PX4_MAX_SERVO:
+            yield REFUSED, item.seq, f"actuator number {item.params[0]:g} is out of bounds 0..{PX4_MAX_SERVO}"
+        elif item.command == C.DO_SET_SERVO and not abs(item.params[1]) <= PX4_MAX_PWM:
             yield (
                 REFUSED,
                 item.seq,
-                f"actuator value {item.params[1]:g} is out of bounds -{PX4_MOST_PWM:g}..{PX4_MOST_PWM:g}",
+                f"actuator value {item.params[1]:g} is out of bounds -{PX4_MAX_PWM:g}..{PX4_MAX_PWM:g}",
             )
     if mission.items and mission.items[0].command == C.NAV_LAND:
         yield REFUSED, mission.items[0].seq, "starts with landing"

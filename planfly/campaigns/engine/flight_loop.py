@@ -162,7 +162,7 @@ def fly_task(campaign: str, index: int, wind: GivenWind | None) -> FlightRow:
 # How a flight ended that could not be flown.
 LOST = "lost: its workers died"
 # How often dask gives a flight up before it is lost: its workers may have died of something else.
-_MOST_GIVEN_UP = 3
+_MAX_FAILURES = 3
 # Names of tasks, which dask keeps the last 100,000 of: enough of them that one is long forgotten when it comes again.
 _NAMES = 4096
 
@@ -231,7 +231,7 @@ class Pilots:
                 row = self._result(future, order)
                 if row is None:
                     given_up[order] += 1
-                if row is None and given_up[order] < _MOST_GIVEN_UP:
+                if row is None and given_up[order] < _MAX_FAILURES:
                     send(order)
                 else:
                     yield Flown(order, row or lost_row(self._base, order.index, LOST))

@@ -166,7 +166,7 @@ def check_middle(base: CampaignBase) -> None:
 
 # In the order in which turbulence grows.
 LEVELS: tuple[Literal["none", "light", "moderate"], ...] = ("none", "light", "moderate")
-MOST_WIND, MOST_GRADIENT = 40.0, 0.05
+MAX_WIND, MAX_GRADIENT = 40.0, 0.05
 
 
 class GivenWind(NamedTuple):
@@ -207,9 +207,9 @@ def _in_wind(scenario: Scenario, values: dict[str, float], mean: GivenWind | Non
     """The scenario in the wind of a draw; gusts have the flight's seed, whatever the scenario states."""
     old = scenario.wind
     about = mean or GivenWind(old.speed, math.degrees(old.from_course))
-    speed = min(MOST_WIND, max(0.0, about.speed + values["wind_speed"]))
+    speed = min(MAX_WIND, max(0.0, about.speed + values["wind_speed"]))
     from_deg = (about.from_deg + values["wind_from"]) % 360.0
-    gradient = min(MOST_GRADIENT, max(-MOST_GRADIENT, old.gradient + values["wind_gradient"]))
+    gradient = min(MAX_GRADIENT, max(-MAX_GRADIENT, old.gradient + values["wind_gradient"]))
     level = LEVELS.index(old.turbulence) + round(values["turbulence"])
     turbulence = LEVELS[min(len(LEVELS) - 1, max(0, level))]
     table = WindTable(speed_mps=speed, from_deg=from_deg, gradient=gradient, turbulence=turbulence)

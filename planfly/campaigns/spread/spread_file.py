@@ -75,7 +75,7 @@ NAMES = tuple(BY_NAME)
 
 # Of a distribution at least this much has to lie within the quantity's range; the rest of it is never drawn.
 INSIDE = 0.99
-MOST_BYTES = 100_000
+MAX_BYTES = 100_000
 DEFAULT = "planfly's default spread"
 
 
@@ -164,7 +164,7 @@ def default_spread() -> FlightSpread:
 def read_spread(path: Path) -> FlightSpread:
     """Read a spread file.  Raises SpreadError for one that cannot be read or used."""
     return parse_spread(
-        utf8_text(read_small_file(path, MOST_BYTES, "spread", SpreadError), path, SpreadError), str(path)
+        utf8_text(read_small_file(path, MAX_BYTES, "spread", SpreadError), path, SpreadError), str(path)
     )
 
 

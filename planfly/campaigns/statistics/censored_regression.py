@@ -39,7 +39,7 @@ Bools = NDArray[np.bool_]
 
 
 # exp of more than this is more than any number; and the least number that is not taken as none.
-_MOST, _LEAST = 700.0, 1e-300
+_MAX_EXPONENT, _MIN_PROBABILITY = 700.0, 1e-300
 
 
 class BinaryLink(Protocol):
@@ -99,8 +99,8 @@ class _Probit:
 
         more = x + width
         # Of one that fails and of one that passes by more, and between them the law's mean square there.
-        ends = self.density(x) ** 2 / np.maximum(ndtr(x), _LEAST) + self.density(more) ** 2 / np.maximum(
-            ndtr(-more), _LEAST
+        ends = self.density(x) ** 2 / np.maximum(ndtr(x), _MIN_PROBABILITY) + self.density(more) ** 2 / np.maximum(
+            ndtr(-more), _MIN_PROBABILITY
         )
         between = ndtr(more) - ndtr(x) - more * self.density(more) + x * self.density(x)
         out: Floats = ends + np.maximum(between, 0.0)
@@ -131,7 +131,7 @@ class _ComplementaryLogLog:
         return out
 
     def log_survival(self, x: Floats) -> Floats:
-        out: Floats = -np.exp(np.minimum(x, _MOST))
+        out: Floats = -np.exp(np.minimum(x, _MAX_EXPONENT))
         return out
 
     def survival(self, x: Floats) -> Floats:
@@ -139,11 +139,11 @@ class _ComplementaryLogLog:
         return out
 
     def density(self, x: Floats) -> Floats:
-        out: Floats = np.exp(x - np.exp(np.minimum(x, _MOST)))
+        out: Floats = np.exp(x - np.exp(np.minimum(x, _MAX_EXPONENT)))
         return out
 
     def information(self, x: Floats, width: float = 0.0) -> Floats:
-        rate, more = (np.exp(np.clip(at, -_MOST, 0.5 * _MOST)) for at in (x, x + width))
+        rate, more = (np.exp(np.clip(at, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT)) for at in (x, x + width))
         # As the probit's: of those that fail rate * ratio * exp(-rate), of the others by integrals over the rate.
         fails = rate * _rate_ratio(rate) * np.exp(-rate)
         between = np.maximum(_square_above(rate) - _square_above(more), 0.0)
@@ -151,17 +151,17 @@ class _ComplementaryLogLog:
         return out
 
     def derivatives(self, x: Floats, failed: Bools) -> tuple[Floats, Floats]:
-        rate = np.exp(np.clip(x, -_MOST, 0.5 * _MOST))
+        rate = np.exp(np.clip(x, -_MAX_EXPONENT, 0.5 * _MAX_EXPONENT))
         first = _rate_ratio(rate)
         second = first * (1.0 - rate - first)
         return np.where(failed, first, -rate), np.where(failed, np.minimum(second, 0.0), -rate)
 
     def log_density(self, x: Floats) -> Floats:
-        out: Floats = x - np.exp(np.minimum(x, _MOST))
+        out: Floats = x - np.exp(np.minimum(x, _MAX_EXPONENT))
         return out
 
     def density_derivatives(self, x: Floats) -> tuple[Floats, Floats]:
-        rate = np.exp(np.minimum(x, 0.5 * _MOST))
+        rate = np.exp(np.minimum(x, 0.5 * _MAX_EXPONENT))
         return 1.0 - rate, -rate
 
 
@@ -245,10 +245,10 @@ _DRAWS = (0.1, 0.4, 1.5)
 _ROOM = 10.0
 # Where Newton's method begins: few fail, and more in more wind; and of the room's coefficient.
 _START, _ROOM_START = (-3.0, np.log(0.3)), 1.0
-_STEPS, _CONVERGED, _LEAST_SHARE, _LEAST_CURVATURE, _MOST_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
+_STEPS, _CONVERGED, _MIN_SHARE, _MIN_CURVATURE, _MAX_LOGARITHM = 100, 1e-8, 1e-9, 1e-9, 5.0
 _OF_THE_WAY = 0.9
 # Of a flight that passed, on either link's scale.
-_MOST_PREDICTOR = 30.0
+_MAX_PREDICTOR = 30.0
 # Points of a posterior's sample.
 _SAMPLE = 512
 
@@ -358,7 +358,7 @@ class _Posterior:
     def coefficients(self, points: Floats) -> Floats:
         """What terms are multiplied by, at any number of points."""
         beta = points.copy()
-        beta[..., 1] = np.exp(np.minimum(points[..., 1], _MOST_LOGARITHM))
+        beta[..., 1] = np.exp(np.minimum(points[..., 1], _MAX_LOGARITHM))
         return beta
 
     def log_density(self, points: Floats) -> Floats:
@@ -366,7 +366,7 @@ class _Posterior:
         beta, off, failed = self.coefficients(points), points - self._middle, self._outcomes.failed
         x, bare = self._terms @ beta.T, self._outcomes.terms @ beta[:, : self.size].T
         # As good as impossible, and of its logarithm's own size nothing is left of what is added to it.
-        possible = (bare[~failed] < _MOST_PREDICTOR).all(axis=0)
+        possible = (bare[~failed] < _MAX_PREDICTOR).all(axis=0)
         x, bare = np.where(possible, x, 0.0), np.where(possible, bare, 0.0)
         logs: Floats = -0.5 * (off * off) @ self._precision
         logs += self._link.log_cdf(x[failed]).sum(axis=0)
@@ -386,7 +386,7 @@ class _Posterior:
         spread over the predictor in the wind in which it is best known, where it does not.
         """
         eigenvalues, axes = np.linalg.eigh(self.slope_and_curvature(mode)[1])
-        covariance = axes / np.maximum(np.abs(eigenvalues), _LEAST_CURVATURE) @ axes.T
+        covariance = axes / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE) @ axes.T
         best_known = -covariance[0, 1] / (covariance[1, 1] * np.exp(mode[1]))
         # By the predictor there, or by the constant: the one's density is the other's.
         turn = np.eye(mode.size)
@@ -448,11 +448,11 @@ def _fit(posterior: _Posterior, at: Floats) -> RegressionFit:
     for _ in range(_STEPS):
         slope, curvature = posterior.slope_and_curvature(at)
         eigenvalues, axes = np.linalg.eigh(curvature)
-        step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _LEAST_CURVATURE))
+        step = axes @ (axes.T @ slope / np.maximum(np.abs(eigenvalues), _MIN_CURVATURE))
         # The room's coefficient is above 0: towards it only so much of the way, where halves would end at it.
         towards = step[-1] if posterior.by_room else 0.0
         share = min(1.0, _OF_THE_WAY * at[-1] / towards) if towards > 0.0 else 1.0
-        while not (tried := loss(at - share * step)) <= value and share > _LEAST_SHARE:
+        while not (tried := loss(at - share * step)) <= value and share > _MIN_SHARE:
             share *= 0.5
         at, value = at - share * step, tried
         if float(np.abs(share * step).max()) < _CONVERGED:

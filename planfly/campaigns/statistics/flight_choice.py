@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 GRID = 0.1
 # The share of all that may be drawn that is expected to fail in the winds that are compared, and how many winds.  What
 # holds about the middle of a law need not hold in its tail, where the boundary is.
-_LEAST_SHARE, _MOST_SHARE, _WINDS = 1e-3, 0.2, 10
+_MIN_SHARE, _MAX_SHARE, _WINDS = 1e-3, 0.2, 10
 # Draws that are compared, of those not flown; of how many the extreme ones are sought.
 _COMPARED, _SOUGHT = 1000, 2000
 # Every so many flights takes the next draw.
@@ -73,7 +73,7 @@ def _most_telling(direction: Direction, count: int) -> list[tuple[float, int]]:
     fits, most, flown = direction.fits(), direction.most, len(direction.draws)
     least, largest = (
         [boundary_speed(fit.modes, direction.numbers.population, share, most) for fit in fits]
-        for share in (_LEAST_SHARE, _MOST_SHARE)
+        for share in (_MIN_SHARE, _MAX_SHARE)
     )
     speeds = np.unique([_rounded(wind, most) for wind in np.linspace(min(least), max(largest), _WINDS)])
     beliefs = [_Belief(fit) for fit in fits]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 
 FEWEST_FLIGHTS = 30
-_MOST_GROUPS = 64
+_MAX_GROUPS = 64
 
 
 def first_order(x: Floats, y: Floats) -> float:
@@ -27,7 +27,7 @@ def first_order(x: Floats, y: Floats) -> float:
     total = float(((y - y.mean()) ** 2).sum()) if count else 0.0
     if count < FEWEST_FLIGHTS or total <= 1e-12 * count or np.ptp(x) == 0.0:
         return 0.0
-    groups = int(min(_MOST_GROUPS, max(4, round(2.0 * count ** (1.0 / 3.0)))))
+    groups = int(min(_MAX_GROUPS, max(4, round(2.0 * count ** (1.0 / 3.0)))))
     parts = np.array_split(y[np.argsort(x, kind="stable")], groups)
     between = sum(part.size * float(part.mean() - y.mean()) ** 2 for part in parts)
     within = (total - between) / (count - groups)

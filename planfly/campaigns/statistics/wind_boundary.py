@@ -39,7 +39,7 @@ Floats = NDArray[np.float64]
 # that fails, over all of it, is then nearly straight in the wind: so many steps of the secant method follow.
 _FEW, _NEAR, _SECANTS = 256, 0.1, 2
 # Of a share, what is told from none.
-_LEAST = 1e-12
+_MIN_PROBABILITY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class _Shares:
         flies = np.ones_like(self._at_origin[0])
         for mode, sample, x in zip(self._modes, self._samples, self._at_origin, strict=True):
             flies *= mode.link.survival(x + sample[:, 1] * (speeds - ORIGIN))
-        out: Floats = np.log(np.maximum(1.0 - flies.mean(axis=0), _LEAST))
+        out: Floats = np.log(np.maximum(1.0 - flies.mean(axis=0), _MIN_PROBABILITY))
         return out
 
 

@@ -30,7 +30,7 @@ from flight.dynamics.trim import (
     solve,
     straight,
 )
-from tests.kernels.processors import NUMPY_AS_ON_ITS_LEAST_PROCESSOR
+from tests.kernels.processors import NUMPY_ON_BASELINE_CPU
 from world.errors import FlightError
 
 Floats = NDArray[np.float64]
@@ -303,7 +303,7 @@ def test_a_trim_is_the_same_to_the_last_digit_on_other_processors() -> None:
     NumPy's own code for this processor's features is left out; where it has none for them, both are the same anyway.
     """
     found = []
-    for changes in ({}, NUMPY_AS_ON_ITS_LEAST_PROCESSOR):
+    for changes in ({}, NUMPY_ON_BASELINE_CPU):
         environment = os.environ | {"PYTHONPATH": str(ROOT)} | changes
         command = [sys.executable, "-W", "ignore", "-c", TRIMS]
         found.append(subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout)

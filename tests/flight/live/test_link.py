@@ -11,7 +11,7 @@ from flight.live.link import (
     EPOCH,
     LARGEST,
     LONGEST_STEP,
-    MOST_PEERS,
+    MAX_PEERS,
     SILENCE,
     Access,
     Dropped,
@@ -232,7 +232,7 @@ def test_who_asks_the_vehicle_on_this_machine_needs_no_heartbeat(link: Link) -> 
 def test_the_table_of_stations_is_bounded_and_forgets(link: Link) -> None:
     for port in range(1000):
         link.take(packed(HEARTBEAT), ("127.0.0.1", port))
-    assert len(link.peers) == MOST_PEERS
+    assert len(link.peers) == MAX_PEERS
     link.clock.now += SILENCE + 1.0
     link.take(packed(HEARTBEAT), ("127.0.0.1", 5000))
     assert list(link.peers) == [("127.0.0.1", 5000)]

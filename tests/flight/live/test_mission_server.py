@@ -9,7 +9,7 @@ from flight.live.mission_server import (
     CONFIRM,
     CONFIRMATIONS,
     LOCK,
-    MOST_UPLOADED,
+    MAX_UPLOADED,
     UPLOAD_TIMEOUT,
     MissionServer,
     MissionType,
@@ -340,7 +340,7 @@ def test_a_locked_or_too_large_upload_is_denied() -> None:
         send(server, mavlink.MAVLink_mission_count_message(1, 1, 2, 2), ONE, 9.0)[0].message.get_type().endswith("INT")
     )
     server.locked = ""
-    big = send(server, mavlink.MAVLink_mission_count_message(1, 1, MOST_UPLOADED + 1, 0), ONE, 20.0)
+    big = send(server, mavlink.MAVLink_mission_count_message(1, 1, MAX_UPLOADED + 1, 0), ONE, 20.0)
     assert big[0].message.type == mavlink.MAV_MISSION_NO_SPACE
     assert len(server.lists[MissionType.MISSION]) == 3
     assert send(server, mavlink.MAVLink_mission_clear_all_message(1, 1, 255), ONE, 40.0)[0].message.type == 0

@@ -9,8 +9,8 @@ import pytest
 
 from logs.figures.failures import Failures
 from logs.figures.scene import (
+    MAX_GROUND,
     MISSING,
-    MOST_GROUND,
     drawn_rows,
     exaggeration,
     ground_grid,
@@ -89,7 +89,7 @@ def test_the_text_holds_the_scene_and_ends_no_script() -> None:
     assert [threat["kill"] for threat in scene["threats"]] == [400.0, 0.0]
     ground = scene["ground"]
     steps = np.frombuffer(base64.b64decode(ground["heights"]), "<u2").reshape(ground["rows"], ground["columns"])
-    assert max(steps.shape) <= MOST_GROUND
+    assert max(steps.shape) <= MAX_GROUND
     assert steps.size < 65_536
     heights = ground["low"] + steps * (ground["high"] - ground["low"]) / (MISSING - 1)
     terrain = SETUP.scenario.terrain

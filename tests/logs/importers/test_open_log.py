@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from logs.importers.open_log import MOST_BYTES, is_field_log, open_log
+from logs.importers.open_log import MAX_BYTES, is_field_log, open_log
 from tests.logs.importers.written_logs import dataflash, gpx, igc, kml, px4, telemetry
 from world.errors import LogError
 
@@ -36,7 +36,7 @@ def test_a_log_that_claims_ten_gigabytes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.BIN"
     with path.open("wb") as file:
         file.truncate(10 * 2**30)
-    with pytest.raises(LogError, match=f"10,737,418,240 bytes: at most {MOST_BYTES:,} are read"):
+    with pytest.raises(LogError, match=f"10,737,418,240 bytes: at most {MAX_BYTES:,} are read"):
         open_log(path)
 
 

@@ -15,7 +15,7 @@ from shapely import LineString, Point
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.foxglove_scene import body_rotation
-from logs.recording.foxglove_updates import EVERY, MOST_POINTS, THINNED, TrackSoFar, along, thinned
+from logs.recording.foxglove_updates import EVERY, MAX_POINTS, THINNED, TrackSoFar, along, thinned
 from logs.recording.mcap_writer import SECOND_NS
 from logs.recording.reader import read_log
 from logs.recording.state_channel import EPOCH_NS
@@ -34,7 +34,7 @@ def test_a_long_winding_flight_keeps_its_shape() -> None:
     for k, position in enumerate(flown):
         points = track.add(position)
         longest = max(longest, len(points))
-        assert len(points) <= min(k + 1, MOST_POINTS)
+        assert len(points) <= min(k + 1, MAX_POINTS)
         assert (points[0] == flown[0]).all()
         assert (points[-1] == position).all()
     line = LineString(points[:, :2])

@@ -10,7 +10,7 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
-from logs.replay.instruments import LEAST_WIDTH, make_instruments
+from logs.replay.instruments import MIN_WIDTH, make_instruments
 from tests.logs.made_flight import record
 
 TIMES = np.arange(0.0, 8.0, 0.37)
@@ -25,11 +25,11 @@ def test_replaying_twice_gives_the_same_frames(log_file: Path) -> None:
     assert len({"\n".join(frame) for frame in first}) == len(TIMES)
 
 
-@pytest.mark.parametrize("width", [10, LEAST_WIDTH, 80, 200])
+@pytest.mark.parametrize("width", [10, MIN_WIDTH, 80, 200])
 def test_frames_fit_their_width_and_24_lines(log_file: Path, width: int) -> None:
     show = make_instruments(read_log(log_file))
     frames = [show.frame(float(time), width=width) for time in TIMES]
-    assert all(len(line) <= max(width, LEAST_WIDTH) for frame in frames for line in frame)
+    assert all(len(line) <= max(width, MIN_WIDTH) for frame in frames for line in frame)
     assert all(len(frame) <= 21 for frame in frames)
 
 

@@ -13,7 +13,7 @@ from logs.figures.failures import Failures
 from logs.figures.time_series import Axis, Panel, Series, Stack, control_stack, time_axis, time_stack
 from logs.report.charts import (
     LOOKS,
-    MOST_MOMENTS,
+    MAX_MOMENTS,
     Chart,
     ChartPanel,
     Layer,
@@ -95,7 +95,7 @@ def test_unknown_places_are_left_out_and_long_flights_thinned() -> None:
     assert len(found["time"]) == len(TRACK) - 2
     assert 3.0 not in found["time"]
     many = {name: np.repeat(getattr(TRACK, name), 50, axis=0) for name in TRACK.__slots__}
-    assert len(flight_moments(SETUP, type(TRACK)(**many))["time"]) == MOST_MOMENTS
+    assert len(flight_moments(SETUP, type(TRACK)(**many))["time"]) == MAX_MOMENTS
 
 
 def test_without_terrain_no_height_above_ground_is_said() -> None:

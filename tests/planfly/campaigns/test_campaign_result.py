@@ -8,7 +8,7 @@ import pytest
 import planfly
 from planfly.campaigns.asked_campaign import campaign_spread, repeated_options
 from planfly.campaigns.campaign_result import (
-    MOST_FLIGHTS,
+    MAX_FLIGHTS,
     USUAL_FLIGHTS,
     CampaignResult,
     campaign_line,
@@ -126,5 +126,5 @@ def test_numbers_that_are_none(given: tuple[int | None, float | None, float | No
 
 def test_how_many_flights_are_meant() -> None:
     assert make_goal(None, None, None, 0.95).flights == USUAL_FLIGHTS
-    assert make_goal(None, 0.99, None, 0.95).flights == MOST_FLIGHTS
+    assert make_goal(None, 0.99, None, 0.95).flights == MAX_FLIGHTS
     assert make_goal(7, None, 0.9, 0.95).target == 0.9

@@ -8,7 +8,7 @@ from matplotlib.text import Text
 
 from logs.figures.style import png_bytes
 from planfly.campaigns.pictures import (
-    MOST,
+    MAX_BARS,
     Bar,
     Spoke,
     covariance_ellipse,
@@ -33,7 +33,7 @@ def test_bars_are_as_long_as_flights_failed() -> None:
 def test_none_is_said_and_many_are_cut() -> None:
     assert "No flight of 7" in draw_failures([], 7).axes[0].texts[0].get_text()
     many = [("turns", f"waypoint {k}", k + 1) for k in range(40)]
-    assert len(draw_failures(many, 100).axes[0].patches) == MOST
+    assert len(draw_failures(many, 100).axes[0].patches) == MAX_BARS
 
 
 # ----------------------------------------------------------------------

@@ -13,7 +13,7 @@ from tests.soak import SOAK, note
 
 MEGABYTE = 2**20
 # MB.  What 200 MB of log may take, and what planfly itself takes, whatever the log.
-MOST, WHOLE, ITSELF = 500.0, 200.0, 270.0
+MAX_MEGABYTES, WHOLE, ITSELF = 500.0, 200.0, 270.0
 # Not ru_maxrss: a process begins with that of the one that started it.
 _CODE = """
 import sys
@@ -39,7 +39,7 @@ def peak(log: Path, target: Path) -> float:
 def test_memory_grows_by_less_than_the_log(tmp_path: Path) -> None:
     few, many = (big_log(tmp_path / f"{size}.BIN", size * MEGABYTE) for size in (2, 14))
     grown = peak(many, tmp_path / "a.mcap") - peak(few, tmp_path / "b.mcap")
-    assert grown < 12.0 * (MOST - ITSELF) / WHOLE
+    assert grown < 12.0 * (MAX_MEGABYTES - ITSELF) / WHOLE
 
 
 @pytest.mark.skipif(not SOAK or sys.platform != "linux", reason="takes minutes")
@@ -47,7 +47,7 @@ def test_memory_grows_by_less_than_the_log(tmp_path: Path) -> None:
 def test_200_megabytes_take_less_than_500(tmp_path: Path, suffix: str) -> None:
     taken = peak(big_log(tmp_path / f"a{suffix}", round(WHOLE) * MEGABYTE), tmp_path / "a.mcap")
     note(f"memory for 200 MB of {suffix}", megabytes=round(taken))
-    assert taken < MOST
+    assert taken < MAX_MEGABYTES
 
 
 @pytest.mark.parametrize("suffix", [".BIN", ".tlog", ".ulg", ".igc", ".gpx", ".kml"])

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.kernels.processors import NUMPY_AS_ON_ITS_LEAST_PROCESSOR
+from tests.kernels.processors import NUMPY_ON_BASELINE_CPU
 from tests.soak import SOAK
 
 ROOT = Path(__file__).parents[3]
@@ -52,7 +52,7 @@ EACH = {
     "threads 1, hash seed 1": {"NUMBA_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONHASHSEED": "1"},
     "threads 2, hash seed 2": {"NUMBA_NUM_THREADS": "2", "OMP_NUM_THREADS": "2", "PYTHONHASHSEED": "2"},
     "threads 4": {"NUMBA_NUM_THREADS": "4", "OMP_NUM_THREADS": "4", "OPENBLAS_NUM_THREADS": "4"},
-    "NumPy as on its least processor": NUMPY_AS_ON_ITS_LEAST_PROCESSOR,
+    "NumPy as on its least processor": NUMPY_ON_BASELINE_CPU,
     "an older OpenBLAS core": {"OPENBLAS_CORETYPE": "Nehalem"},
     "a C library without AVX2 and FMA": {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX2,-FMA,-FMA4"},
 }

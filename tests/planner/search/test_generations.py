@@ -11,7 +11,7 @@ from planner.evaluation.encoding import ENCODINGS
 from planner.evaluation.problem import make_problem
 from planner.plan import Objective, Plan
 from planner.search.algorithms import ALGORITHMS
-from planner.search.generations import MOST_GENERATIONS, path_generations, waypoint_generations
+from planner.search.generations import MAX_GENERATIONS, path_generations, waypoint_generations
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search, best_first
 from world.random_streams import PLANNER, stream
@@ -77,7 +77,7 @@ def test_generations_shorten_the_best_path(make_limits: Callable[[Scenario], Lim
     search = search_of_of_waypoint_generations(scenario, make_limits(scenario))
     waypoint_generations(search, 200, 100)
     lengths = [row[0] for row in search.history if row[2] == 0.0]
-    assert len(search.history) == MOST_GENERATIONS == search.done
+    assert len(search.history) == MAX_GENERATIONS == search.done
     assert lengths == sorted(lengths, reverse=True)
     assert lengths[-1] < lengths[0] - 0.005
 

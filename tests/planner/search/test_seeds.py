@@ -14,7 +14,7 @@ from planner.plan import Certificate
 from planner.search.algorithms import ALGORITHMS
 from planner.search.plan_path import plan_path
 from planner.search.search_state import Search
-from planner.search.seeds import LEAST_DETOUR, search_other_sides, starting_vectors, straight_line
+from planner.search.seeds import MIN_DETOUR, search_other_sides, starting_vectors, straight_line
 from tests.instances import random_scenario
 from world.geometry import leg_courses
 from world.random_streams import PLANNER, stream
@@ -96,7 +96,7 @@ def test_where_the_way_is_nearly_straight_no_other_side_is_looked_for(
         before = search.evaluations
         search_other_sides(search)
         seen.append(search.evaluations - before)
-        assert search.archive.scores[0][4] >= 1.0 + LEAST_DETOUR or seen[-1] == 0
+        assert search.archive.scores[0][4] >= 1.0 + MIN_DETOUR or seen[-1] == 0
 
     monkeypatch.setattr(whole, "search_other_sides", counted)
     assert plan_path(scenario, make_limits(scenario), seed=1).safe

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from tests.world.made.made_scenario import SMALL
-from world.airspace.zone_files import FLIGHT_LEVEL_ERROR, MOST_BYTES, geojson_zones, kml_zones, zone_entries
+from world.airspace.zone_files import FLIGHT_LEVEL_ERROR, MAX_BYTES, geojson_zones, kml_zones, zone_entries
 from world.airspace.zones import Cylinder, Polygon
 from world.errors import PlanflyError, ScenarioError
 from world.scenario import Scenario, from_spec, load_scenario
@@ -331,7 +331,7 @@ FAULTS_OF_ZONE_FILES = {
     "none.geojson": (b'{"type": "FeatureCollection", "features": []}', "there is no zone in it"),
     "none.kml": (b"<kml/>", "there is no zone in it"),
     "latin.geojson": (b'{"type": "\xe9"}', "not a text file in UTF-8 (byte 10)"),
-    "large.kml": (b" " * (MOST_BYTES + 1), "16,777,217 bytes: a file of zones has at most 16,777,216"),
+    "large.kml": (b" " * (MAX_BYTES + 1), "16,777,217 bytes: a file of zones has at most 16,777,216"),
     "pole.geojson": (
         json.dumps(LAKE).replace("46.02", "89.5").encode(),
         "feature (lake): rings_deg.0.2: latitude 89.5: allowed -89..89",

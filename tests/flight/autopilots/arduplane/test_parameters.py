@@ -11,7 +11,7 @@ from aircraft.catalog import Aircraft, load_aircraft
 from flight.autopilots.arduplane.parameters import (
     ARDUPILOT_PARAMETERS,
     DEFINITIONS,
-    MOST_BYTES,
+    MAX_BYTES,
     default_parameters,
     load_parameters,
     parameters_of,
@@ -94,7 +94,7 @@ def test_what_is_no_text_file_is_refused(tmp_path: Path) -> None:
     file.write_bytes(b"WP_RADIUS 90\n\xff\xfe 1\n")
     with pytest.raises(ParameterError, match=r"bytes.parm:2: not a text file in UTF-8"):
         read_parameter_file(file)
-    file.write_bytes(b" " * (MOST_BYTES + 1))
+    file.write_bytes(b" " * (MAX_BYTES + 1))
     with pytest.raises(ParameterError, match="has at most"):
         read_parameter_file(file)
 
