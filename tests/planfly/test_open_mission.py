@@ -210,7 +210,7 @@ MISSION = """QGC WPL 110
 
 
 @pytest.fixture
-def mission_of_open_mission(tmp_path: Path) -> Path:
+def short_mission(tmp_path: Path) -> Path:
     (tmp_path / "m.waypoints").write_text(MISSION, encoding="ascii")
     (tmp_path / "field.toml").write_text(FIELD, encoding="utf-8")
     return tmp_path / "m.waypoints"
@@ -229,8 +229,8 @@ def test_a_log_is_known_by_its_first_bytes_or_its_name(tmp_path: Path) -> None:
         is_log(tmp_path / "none")
 
 
-def test_a_mission_without_a_scenario_gets_one_made_around_it(mission_of_open_mission: Path) -> None:
-    opened = open_mission(mission_of_open_mission, None, None)
+def test_a_mission_without_a_scenario_gets_one_made_around_it(short_mission: Path) -> None:
+    opened = open_mission(short_mission, None, None)
     assert (opened.name, opened.setup.seed) == ("m", 1)
     assert opened.setup.scenario.external
     assert opened.setup.scenario.terrain is None
@@ -238,10 +238,10 @@ def test_a_mission_without_a_scenario_gets_one_made_around_it(mission_of_open_mi
     assert np.linalg.norm(np.diff(opened.setup.route.waypoints[:, :2], axis=0)) == pytest.approx(1111.5, abs=0.5)
 
 
-def test_a_mission_is_judged_in_the_scenario_that_is_named(mission_of_open_mission: Path) -> None:
+def test_a_mission_is_judged_in_the_scenario_that_is_named(short_mission: Path) -> None:
     slower = open_mission(
-        mission_of_open_mission,
-        str(mission_of_open_mission.parent / "field.toml"),
+        short_mission,
+        str(short_mission.parent / "field.toml"),
         None,
         seed=9,
         change=lambda s: with_flight(s, airspeed_mps=21.0),
@@ -252,9 +252,7 @@ def test_a_mission_is_judged_in_the_scenario_that_is_named(mission_of_open_missi
     assert (slower.setup.route.airspeed == 21.0).all()
 
 
-def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(
-    mission_of_open_mission: Path, tmp_path: Path
-) -> None:
+def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(short_mission: Path, tmp_path: Path) -> None:
     scenario = small_scenario()
     plan = make_plan(scenario, load_airframe(scenario), 3)
     file = tmp_path / "plan.json"
@@ -265,7 +263,7 @@ def test_a_plan_is_opened_in_its_own_scenario_unless_another_is_named(
     assert (own.setup.scenario.name, own.setup.seed, own.name) == ("small", 3, "small")
     assert own.setup.plan is not None
     np.testing.assert_allclose(own.setup.route.waypoints, plan.waypoints, atol=0.02)
-    other = open_mission(file, str(mission_of_open_mission.parent / "field.toml"), None, seed=4)
+    other = open_mission(file, str(short_mission.parent / "field.toml"), None, seed=4)
     assert (other.setup.scenario.name, other.setup.seed, other.name) == ("field", 4, "plan")
     assert other.setup.plan is None
     assert dataclasses.replace(other.setup.mission, source="") == dataclasses.replace(opened.mission, source="")
@@ -276,9 +274,9 @@ def test_what_is_not_there_names_what_is_expected(tmp_path: Path) -> None:
         open_mission(tmp_path / "none.plan", None, None)
 
 
-def test_a_mission_that_lies_beside_the_name_is_named(mission_of_open_mission: Path) -> None:
-    (mission_of_open_mission.parent / "m.waypoints.bak").write_text("", encoding="ascii")
+def test_a_mission_that_lies_beside_the_name_is_named(short_mission: Path) -> None:
+    (short_mission.parent / "m.waypoints.bak").write_text("", encoding="ascii")
     with pytest.raises(MissionError, match=r"file is expected: did you mean 'm\.waypoints'\?$"):
-        open_mission(mission_of_open_mission.with_name("n.waypoints"), None, None)
+        open_mission(short_mission.with_name("n.waypoints"), None, None)
     with pytest.raises(MissionError, match=r"file is expected$"):
-        open_mission(mission_of_open_mission.parent / "nowhere" / "m.waypoints", None, None)
+        open_mission(short_mission.parent / "nowhere" / "m.waypoints", None, None)

@@ -161,7 +161,7 @@ def test_what_is_known_of_zones_and_height_comes_back_and_nothing_of_it_is_writt
 # ----------------------------------------------------------------------
 # A plan on a terminal's one line, and as a notebook shows it.
 
-CERTIFICATE_OF_PLAN_TABLE = Certificate(np.radians(5.0), np.inf, np.radians(1.25), 9.04, 10.0, 51.0, ())
+GOOD_CERTIFICATE = Certificate(np.radians(5.0), np.inf, np.radians(1.25), 9.04, 10.0, 51.0, ())
 
 
 @pytest.fixture(scope="module")
@@ -173,7 +173,7 @@ def plan() -> Plan:
         path,
         np.zeros(4),
         np.array([1.25, 0, 0, 0]),
-        CERTIFICATE_OF_PLAN_TABLE,
+        GOOD_CERTIFICATE,
         7,
         "umda",
         60,
@@ -194,7 +194,7 @@ def test_a_plan_prints_in_a_line(plan: Plan) -> None:
     ],
 )
 def test_its_state_is_said_in_words(plan: Plan, change: dict[str, object], state: str) -> None:
-    assert replace(plan, certificate=replace(CERTIFICATE_OF_PLAN_TABLE, **change)).state == state  # type: ignore[arg-type]
+    assert replace(plan, certificate=replace(GOOD_CERTIFICATE, **change)).state == state  # type: ignore[arg-type]
 
 
 def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
@@ -210,7 +210,7 @@ def test_a_notebook_shows_what_it_keeps_from_its_limits(plan: Plan) -> None:
 
 def test_problems_are_named_and_no_missile_is_told_so(plan: Plan) -> None:
     text = plan_html(
-        replace(plan, certificate=replace(CERTIFICATE_OF_PLAN_TABLE, kill_distance=np.inf, problems=("slope: 9°",)))
+        replace(plan, certificate=replace(GOOD_CERTIFICATE, kill_distance=np.inf, problems=("slope: 9°",)))
     )
     assert "<td>fails</td><td>slope: 9°</td>" in text
     assert "<td>none</td>" in text

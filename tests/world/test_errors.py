@@ -8,7 +8,7 @@ import pytest
 
 import world.errors
 from planfly.cli import main
-from planfly.commands import shell as scenarios
+from planfly.commands import shell
 from world.errors import (
     FlightError,
     LogError,
@@ -50,7 +50,7 @@ def test_the_command_line_ends_with_exit_code_2_and_the_message(
     def fail(*_: object) -> int:
         raise kind("file.toml: limits: too many")
 
-    monkeypatch.setattr(scenarios, "scenarios", fail)
+    monkeypatch.setattr(shell, "scenarios", fail)
     assert main(["scenarios"]) == 2
     assert capsys.readouterr().err.splitlines() == ["planfly: file.toml: limits: too many"]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from world import files as atomic_files
+from world import files
 from world.errors import MissionError, PlanflyError, ScenarioError
 from world.files import (
     did_you_mean,
@@ -217,7 +217,7 @@ class _Windows:
 
 @pytest.fixture
 def on_windows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(atomic_files, "fcntl", None)
+    monkeypatch.setattr(files, "fcntl", None)
     monkeypatch.setitem(sys.modules, "msvcrt", _Windows)
 
 

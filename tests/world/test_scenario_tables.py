@@ -237,7 +237,7 @@ CASES: dict[str, tuple[str, str, str]] = {
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_one_fault_one_line_of_scenario_tables(case: str, tmp_path: Path) -> None:
+def test_one_fault_in_a_scenario_is_one_line(case: str, tmp_path: Path) -> None:
     old, new, wanted = CASES[case]
     assert wanted in refused(tmp_path, with_fault(old, new))
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from aircraft.catalog import Aircraft, load_aircraft, read_aircraft
-from flight.dynamics import model_check as model_trial
+from flight.dynamics import model_check
 from flight.dynamics.fdm import Fdm
 from flight.dynamics.model_check import try_model
 from tests.own_aircraft import assert_refused, change_model
@@ -102,7 +102,7 @@ class Tried:
 @pytest.fixture
 def tried(monkeypatch: pytest.MonkeyPatch) -> Tried:
     fake = Tried()
-    monkeypatch.setattr(model_trial.subprocess, "run", fake.run)
+    monkeypatch.setattr(model_check.subprocess, "run", fake.run)
     return fake
 
 

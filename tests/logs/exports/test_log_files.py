@@ -146,7 +146,7 @@ def test_events_are_texts_at_their_time(messages: list[Any], log: FlightLog) -> 
         assert texts[event.text[:50]] == pytest.approx(event.time, abs=0.2)
 
 
-def test_our_own_reader_finds_flight_and_mission(tlog: Path, log: FlightLog) -> None:
+def test_our_own_reader_opens_the_tlog(tlog: Path, log: FlightLog) -> None:
     raw = read_telemetry(tlog)
     assert raw.vehicle == "plane"
     assert len(raw.missions[-1].mission.items) == len(log.setup.mission.items)
@@ -158,13 +158,13 @@ def test_our_own_reader_finds_flight_and_mission(tlog: Path, log: FlightLog) -> 
 
 
 @pytest.fixture(scope="module")
-def log_of_px4_file() -> FlightLog:
+def small_log() -> FlightLog:
     return example_log()
 
 
 @pytest.fixture(scope="module")
-def found(log_of_px4_file: FlightLog) -> ULog:
-    return ULog(io.BytesIO(px4_log_bytes(log_of_px4_file)))
+def found(small_log: FlightLog) -> ULog:
+    return ULog(io.BytesIO(px4_log_bytes(small_log)))
 
 
 def test_the_topics_are_px4s(found: ULog) -> None:
@@ -178,27 +178,27 @@ def test_the_topics_are_px4s(found: ULog) -> None:
     assert not found.dropouts
 
 
-def test_places_are_north_east_down_and_on_earth(found: ULog, log_of_px4_file: FlightLog) -> None:
+def test_places_are_north_east_down_and_on_earth(found: ULog, small_log: FlightLog) -> None:
     local, place = (found.get_dataset(f"vehicle_{name}_position").data for name in ("local", "global"))
-    rows = np.searchsorted(log_of_px4_file.track.time, local["timestamp"] * 1e-6 - 1e-6)
-    east, north, up = log_of_px4_file.track.position[rows].T
+    rows = np.searchsorted(small_log.track.time, local["timestamp"] * 1e-6 - 1e-6)
+    east, north, up = small_log.track.position[rows].T
     assert local["x"] == pytest.approx(north, abs=1e-3)
     assert local["y"] == pytest.approx(east, abs=1e-3)
     assert local["ref_alt"] - local["z"] == pytest.approx(up, abs=1e-3)
-    assert local["vz"] == pytest.approx(-log_of_px4_file.track.velocity[rows, 2], abs=1e-6)
-    assert local["vy"] == pytest.approx(log_of_px4_file.track.velocity[rows, 0], abs=1e-6)
+    assert local["vz"] == pytest.approx(-small_log.track.velocity[rows, 2], abs=1e-6)
+    assert local["vy"] == pytest.approx(small_log.track.velocity[rows, 0], abs=1e-6)
     assert local["xy_valid"].all()
-    lat, lon = to_geo(log_of_px4_file.setup.scenario.origin, east, north)
+    lat, lon = to_geo(small_log.setup.scenario.origin, east, north)
     assert place["lat"] == pytest.approx(lat, abs=1e-12)
     assert place["lon"] == pytest.approx(lon, abs=1e-12)
     assert place["alt"] == pytest.approx(up, abs=1e-3)
-    assert place["alt"] - place["terrain_alt"] == pytest.approx(log_of_px4_file.track.clearance[rows], abs=1e-3)
+    assert place["alt"] - place["terrain_alt"] == pytest.approx(small_log.track.clearance[rows], abs=1e-3)
 
 
-def test_the_attitude_is_scipys_quaternion(found: ULog, log_of_px4_file: FlightLog) -> None:
+def test_the_attitude_is_scipys_quaternion(found: ULog, small_log: FlightLog) -> None:
     data = found.get_dataset("vehicle_attitude").data
-    assert len(data["timestamp"]) == len(log_of_px4_file.track)
-    wanted = Rotation.from_euler("ZYX", log_of_px4_file.track.attitude[:, ::-1]).as_quat()[:, [3, 0, 1, 2]]
+    assert len(data["timestamp"]) == len(small_log.track)
+    wanted = Rotation.from_euler("ZYX", small_log.track.attitude[:, ::-1]).as_quat()[:, [3, 0, 1, 2]]
     given = np.stack([data[f"q[{k}]"] for k in range(4)], axis=1)
     assert np.abs((given * wanted).sum(axis=1)) == pytest.approx(1.0, abs=1e-6)
 
@@ -210,42 +210,40 @@ def test_any_attitude_is_the_rotation_it_names() -> None:
     assert (given * wanted.inv()).magnitude() == pytest.approx(0.0, abs=1e-7)
 
 
-def test_air_and_battery(found: ULog, log_of_px4_file: FlightLog) -> None:
+def test_air_and_battery(found: ULog, small_log: FlightLog) -> None:
     air = found.get_dataset("airspeed_validated").data
-    rows = np.searchsorted(log_of_px4_file.track.time, air["timestamp"] * 1e-6 - 1e-6)
-    assert air["true_airspeed_m_s"] == pytest.approx(log_of_px4_file.track.airspeed[rows], abs=1e-6)
+    rows = np.searchsorted(small_log.track.time, air["timestamp"] * 1e-6 - 1e-6)
+    assert air["true_airspeed_m_s"] == pytest.approx(small_log.track.airspeed[rows], abs=1e-6)
     # The standard atmosphere's density at 200 m is 1.2017 of 1.2250 kg/m^3.
-    at = int(np.argmin(np.abs(log_of_px4_file.track.position[rows, 2] - 200.0)))
+    at = int(np.argmin(np.abs(small_log.track.position[rows, 2] - 200.0)))
     share = air["calibrated_airspeed_m_s"][at] / air["true_airspeed_m_s"][at]
     assert share == pytest.approx((1.2017 / 1.2250) ** 0.5, abs=2e-4)
     wind = found.get_dataset("wind").data
-    assert wind["windspeed_east"] == pytest.approx(log_of_px4_file.track.wind[rows, 0], abs=1e-6)
+    assert wind["windspeed_east"] == pytest.approx(small_log.track.wind[rows, 0], abs=1e-6)
     battery = found.get_dataset("battery_status").data
     energy = (battery["voltage_v"] * battery["discharged_mah"])[-1] / 1000.0
-    assert energy == pytest.approx(float(log_of_px4_file.track.energy[-1] - log_of_px4_file.track.energy[0]), rel=1e-2)
+    assert energy == pytest.approx(float(small_log.track.energy[-1] - small_log.track.energy[0]), rel=1e-2)
 
 
-def test_events_are_logged_messages_at_their_time(found: ULog, log_of_px4_file: FlightLog) -> None:
+def test_events_are_logged_messages_at_their_time(found: ULog, small_log: FlightLog) -> None:
     assert [(one.message, one.timestamp) for one in found.logged_messages] == [
-        (event.text, round(event.time * 1e6)) for event in log_of_px4_file.events
+        (event.text, round(event.time * 1e6)) for event in small_log.events
     ]
 
 
-def test_our_own_reader_finds_flight_and_mission_of_px4_file(log_of_px4_file: FlightLog, tmp_path: Path) -> None:
+def test_our_own_reader_opens_the_ulog(small_log: FlightLog, tmp_path: Path) -> None:
     file = tmp_path / "flight.ulg"
-    file.write_bytes(px4_log_bytes(log_of_px4_file))
+    file.write_bytes(px4_log_bytes(small_log))
     raw = read_px4(file)
     assert raw.vehicle == "plane"
-    assert [item.x for item in raw.missions[0].mission.items] == [
-        item.x for item in log_of_px4_file.setup.mission.items
-    ]
+    assert [item.x for item in raw.missions[0].mission.items] == [item.x for item in small_log.setup.mission.items]
     assert (raw.damage.places, raw.modes[0].time) == (0, 0.0)
 
 
-def test_rows_without_a_place_are_left_out(log_of_px4_file: FlightLog) -> None:
-    position = np.array(log_of_px4_file.track.position)
+def test_rows_without_a_place_are_left_out(small_log: FlightLog) -> None:
+    position = np.array(small_log.track.position)
     position[100:110] = np.nan
-    columns = {name: getattr(log_of_px4_file.track, name) for name in Track.__dataclass_fields__}
-    holed = replace(log_of_px4_file, track=Track(**(columns | {"position": position})))
+    columns = {name: getattr(small_log.track, name) for name in Track.__dataclass_fields__}
+    holed = replace(small_log, track=Track(**(columns | {"position": position})))
     data = ULog(io.BytesIO(px4_log_bytes(holed))).get_dataset("vehicle_attitude").data
-    assert len(data["timestamp"]) == len(log_of_px4_file.track) - 10
+    assert len(data["timestamp"]) == len(small_log.track) - 10

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from logs.importers.raw_log import RawLog, example_raw_log
-from planfly import imported_flights as field_flights
+from planfly import imported_flights
 from planfly.imported_flights import FieldOptions, ImportedFlight
 
 
@@ -15,12 +15,12 @@ def judged(
     given = replace(example_raw_log() if raw is None else raw)
     path = folder / name
     path.write_bytes(b"stands for the log")
-    reader = field_flights.open_log
-    field_flights.open_log = lambda _: given
+    reader = imported_flights.open_log
+    imported_flights.open_log = lambda _: given
     try:
-        return field_flights.import_flight(path, options or FieldOptions(), lambda scenario: scenario)
+        return imported_flights.import_flight(path, options or FieldOptions(), lambda scenario: scenario)
     finally:
-        field_flights.open_log = reader
+        imported_flights.open_log = reader
 
 
 def outcome(flight: ImportedFlight, rule: str) -> list[bool | None]:

@@ -7,7 +7,7 @@ import gpxpy
 import numpy as np
 import pytest
 
-from logs.importers import track_files as module
+from logs.importers import track_files
 from logs.importers.raw_log import example_raw_log
 from logs.importers.track_files import read_gpx, read_igc, read_kml, track_text
 from tests.logs.importers.written_logs import BEGAN, gpx, igc, kml
@@ -24,7 +24,7 @@ def test_a_document_type_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_file_may_be_as_large_as_is_said_and_no_larger(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "MAX_BYTES", 10)
+    monkeypatch.setattr(track_files, "MAX_BYTES", 10)
     path = tmp_path / "a.igc"
     path.write_bytes(b"x" * 10)
     assert track_text(path, xml=False) == "x" * 10
@@ -58,9 +58,9 @@ def test_a_zipped_file_that_is_none_is_refused(tmp_path: Path) -> None:
 
 def test_what_unpacks_to_more_than_is_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = zipped(tmp_path / "a.kmz", doc_kml="0" * 5000)
-    monkeypatch.setattr(module, "MAX_BYTES", 5000)
+    monkeypatch.setattr(track_files, "MAX_BYTES", 5000)
     assert len(track_text(path, xml=True)) == 5000
-    monkeypatch.setattr(module, "MAX_BYTES", 4999)
+    monkeypatch.setattr(track_files, "MAX_BYTES", 4999)
     with pytest.raises(LogError, match="more than 4,999 bytes unpacked"):
         track_text(path, xml=True)
 

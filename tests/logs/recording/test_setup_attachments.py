@@ -18,7 +18,7 @@ from flight.mission.items import Mission, MissionItem
 from flight.mission.route import Route
 from flight.simulation.setup import AutopilotProgram, FlightSetup
 from flight.simulation.track import Track
-from logs.recording import setup_attachments as names
+from logs.recording import setup_attachments
 from logs.recording.reader import read_log
 from logs.recording.setup_attachments import pack_setup, unpack_setup
 from tests.logs.log_copies import Attachments, same
@@ -42,27 +42,27 @@ def test_a_log_holds_exactly_these(log_file: Path) -> None:
         "result.json": "application/json",
     }
     fixed = {
-        names.SETUP_FILE,
-        names.SCENARIO_FILE,
-        names.PLAN_FILE,
-        names.MISSION_FILE,
-        names.TERRAIN_FILE,
-        names.VERDICT_FILE,
-        names.RESULT_FILE,
+        setup_attachments.SETUP_FILE,
+        setup_attachments.SCENARIO_FILE,
+        setup_attachments.PLAN_FILE,
+        setup_attachments.MISSION_FILE,
+        setup_attachments.TERRAIN_FILE,
+        setup_attachments.VERDICT_FILE,
+        setup_attachments.RESULT_FILE,
     }
-    assert fixed | {names.heights_name(0)} == set(found)
-    assert names.RECOVERY_FILE not in found
+    assert fixed | {setup_attachments.heights_name(0)} == set(found)
+    assert setup_attachments.RECOVERY_FILE not in found
 
 
 def test_parts_of_the_terrain_sort_in_their_order() -> None:
-    parts = [names.heights_name(part) for part in range(120)]
+    parts = [setup_attachments.heights_name(part) for part in range(120)]
     assert sorted(parts) == parts
     assert len(set(parts)) == 120
 
 
 def test_a_name_of_no_kind_has_no_media_type() -> None:
     with pytest.raises(KeyError):
-        names.media_type("picture.png")
+        setup_attachments.media_type("picture.png")
 
 
 # ----------------------------------------------------------------------

@@ -10,7 +10,7 @@ import planfly
 from planfly.airframe import load_airframe
 from planfly.api.optimising import Model
 from planner.plan import Violation
-from planner.search import generations as path_generations
+from planner.search import generations as generations_module
 from planner.search.plan_path import plan_path
 from planner.search.search_state import KILL, LENGTH, Search
 from world.scenario import load_scenario, with_planner
@@ -100,7 +100,7 @@ def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """The paper's UMDA on a problem of its own, and ask and tell of the same scores: the same paths, bit for bit."""
     told: list[tuple[np.ndarray, np.ndarray]] = []
     twins: list[planfly.Optimiser] = []
-    evaluate, make = Search.evaluate, path_generations._make_optimiser
+    evaluate, make = Search.evaluate, generations_module._make_optimiser
 
     def recorded(search: Search, vectors: np.ndarray) -> np.ndarray:
         scores = evaluate(search, vectors)
@@ -114,7 +114,7 @@ def test_it_is_the_planners_own_step(monkeypatch: pytest.MonkeyPatch) -> None:
         return make(search, rank, population, initial)  # type: ignore[arg-type]
 
     monkeypatch.setattr(Search, "evaluate", recorded)
-    monkeypatch.setattr(path_generations, "_make_optimiser", begin)
+    monkeypatch.setattr(generations_module, "_make_optimiser", begin)
     scenario = with_planner(load_scenario("paper-07"), "test", population=40, generations=6)
     plan_path(scenario, load_airframe(scenario).limits, seed=5, algorithm="umda")
     generations, (twin,) = told[:7], twins

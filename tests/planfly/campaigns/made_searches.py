@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from planfly.campaigns import find_winds as module
+from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.engine.flight_loop import Flown, FlyOne, Order
 from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import WindsFound, WindsGoal, find_winds, open_winds_store
@@ -40,7 +40,7 @@ def flying_here() -> Iterator[None]:
         yield HerePilots(base, fly)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "hired_pilots", hired)
+        patch.setattr(find_winds_module, "hired_pilots", hired)
         yield
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from logs.verdict.places import Place
-from planfly.campaigns import find_winds as module
+from planfly.campaigns import find_winds as find_winds_module
 from planfly.campaigns.engine.flight_loop import FlyOne
 from planfly.campaigns.engine.workers import Workers
 from planfly.campaigns.find_winds import (
@@ -188,8 +188,8 @@ def surer_but_in_the_west(base: CampaignBase, index: int, wind: GivenWind | None
 @pytest.mark.usefixtures("here")
 def test_progress_tells_what_is_known(wind_base: CampaignBase, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("planfly.campaigns.engine.flight_loop.TOLD_EVERY", 0.0)
-    monkeypatch.setattr(module, "FEWEST", 30)
-    monkeypatch.setattr(module, "ACCURACY", 0.8)
+    monkeypatch.setattr(find_winds_module, "FEWEST", 30)
+    monkeypatch.setattr(find_winds_module, "ACCURACY", 0.8)
     goal = replace(GOAL, flights=600)
     told: list[tuple[float, float, str]] = []
     with open_winds_store(wind_base, goal, tmp_path, resume=False) as store:

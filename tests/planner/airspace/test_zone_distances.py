@@ -113,7 +113,7 @@ def test_nothing_is_charged_only_where_fine_samples_keep_the_margin(charge: Char
     assert free > 10
 
 
-MARGINS_OF_ZONE_DISTANCES = ZoneMargins(10.0, 5.0, 0.75)
+CERTIFIED_MARGINS = ZoneMargins(10.0, 5.0, 0.75)
 DEPTHS = -GROUND.heights
 DEPTHS.setflags(write=False)
 Room = Callable[..., np.void]
@@ -126,7 +126,7 @@ def room() -> Room:
     ) -> np.void:
         out = np.zeros(1, ZONE_ROOM)
         ends = np.array(a, dtype=np.float64), np.array(b, dtype=np.float64)
-        kept = keep_zones(zones, FAR, GROUND, MARGINS_OF_ZONE_DISTANCES)
+        kept = keep_zones(zones, FAR, GROUND, CERTIFIED_MARGINS)
         to_pixel = GROUND.to_pixel.record
         measure_zone_room(kept, GROUND.heights, DEPTHS, to_pixel, *ends, np.array(beside), 0.0, above, out[0])
         return out[0]

@@ -125,13 +125,11 @@ def test_without_zones_and_greatest_height_there_is_nothing_to_tell(made: Made) 
 # ----------------------------------------------------------------------
 # What zones and a greatest height add to the graded scores, and that a scenario without them is scored as ever.
 
-Made_of_airspace_scores = Callable[..., ProblemArrays]
+MakeArrays = Callable[..., ProblemArrays]
 
 
 @pytest.fixture
-def made_of_airspace_scores(
-    small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
-) -> Made_of_airspace_scores:
+def make_arrays(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> MakeArrays:
     """Arrays of the search over level ground, for an autopilot that strays by these numbers if there are any."""
 
     def arrays(numbers: dict[str, float] | None = None, **tables: Any) -> ProblemArrays:
@@ -147,24 +145,22 @@ def found(data: ProblemArrays, path: np.ndarray, violation: Violation) -> float:
     return float(graded_scores(data, path[None])[0][0, violation])
 
 
-def tower_of_airspace_scores(off: float, radius: float = 200.0, **levels: float) -> list[dict[str, Any]]:
+def north_tower(off: float, radius: float = 200.0, **levels: float) -> list[dict[str, Any]]:
     """A cylinder whose edge is this far (m) north of the straight way."""
     return [{"name": "it", "kind": "exclusion", "east_m": 1500, "north_m": radius + off, "radius_m": radius, **levels}]
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_zone_beside_the_way_of_airspace_scores(
-    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
-) -> None:
-    data = made_of_airspace_scores(zones=tower_of_airspace_scores(SEARCH_ZONE_MARGIN + more))
+def test_a_zone_beside_the_way_is_scored(make_arrays: MakeArrays, more: float, violated: bool) -> None:
+    data = make_arrays(zones=north_tower(SEARCH_ZONE_MARGIN + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
-    data = made_of_airspace_scores({"across": 12.0}, zones=tower_of_airspace_scores(SEARCH_ZONE_MARGIN + 12.0 + more))
+    data = make_arrays({"across": 12.0}, zones=north_tower(SEARCH_ZONE_MARGIN + 12.0 + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
 def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(
-    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
+    make_arrays: MakeArrays, more: float, violated: bool
 ) -> None:
     """The turn of 36.87 degrees strays 40 m x 36.87 / 90; the zone lies 300 m before it, by the leg."""
     path = np.array([[0.0, 0.0, 150.0], [3000.0, 0.0, 150.0], [5400.0, 1800.0, 150.0]])
@@ -173,50 +169,44 @@ def test_a_zone_outside_a_corner_is_kept_by_what_is_strayed_there(
     zone = {"name": "it", "kind": "exclusion", "east_m": 2990.0, "radius_m": 50.0}
     zone["north_m"] = -(50.0 + SEARCH_ZONE_MARGIN + strayed + more)
     numbers = {"excursion": 40.0, "before": 200.0, "after": 200.0}
-    data = made_of_airspace_scores(numbers, zones=[zone], **ends)
+    data = make_arrays(numbers, zones=[zone], **ends)
     assert (found(data, path, Violation.BOUNDS) > 0.0) == violated
     # Away from the corner the leg's own margin is enough.
-    data = made_of_airspace_scores(numbers, zones=[zone | {"east_m": 1000.0}], **ends)
+    data = make_arrays(numbers, zones=[zone | {"east_m": 1000.0}], **ends)
     assert found(data, path, Violation.BOUNDS) == 0.0
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_floor_over_the_way_of_airspace_scores(
-    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
-) -> None:
-    data = made_of_airspace_scores(zones=tower_of_airspace_scores(-200.0, floor_amsl_m=150.0 + SEARCH_BUFFER + more))
+def test_a_floor_over_the_way_is_scored(make_arrays: MakeArrays, more: float, violated: bool) -> None:
+    data = make_arrays(zones=north_tower(-200.0, floor_amsl_m=150.0 + SEARCH_BUFFER + more))
     assert (found(data, STRAIGHT, Violation.BOUNDS) > 0.0) == violated
 
 
 @pytest.mark.parametrize(("more", "violated"), [(0.1, False), (-0.1, True)])
-def test_a_greatest_height_above_ground(
-    made_of_airspace_scores: Made_of_airspace_scores, more: float, violated: bool
-) -> None:
-    data = made_of_airspace_scores(limits={"max_height_m": 158.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
+def test_a_greatest_height_above_ground(make_arrays: MakeArrays, more: float, violated: bool) -> None:
+    data = make_arrays(limits={"max_height_m": 158.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
     path = STRAIGHT + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.0, 0.0]])
     assert (found(data, path, Violation.TERRAIN) > 0.0) == violated
     # Where the autopilot is 5 m off in height.
-    data = made_of_airspace_scores(
-        {"up": 5.0}, limits={"max_height_m": 163.0 + SEARCH_BUFFER + more, "min_clearance_m": 30}
-    )
+    data = make_arrays({"up": 5.0}, limits={"max_height_m": 163.0 + SEARCH_BUFFER + more, "min_clearance_m": 30})
     assert (found(data, path, Violation.TERRAIN) > 0.0) == violated
 
 
-def test_the_ground_beside_the_way_counts_too(made_of_airspace_scores: Made_of_airspace_scores) -> None:
+def test_the_ground_beside_the_way_counts_too(make_arrays: MakeArrays) -> None:
     """A hill of 200 m falls away beside the leg: 325 - 167 m above it, and 325 - 148 m above it 60 m aside."""
     hill = {"kind": "peaks", "peak": [{"east_m": 1500, "north_m": 300, "height_m": 200, "sigma_m": 300}]}
     most = {"max_height_m": 175.0, "min_clearance_m": 1}
-    data = made_of_airspace_scores({"across": 0.0}, terrain=hill, limits=most, threats=[])
-    wide = made_of_airspace_scores({"across": 60.0}, terrain=hill, limits=most, threats=[])
+    data = make_arrays({"across": 0.0}, terrain=hill, limits=most, threats=[])
+    wide = make_arrays({"across": 60.0}, terrain=hill, limits=most, threats=[])
     for arrays, worse in ((data, False), (wide, True)):
         a, b = np.array([1400.0, 150.0, 325.0]), np.array([1600.0, 150.0, 325.0])
         assert (float(airspace_excess(arrays, a, b, 0.0, 0.0)) > 0.0) == worse
 
 
-def test_an_inclusion_near_the_start_leaves_room_to_leave(made_of_airspace_scores: Made_of_airspace_scores) -> None:
+def test_an_inclusion_near_the_start_leaves_room_to_leave(make_arrays: MakeArrays) -> None:
     """The start is 6 m within the fence: the way straight away from its edge is charged nothing."""
     fence = {"name": "it", "kind": "inclusion", "polygon_m": [[-6, -900], [6900, -900], [6900, 900], [-6, 900]]}
-    data = made_of_airspace_scores({"across": 12.0}, zones=[fence])
+    data = make_arrays({"across": 12.0}, zones=[fence])
     assert found(data, STRAIGHT, Violation.BOUNDS) == 0.0
     beside = np.array([[0.0, 0.0, 150.0], [0.0, 800.0, 150.0], [6000.0, 0.0, 150.0]])
     assert found(data, beside, Violation.BOUNDS) > 0.0

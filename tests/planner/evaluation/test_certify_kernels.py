@@ -99,7 +99,7 @@ RADAR = {"east_m": 3000, "north_m": 0, "amsl_m": 150, "detection_radius_m": 400,
 
 
 @pytest.fixture
-def make_of_certify_kernels(
+def make_certified(
     small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]
 ) -> Callable[..., ProblemArrays]:
     """Arrays of the certificate, over level ground at 20 m, in still air."""
@@ -112,9 +112,9 @@ def make_of_certify_kernels(
 
 
 def test_a_straight_leg_keeps_its_distance_from_a_missile(
-    make_of_certify_kernels: Callable[..., ProblemArrays],
+    make_certified: Callable[..., ProblemArrays],
 ) -> None:
-    data = make_of_certify_kernels(threats=[RADAR, MISSILE])
+    data = make_certified(threats=[RADAR, MISSILE])
     east = np.array([[0.0, 0.0, 150.0], [6000.0, 0.0, 150.0]])
     # It passes 1000 m beside and 100 m below the missile.
     assert missile_distance(data, east) == pytest.approx(math.hypot(1000.0, 100.0) - 400.0)
@@ -128,36 +128,36 @@ def test_a_straight_leg_keeps_its_distance_from_a_missile(
     assert missile_distance(data, still) == pytest.approx(-100.0)
 
 
-def test_a_radar_is_no_missile(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
-    assert missile_distance(make_of_certify_kernels(threats=[RADAR]), CORNER) == math.inf
-    assert missile_distance(make_of_certify_kernels(), CORNER) == math.inf
+def test_a_radar_is_no_missile(make_certified: Callable[..., ProblemArrays]) -> None:
+    assert missile_distance(make_certified(threats=[RADAR]), CORNER) == math.inf
+    assert missile_distance(make_certified(), CORNER) == math.inf
 
 
-def test_the_arc_inside_a_corner_counts_too(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
+def test_the_arc_inside_a_corner_counts_too(make_certified: Callable[..., ProblemArrays]) -> None:
     # The arc cuts the corner off on the side of a missile there, by (sqrt(2) - 1) radii.
     inside = {"east_m": 1000, "north_m": 1000, "amsl_m": 150, "kill_radius_m": 400, "kill_scale_m": 40}
     radius = turn_radius(25.0, math.radians(30.0))
     # From the missile to the arc's centre, and on to its middle: 1.4 m for the chords (15 degrees each).
     centre = math.hypot(1000.0 - radius, 1000.0 - radius)
     wanted = min(1000.0, centre + radius) - 400.0
-    assert missile_distance(make_of_certify_kernels(threats=[inside]), CORNER) == pytest.approx(wanted, abs=1.5)
+    assert missile_distance(make_certified(threats=[inside]), CORNER) == pytest.approx(wanted, abs=1.5)
     near = inside | {"east_m": 1990, "north_m": 10, "kill_radius_m": 1, "kill_scale_m": 1}
     # 14 m from the corner, along the diagonal, a leg is nearer than the arc, which passes 0.414 radii from the corner.
-    assert missile_distance(make_of_certify_kernels(threats=[near]), CORNER) == pytest.approx(10.0 - 1.0)
+    assert missile_distance(make_certified(threats=[near]), CORNER) == pytest.approx(10.0 - 1.0)
     far = near | {"east_m": 1970, "north_m": 30}
     away = (math.sqrt(2.0) - 1.0) * radius - math.hypot(30.0, 30.0)
     assert 0.0 < away < 30.0
-    assert missile_distance(make_of_certify_kernels(threats=[far]), CORNER) == pytest.approx(away - 1.0, abs=1.5)
+    assert missile_distance(make_certified(threats=[far]), CORNER) == pytest.approx(away - 1.0, abs=1.5)
 
 
-def test_courses_asked_for_become_far_points_on_them(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
+def test_courses_asked_for_become_far_points_on_them(make_certified: Callable[..., ProblemArrays]) -> None:
     start, destination = make_ends(course_deg=0), make_ends(east=6000, course_deg=90)
-    out = with_courses(make_of_certify_kernels(start=start, destination=destination), CORNER)
+    out = with_courses(make_certified(start=start, destination=destination), CORNER)
     np.testing.assert_array_equal(out[1:-1], CORNER)
     # It comes from the south, and leaves to the east, level.
     assert out[0].tolist() == pytest.approx([0.0, -1e4, 150.0])
     assert out[-1].tolist() == pytest.approx([12_000.0, 1500.0, 150.0])
-    free = with_courses(make_of_certify_kernels(), CORNER)
+    free = with_courses(make_certified(), CORNER)
     # On the legs' own lines.
     assert free[0].tolist() == [-2000.0, 0.0, 150.0]
     assert free[-1].tolist() == [2000.0, 3000.0, 150.0]
@@ -168,16 +168,16 @@ def make_ends(east: float = 0.0, **more: float) -> dict[str, float]:
     return {"east_m": east, "north_m": 0.0, "amsl_m": 150.0} | more
 
 
-def test_a_turn_uses_its_tangent_of_both_legs(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
+def test_a_turn_uses_its_tangent_of_both_legs(make_certified: Callable[..., ProblemArrays]) -> None:
     # At right angles the tangent is as long as the radius.
     radius = turn_radius(25.0, math.radians(30.0))
-    turns, rolls = turn_and_roll_lengths(make_of_certify_kernels(), CORNER)
+    turns, rolls = turn_and_roll_lengths(make_certified(), CORNER)
     assert turns.tolist() == pytest.approx([radius, radius], rel=1e-6)
     assert rolls.tolist() == [0.0, 0.0]
 
 
-def test_only_an_s_turn_rolls_over(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
-    data, radius = make_of_certify_kernels(), turn_radius(25.0, math.radians(30.0))
+def test_only_an_s_turn_rolls_over(make_certified: Callable[..., ProblemArrays]) -> None:
+    data, radius = make_certified(), turn_radius(25.0, math.radians(30.0))
     for side, rolling in ((1.0, False), (-1.0, True)):
         end = [2000.0 - side * 1500.0, 1500.0, 150.0]
         turns, rolls = turn_and_roll_lengths(data, np.vstack([CORNER, end]))
@@ -186,18 +186,18 @@ def test_only_an_s_turn_rolls_over(make_of_certify_kernels: Callable[..., Proble
 
 
 def test_slopes_are_the_numbers_of_the_scenario_less_their_margin(
-    make_of_certify_kernels: Callable[..., ProblemArrays],
+    make_certified: Callable[..., ProblemArrays],
 ) -> None:
-    data = make_of_certify_kernels(limits={"max_climb_deg": 5, "max_dive_deg": 7})
+    data = make_certified(limits={"max_climb_deg": 5, "max_dive_deg": 7})
     climbs, dives = leg_slope_limits(data, CORNER)
     assert climbs.tolist() == pytest.approx([math.radians(5.0) - ANGLE_MARGIN] * 2)
     assert dives.tolist() == pytest.approx([math.radians(7.0) - ANGLE_MARGIN] * 2)
 
 
 def test_heights_stand_above_the_ground_for_legs_and_arcs(
-    make_of_certify_kernels: Callable[..., ProblemArrays],
+    make_certified: Callable[..., ProblemArrays],
 ) -> None:
-    data = make_of_certify_kernels()
+    data = make_certified()
     climbing = CORNER + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 50.0], [0.0, 0.0, 100.0]])
     pieces = heights_above_ground(data, climbing)
     legs, arcs = pieces[~pieces["of_arc"]], pieces[pieces["of_arc"]]
@@ -210,13 +210,13 @@ def test_heights_stand_above_the_ground_for_legs_and_arcs(
     assert (pieces["buffer"] == data.buffer).all()
 
 
-def test_off_the_terrain_there_is_no_height(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
+def test_off_the_terrain_there_is_no_height(make_certified: Callable[..., ProblemArrays]) -> None:
     away = np.array([[0.0, 0.0, 150.0], [99_000.0, 0.0, 150.0]])
-    assert np.isnan(heights_above_ground(make_of_certify_kernels(), away)["height"]).all()
+    assert np.isnan(heights_above_ground(make_certified(), away)["height"]).all()
 
 
-def test_the_buffer_grows_from_an_end_that_leaves_none(make_of_certify_kernels: Callable[..., ProblemArrays]) -> None:
-    data = make_of_certify_kernels()._replace(buffer=5.0, start_buffer=1.0)
+def test_the_buffer_grows_from_an_end_that_leaves_none(make_certified: Callable[..., ProblemArrays]) -> None:
+    data = make_certified()._replace(buffer=5.0, start_buffer=1.0)
     for away, wanted in ((0.0, 1.0), (40.0, 1.0 + 0.5 * BUFFER_GROWTH * 40.0), (1000.0, 5.0)):
         leg = np.array([[away, 0.0, 150.0], [3000.0, 0.0, 150.0]])
         assert heights_above_ground(data, leg)["buffer"][0] == pytest.approx(wanted), away

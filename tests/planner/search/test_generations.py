@@ -52,7 +52,7 @@ def test_a_seeded_search_spends_a_share_once_it_is_safe(scenario: Scenario, limi
 # Generations of waypoints: they find the way without seeds, from the same seed the same, and keep to what is asked.
 
 
-def search_of_of_waypoint_generations(scenario: Scenario, limits: Limits, seed: int = 1) -> Search:
+def waypoint_search(scenario: Scenario, limits: Limits, seed: int = 1) -> Search:
     problem, algorithm = make_problem(scenario, limits), ALGORITHMS["fda"]
     encoding = ENCODINGS["rotated"](problem.space, scenario.planner.waypoints)
     return Search(problem, algorithm, encoding, stream(seed, PLANNER), None, None, False, 10.0)
@@ -74,7 +74,7 @@ def test_the_way_is_found_without_seeds(threats: str, most: float, make_limits: 
 
 def test_generations_shorten_the_best_path(make_limits: Callable[[Scenario], Limits]) -> None:
     scenario = load_scenario("hard-15")
-    search = search_of_of_waypoint_generations(scenario, make_limits(scenario))
+    search = waypoint_search(scenario, make_limits(scenario))
     waypoint_generations(search, 200, 100)
     lengths = [row[0] for row in search.history if row[2] == 0.0]
     assert len(search.history) == MAX_GENERATIONS == search.done
@@ -83,7 +83,7 @@ def test_generations_shorten_the_best_path(make_limits: Callable[[Scenario], Lim
 
 
 def test_waypoints_stay_in_their_intervals(scenario: Scenario, limits: Limits) -> None:
-    search = search_of_of_waypoint_generations(scenario, limits)
+    search = waypoint_search(scenario, limits)
     waypoint_generations(search, 40, 5)
     assert search.done == 5
     assert (search.archive.vectors >= search.encoding.lower).all()
@@ -92,7 +92,7 @@ def test_waypoints_stay_in_their_intervals(scenario: Scenario, limits: Limits) -
 
 
 def test_a_stop_ends_after_the_generation_under_way(scenario: Scenario, limits: Limits) -> None:
-    search = search_of_of_waypoint_generations(scenario, limits)
+    search = waypoint_search(scenario, limits)
     search.stop = lambda: "interrupted" if search.done >= 2 else ""
     waypoint_generations(search, 40, 8)
     assert (search.done, search.ended) == (2, "interrupted")

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import planner.search.plan_path as whole
+import planner.search.plan_path as plan_path_module
 from aircraft.path_limits import Limits
 from planner.evaluation.encoding import ENCODINGS, rotated_frame
 from planner.evaluation.problem import make_problem
@@ -80,7 +80,7 @@ def test_paths_get_no_longer_by_other_sides(
     scenario = fresh(seed, tmp_path)
     limits = make_limits(scenario)
     now = plan_path(scenario, limits, seed=1)
-    monkeypatch.setattr(whole, "search_other_sides", without_other_sides)
+    monkeypatch.setattr(plan_path_module, "search_other_sides", without_other_sides)
     before = plan_path(scenario, limits, seed=1)
     assert now.safe
     assert now.objectives[0] <= (1.001 * before.objectives[0] if before.safe else 9.0)
@@ -98,7 +98,7 @@ def test_where_the_way_is_nearly_straight_no_other_side_is_looked_for(
         seen.append(search.evaluations - before)
         assert search.archive.scores[0][4] >= 1.0 + MIN_DETOUR or seen[-1] == 0
 
-    monkeypatch.setattr(whole, "search_other_sides", counted)
+    monkeypatch.setattr(plan_path_module, "search_other_sides", counted)
     assert plan_path(scenario, make_limits(scenario), seed=1).safe
 
 
@@ -130,7 +130,7 @@ def test_it_is_not_looked_for_where_a_straight_frame_holds_a_short_path(
     def refused(_search: Search, _found: object) -> tuple[np.ndarray, Certificate]:
         raise AssertionError("a route that turns back was looked for")
 
-    monkeypatch.setattr(whole, "search_turning_back", refused)
+    monkeypatch.setattr(plan_path_module, "search_turning_back", refused)
     for name in ("hard-07", "hard-60"):
         scenario = load_scenario(name)
         assert plan_path(scenario, make_limits(scenario), seed=1).safe

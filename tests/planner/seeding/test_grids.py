@@ -130,7 +130,7 @@ ACROSS = np.arange(-600.0, 601.0, 200.0)
 
 
 @pytest.fixture
-def data_of_grid_kernels(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> ProblemArrays:
+def level_data(small: Callable[..., Scenario], make_limits: Callable[[Scenario], Limits]) -> ProblemArrays:
     """Level ground, no threats, slopes of 20 degrees; 6 km from 150 m to 150 m."""
     limits = {"max_climb_deg": 20, "max_dive_deg": 20}
     scenario = small(terrain={"kind": "flat", "amsl_m": 0}, threats=[], limits=limits)
@@ -138,7 +138,7 @@ def data_of_grid_kernels(small: Callable[..., Scenario], make_limits: Callable[[
 
 
 def route_over(
-    data_of_grid_kernels: ProblemArrays,
+    level_data: ProblemArrays,
     layers: list[float],
     closed: tuple[tuple[int, int], ...] = (),
     bound: float = math.inf,
@@ -147,48 +147,46 @@ def route_over(
     extra = np.zeros((31, ACROSS.size))
     for stage, across in closed:
         extra[stage, across] = math.inf
-    frame = rotated_frame(data_of_grid_kernels.start, data_of_grid_kernels.destination)
-    return cheapest_route(data_of_grid_kernels, frame, Grid(30, ACROSS, np.array(layers)), extra, bound)
+    frame = rotated_frame(level_data.start, level_data.destination)
+    return cheapest_route(level_data, frame, Grid(30, ACROSS, np.array(layers)), extra, bound)
 
 
-def test_in_the_open_the_straight_line_is_the_cheapest(data_of_grid_kernels: ProblemArrays) -> None:
-    cells, cost = route_over(data_of_grid_kernels, [150.0, 350.0])
+def test_in_the_open_the_straight_line_is_the_cheapest(level_data: ProblemArrays) -> None:
+    cells, cost = route_over(level_data, [150.0, 350.0])
     assert cost == pytest.approx(6000.0)
     assert cells["across"].tolist() == [3] * 31
     assert cells["layer"].tolist() == [0] * 31
 
 
-def test_a_wall_with_one_gap_is_passed_through_the_gap(data_of_grid_kernels: ProblemArrays) -> None:
+def test_a_wall_with_one_gap_is_passed_through_the_gap(level_data: ProblemArrays) -> None:
     # Three places aside and three back are shortest as six steps of one place each.
     wall = tuple((15, y) for y in range(ACROSS.size) if y != 6)
-    cells, cost = route_over(data_of_grid_kernels, [150.0], wall)
+    cells, cost = route_over(level_data, [150.0], wall)
     assert cells["across"][[0, 15, 30]].tolist() == [3, 6, 3]
     assert cost == pytest.approx(200.0 * (24 + 6 * math.sqrt(2.0)))
 
 
-def test_a_closed_wall_has_no_route(data_of_grid_kernels: ProblemArrays) -> None:
-    cells, cost = route_over(data_of_grid_kernels, [150.0], tuple((15, y) for y in range(ACROSS.size)))
+def test_a_closed_wall_has_no_route(level_data: ProblemArrays) -> None:
+    cells, cost = route_over(level_data, [150.0], tuple((15, y) for y in range(ACROSS.size)))
     assert (len(cells), cost) == (0, math.inf)
 
 
 @pytest.mark.parametrize(("bound", "found"), [(6000.1, True), (5999.9, False)])
-def test_a_route_dearer_than_the_bound_is_not_found(
-    data_of_grid_kernels: ProblemArrays, bound: float, found: bool
-) -> None:
-    cells, cost = route_over(data_of_grid_kernels, [150.0], bound=bound)
+def test_a_route_dearer_than_the_bound_is_not_found(level_data: ProblemArrays, bound: float, found: bool) -> None:
+    cells, cost = route_over(level_data, [150.0], bound=bound)
     assert (len(cells) == 31, math.isfinite(cost)) == (found, found)
 
 
 @pytest.mark.parametrize(("top", "found"), [(220.0, True), (221.5, False)])
 def test_a_step_climbs_and_sinks_no_more_than_the_limits_allow(
-    data_of_grid_kernels: ProblemArrays, top: float, found: bool
+    level_data: ProblemArrays, top: float, found: bool
 ) -> None:
     # 200 m at 20 degrees less half a degree of margin are 70.8 m; there is no place aside for a longer step.
     def between(first: float, last: float) -> Records:
         ends = {"start": np.array([0.0, 0.0, first]), "destination": np.array([6000.0, 0.0, last])}
         grid = Grid(30, np.zeros(1), np.array([150.0, top]))
         frame = rotated_frame(ends["start"], ends["destination"])
-        return cheapest_route(data_of_grid_kernels._replace(**ends), frame, grid, np.zeros((31, 1)), math.inf)[0]
+        return cheapest_route(level_data._replace(**ends), frame, grid, np.zeros((31, 1)), math.inf)[0]
 
     up, down = between(150.0, top), between(top, 150.0)
     assert (len(up), len(down)) == (31 * found, 31 * found)

@@ -11,7 +11,7 @@ from aircraft.path_limits import Limits
 from planner.evaluation.certify_kernels import turn_and_roll_lengths
 from planner.evaluation.encoding import rotated_frame
 from planner.evaluation.problem import Problem, ProblemArrays, make_problem
-from planner.seeding import lattice as lattice_routes
+from planner.seeding import lattice as lattice_module
 from planner.seeding.lattice import (
     LEAST_STEP,
     MOST_LATTICE,
@@ -200,7 +200,7 @@ def test_a_search_in_slices_finds_the_same_route(pocket: Problem, monkeypatch: p
     made = make_lattice(data, frame, 500.0)
     whole = cheapest_lattice_route(data, frame, made, 2, 1_000_000)
     asked: list[int] = []
-    monkeypatch.setattr(lattice_routes, "STATES_AT_ONCE", 7)
+    monkeypatch.setattr(lattice_module, "STATES_AT_ONCE", 7)
     sliced = cheapest_lattice_route(data, frame, made, 2, 1_000_000, lambda: asked.append(0))
     assert len(whole) > 0
     assert len(asked) > 10

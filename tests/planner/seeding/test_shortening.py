@@ -12,7 +12,7 @@ from benchmarks.planning.smooth_search import Programme
 from benchmarks.task import is_safe, make_task
 from planner.evaluation.problem import make_problem
 from planner.search.plan_path import plan_path
-from planner.seeding import shortening as path_shortening
+from planner.seeding import shortening
 from planner.seeding.shortening import (
     LONGEST_STEP,
     MOST_MODELS,
@@ -109,9 +109,9 @@ def test_many_missiles_are_looked_at_in_slices_with_the_same_result(monkeypatch:
     asked: list[int] = []
     whole, models = shorten_path(data, start, pause=lambda: asked.append(0))
     assert len(asked) == 1
-    monkeypatch.setattr(path_shortening, "PAIRS_AT_ONCE", 1)
+    monkeypatch.setattr(shortening, "PAIRS_AT_ONCE", 1)
     sliced, again = shorten_path(data, start, pause=lambda: asked.append(0))
-    assert len(asked) == 1 + path_shortening.ROUNDS
+    assert len(asked) == 1 + shortening.ROUNDS
     np.testing.assert_array_equal(whole, sliced)
     assert models == again
 

@@ -117,7 +117,7 @@ def test_a_feature_and_a_geometry_alone() -> None:
 
 
 DEEP = "[" * 200_000
-FAULTS_OF_GEOJSON_ZONES: dict[str, tuple[Any, str]] = {
+GEOJSON_FAULTS: dict[str, tuple[Any, str]] = {
     "not JSON": ("{", "not valid JSON"),
     "brackets without end": (DEEP, "not valid JSON"),
     "NaN": (json.dumps(feature("Polygon", [[[8.0, float("nan")], *RING]])), "NaN is no number of JSON"),
@@ -143,9 +143,9 @@ FAULTS_OF_GEOJSON_ZONES: dict[str, tuple[Any, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", FAULTS_OF_GEOJSON_ZONES)
-def test_what_is_no_zone(case: str) -> None:
-    text, wanted = FAULTS_OF_GEOJSON_ZONES[case]
+@pytest.mark.parametrize("case", GEOJSON_FAULTS)
+def test_a_geometry_that_is_no_zone(case: str) -> None:
+    text, wanted = GEOJSON_FAULTS[case]
     with pytest.raises(ScenarioError) as caught:
         list(geojson_zones(text, "z.geojson"))
     message = str(caught.value)
@@ -234,7 +234,7 @@ def test_a_point_with_a_radius_by_either_kind_of_data() -> None:
         assert entries == {"name": "lake", "kind": "exclusion", "radius_m": 80.0, "lat_deg": 46.5, "lon_deg": 8.5}
 
 
-FAULTS_OF_KML_ZONES = {
+KML_FAULTS = {
     "not XML": ("<kml>", "not valid XML"),
     "no KML": ("<gpx/>", "a <kml> element is expected"),
     "an entity": (
@@ -268,9 +268,9 @@ FAULTS_OF_KML_ZONES = {
 }
 
 
-@pytest.mark.parametrize("case", FAULTS_OF_KML_ZONES)
-def test_what_is_no_zone_of_kml_zones(case: str) -> None:
-    text, wanted = FAULTS_OF_KML_ZONES[case]
+@pytest.mark.parametrize("case", KML_FAULTS)
+def test_a_placemark_that_is_no_zone(case: str) -> None:
+    text, wanted = KML_FAULTS[case]
     with pytest.raises(ScenarioError) as caught:
         list(kml_zones(text, "z.kml"))
     message = str(caught.value)
@@ -283,11 +283,11 @@ def test_what_is_no_zone_of_kml_zones(case: str) -> None:
 # Files of zones named by a scenario: read beside it, written down with it, refused by their names.
 
 # Near 46 N 8 E, where the small scenario's map has its origin.
-RING_OF_ZONE_FILES = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
+LAKE_RING = [[8.0, 46.01], [8.01, 46.01], [8.01, 46.02], [8.0, 46.01]]
 LAKE = {
     "type": "Feature",
     "properties": {"name": "lake", "ceiling_agl_m": 90.0},
-    "geometry": {"type": "Polygon", "coordinates": [RING_OF_ZONE_FILES]},
+    "geometry": {"type": "Polygon", "coordinates": [LAKE_RING]},
 }
 MAST = """<kml><Placemark><name>mast</name><ExtendedData><Data name="radius_m"><value>80</value></Data></ExtendedData>
 <Point><coordinates>8.0,46.02</coordinates></Point></Placemark></kml>"""
@@ -324,7 +324,7 @@ def test_what_is_written_down_needs_no_file(tmp_path: Path) -> None:
     assert again.to_json() == written
 
 
-FAULTS_OF_ZONE_FILES = {
+BAD_FILES = {
     "missing.geojson": (None, "no such file"),
     "zones.kmz": (b"PK", "suffix '.kmz': a file of zones is .geojson, .json or .kml"),
     "empty.geojson": (b"", "not valid JSON"),
@@ -352,9 +352,9 @@ FAULTS_OF_ZONE_FILES = {
 }
 
 
-@pytest.mark.parametrize("name", FAULTS_OF_ZONE_FILES)
+@pytest.mark.parametrize("name", BAD_FILES)
 def test_a_bad_file_is_refused_by_its_name(name: str, tmp_path: Path) -> None:
-    content, wanted = FAULTS_OF_ZONE_FILES[name]
+    content, wanted = BAD_FILES[name]
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises(PlanflyError) as caught:

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import load_aircraft
-from flight.autopilots.arduplane_sitl import physics as physics_port
+from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.flight import AutopilotFlight, fly_autopilot
 from flight.simulation.setup import FlightSetup
 from tests.flight.autopilots.arduplane_sitl.conftest import MakeFake
@@ -99,7 +99,7 @@ def test_an_autopilot_flies_the_mission_to_its_end(fake_autopilot: MakeFake, tmp
 def test_what_goes_wrong_with_the_program_is_one_line_that_names_it(
     fake_autopilot: MakeFake, monkeypatch: pytest.MonkeyPatch, fault: str, said: str
 ) -> None:
-    monkeypatch.setattr(physics_port, "SILENCE", 1.0)
+    monkeypatch.setattr(physics, "SILENCE", 1.0)
     before, folders = children(), left_behind()
     program = fake_autopilot(fault)
     with pytest.raises(FlightError) as failed:

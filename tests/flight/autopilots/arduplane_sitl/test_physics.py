@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from aircraft.catalog import aircraft_names, load_aircraft
-from flight.autopilots.arduplane_sitl import physics as physics_port
+from flight.autopilots.arduplane_sitl import physics
 from flight.autopilots.arduplane_sitl.physics import (
     LOOK_FRAMES,
     METRES_A_DEGREE,
@@ -38,7 +38,7 @@ from flight.dynamics.fdm import Fdm
 from flight.dynamics.trim import straight
 from flight.guidance.gains import load_gains
 from flight.guidance.path import waypoint_records
-from flight.live import link as running_clock
+from flight.live import link
 from flight.mission.items import Home
 from flight.simulation.tick import Workspace
 from tests.setups import setup_maker
@@ -167,7 +167,7 @@ def test_a_frame_that_was_before_is_a_new_beginning(port: PhysicsPort, autopilot
 
 
 def test_silence_ends_the_wait_and_not_sooner(port: PhysicsPort, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(physics_port, "SILENCE", 0.6)
+    monkeypatch.setattr(physics, "SILENCE", 0.6)
     started = time.monotonic()
     with pytest.raises(FlightError, match="silent for 1 s; ended"):
         port.receive()
@@ -178,8 +178,8 @@ def test_a_sleeping_laptop_is_no_silence(port: PhysicsPort, monkeypatch: pytest.
     """Its clock leaps by an hour in the middle of a wait: the program, which slept too, is still waited for."""
     leap = 0.0
     real = time.monotonic
-    monkeypatch.setattr(running_clock.time, "monotonic", lambda: real() + leap)
-    monkeypatch.setattr(physics_port, "SILENCE", 1.6)
+    monkeypatch.setattr(link.time, "monotonic", lambda: real() + leap)
+    monkeypatch.setattr(physics, "SILENCE", 1.6)
     looks = 0
 
     def watch() -> None:
@@ -199,7 +199,7 @@ def test_a_sleeping_laptop_is_no_silence(port: PhysicsPort, monkeypatch: pytest.
 def test_the_same_question_without_end_is_no_understanding(
     port: PhysicsPort, autopilot: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(physics_port, "SILENCE", 0.5)
+    monkeypatch.setattr(physics, "SILENCE", 0.5)
     autopilot.send(packet(7))
     port.receive()
     port.answer(b"what it does not understand")

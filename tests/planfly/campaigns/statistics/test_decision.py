@@ -59,7 +59,7 @@ def test_the_interval_covers_as_it_says(p: float, flights: int) -> None:
     assert 0.95 <= exact <= 0.99
 
 
-def test_lost_flights_count_against_both_ways() -> None:
+def test_lost_flights_widen_the_interval_both_ways() -> None:
     tally = Tally(90, 4, 6)
     assert tally.flown == 100
     assert lower_bound(tally) == lower_bound(Tally(90, 10))
@@ -203,7 +203,7 @@ def test_a_target_far_off_is_refuted_soon() -> None:
     assert bound.interval(10, 10).high < 0.99
 
 
-def test_lost_flights_count_against_both_ways_of_stopping_bound() -> None:
+def test_lost_flights_widen_the_bound_both_ways() -> None:
     bound = StoppingBound(0.9)
     low, high = bound.bounds(Tally(200, 5, 10))
     assert low == bound.interval(200, 15).low
