@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.missions import feasible
 from world.geometry import wrap
 
@@ -36,7 +36,7 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
         flown = simulate(made.setup, made.airframe.aircraft)
         if flown.ended != "completed":
             raise RuntimeError(f"mission {number} {flown.ended}")
-        shape = route_demands(made.setup)
+        shape = route_requirements(made.setup)
         courses = []
         for leg in range(shape.legs):
             line = _line(shape, flown.track, leg)
@@ -46,7 +46,7 @@ def angles(numbers: Iterable[int], margin: float) -> Angles:
     return Angles(*(np.degrees(np.abs([value for value in found if np.isfinite(value)])) for found in (turns, slopes)))
 
 
-def _line(shape: RouteDemands, track: Track, leg: int) -> Floats:
+def _line(shape: RouteRequirements, track: Track, leg: int) -> Floats:
     """(3,) east, north and up for each m of the way over the ground, by least squares; NaN for a short stretch."""
     away = track.position - shape.points[leg]
     along = away[:, :2] @ shape.leg_unit(leg)

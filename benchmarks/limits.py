@@ -17,7 +17,7 @@ from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, make_limits
 from flight.simulation.simulate import simulate
 from flight.simulation.track import Track
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from world.scenario import from_spec
 
 Floats = NDArray[np.float64]
@@ -177,7 +177,7 @@ def leg_limit(aircraft: Aircraft, turn: float, same_way: bool, wind: float = 0.0
         track = fly(leg)
         return track is not None and _held_bank(track) <= bank and float(np.abs(track.cross_track).max()) <= CROSS_HELD
 
-    shape = route_demands(made_setup(points(FAR), aircraft, wind, wind_from))
+    shape = route_requirements(made_setup(points(FAR), aircraft, wind, wind_from))
     predicted = float(shape.after[1] + shape.reversal[1] + shape.before[2])
     return Limit("leg", wind, wind_from, predicted, bisect(holds, 1.4 * predicted, 0.6 * predicted), same_way)
 

@@ -11,7 +11,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Rows
 from logs.recording.recorder import Recorder
 from logs.verdict.findings import Verdict
-from logs.verdict.places import FlownBeside
+from logs.verdict.places import ReferenceFlights
 from world.files import hold
 from world.geometry import leg_runs
 from world.interruption import uninterrupted
@@ -156,11 +156,11 @@ class WholeLog:
         """Record what happened; arguments as of `Recorder.event`."""
         self._recorder.event(time, text, level)
 
-    def finish(self, ended: str, verdict: Verdict, beside: FlownBeside | None) -> None:
+    def finish(self, ended: str, verdict: Verdict, reference: ReferenceFlights | None) -> None:
         """Close the log of a flight that has been judged."""
         with uninterrupted(), self._named_errors():
             self._open = False
-            self._recorder.finish(ended, verdict, beside)
+            self._recorder.finish(ended, verdict, reference)
 
     @contextlib.contextmanager
     def _named_errors(self) -> Iterator[None]:

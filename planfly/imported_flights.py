@@ -314,7 +314,7 @@ def _one_again(
         envelope = load_envelope(model, motor_braking=scenario.flight.motor_braking)
         limits = make_limits(scenario, envelope, setup.airspeed, min(setup.max_bank, envelope.max_bank))
     own = replace(
-        legs.demands.setup,
+        legs.requirements.setup,
         scenario=scenario,
         limits=limits,
         aircraft=model.name,

@@ -22,11 +22,11 @@ from logs.recording.reader import LogEvent
 from logs.recording.recorder import thin_track
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_flight import judge_flight, judge_plan_only
-from logs.verdict.places import FlownBeside
+from logs.verdict.places import ReferenceFlights
 from logs.verdict.rules.energy_rule import needed_energy
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.crash_safe_log import FlightLimits, WholeLog
-from planfly.reference_flights import judge_with_flights_beside
+from planfly.reference_flights import judge_with_reference_flights
 from planner.plan import Plan
 from planner.search.plan_path import plan_path
 from world.errors import FlightError, StartError
@@ -90,7 +90,7 @@ class JudgedFlight:
     ended: how it ended, "completed" or the reason why not.
     verdict: on these rows.
     events: what the log holds beside them.
-    beside: what other flights had to say of it; None where none were flown.
+    reference: what other flights had to say of it; None where none were flown.
     """
 
     setup: FlightSetup
@@ -98,7 +98,7 @@ class JudgedFlight:
     ended: str
     verdict: Verdict
     events: tuple[LogEvent, ...]
-    beside: FlownBeside | None = None
+    reference: ReferenceFlights | None = None
 
 
 def plan_then_fly(
@@ -183,7 +183,7 @@ def fly_and_judge(
     every: int = 1,
     autopilot: Path | None = None,
     off_nominal: OffNominal | None = None,
-    beside: bool = True,
+    reference: bool = True,
     most: FlightLimits = _USUAL_LIMITS,
 ) -> JudgedFlight:
     """Fly a setup, record it if a log is named, and judge it.
@@ -191,7 +191,7 @@ def fly_and_judge(
     every: one row in so many is recorded; the verdict is then that of the recorded rows, so that a check repeats it.
     autopilot: the program of a real ArduPlane, which then flies; its own log is kept beside ours, as `.BIN`.
     off_nominal: how the flight differs from what guidance knows; none of a real ArduPlane's.
-    beside: whether the flights below are flown; whether it is flyable does not depend on them.
+    reference: whether the flights below are flown; whether it is flyable does not depend on them.
     most: how long it may fly, and how large its log may grow.
 
     An autopilot's flight has that of the aircraft by planfly's guidance flown beside it, and where it fails and that
@@ -208,7 +208,7 @@ def fly_and_judge(
         if autopilot is None:
             how = off_nominal or OffNominal(Variation())
             flight = Flight(setup, airframe.aircraft, how.variation, start_offset=how.start_offset)
-            return _record_and_judge(setup, airframe, flight, log, advance, every, most, beside=beside)
+            return _record_and_judge(setup, airframe, flight, log, advance, every, most, reference=reference)
         return _fly_program(setup, airframe, log, advance, every, autopilot, most)
     except StartError as error:
         return _unflown(setup, log, f"not started: {error.reason}")
@@ -264,7 +264,7 @@ def _record_and_judge(
     every: int,
     most: FlightLimits,
     *,
-    beside: bool = True,
+    reference: bool = True,
 ) -> JudgedFlight:
     flight.most_ticks = min(flight.most_ticks, most.most_ticks(flight.dt))
 
@@ -274,14 +274,14 @@ def _record_and_judge(
 
     if log is None:
         flown = fly_to_end(flight, progress=report)
-        return _judged(setup, airframe, flown.track, flown.ended, beside=beside)
+        return _judged(setup, airframe, flown.track, flown.ended, reference=reference)
     with WholeLog(log, setup, every=every, batch=BATCH) as recorder:
         flown = fly_to_end(flight, recorder.write, report, lambda: most.log_full(recorder.size))
         recorder.ended = flown.ended
-        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, beside=beside)
+        judged = _judged(setup, airframe, thin_track(flown.track, every), flown.ended, reference=reference)
         for event in judged.events:
             recorder.event(event.time, event.text, event.level)
-        recorder.finish(judged.ended, judged.verdict, judged.beside)
+        recorder.finish(judged.ended, judged.verdict, judged.reference)
     return judged
 
 
@@ -292,10 +292,10 @@ def _unflown(setup: FlightSetup, log: Path | None, ended: str) -> JudgedFlight:
     return JudgedFlight(setup, join_tracks([]), ended, judge_flight(setup, join_tracks([]), ended), ())
 
 
-def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, beside: bool) -> JudgedFlight:
+def _judged(setup: FlightSetup, airframe: Airframe, track: Track, ended: str, *, reference: bool) -> JudgedFlight:
     end = float(track.time[-1]) if len(track) else 0.0
     event = LogEvent(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-    if not beside:
+    if not reference:
         return JudgedFlight(setup, track, ended, judge_flight(setup, track, ended), (event,))
-    verdict, others = judge_with_flights_beside(setup, airframe.aircraft, track, ended)
+    verdict, others = judge_with_reference_flights(setup, airframe.aircraft, track, ended)
     return JudgedFlight(setup, track, ended, verdict, (event,), others)

@@ -1,4 +1,4 @@
-"""The flights beside an autopilot's: of the aircraft by planfly's guidance, and with other parameters."""
+"""Reference flights of an autopilot's: the aircraft by planfly's guidance, and the law with other parameters."""
 
 import contextlib
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from flight.simulation.track import Track
 from logs.verdict.findings import Finding, Verdict
 from logs.verdict.judge_flight import judge_flight
 from logs.verdict.measures.route_requirements import true_route
-from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, FlownBeside
+from logs.verdict.places import FLIGHT, AirframeAnswer, DecidingParameter, ReferenceFlights
 from logs.verdict.summary import first_failed
 from world.errors import StartError
 
@@ -120,7 +120,7 @@ def _off(failed: Finding, findings: tuple[Finding, ...]) -> float | None:
 
 
 class _GivenUp(Exception):
-    """There is no time for flights beside."""
+    """There is no time for reference flights."""
 
 
 def airframe_answer(setup: FlightSetup, aircraft: Aircraft, progress: Progress | None = None) -> AirframeAnswer:
@@ -169,9 +169,9 @@ def find_deciding_parameter(
     return deciding_parameter(setup.parameters, findings, passes)
 
 
-def judge_with_flights_beside(
+def judge_with_reference_flights(
     setup: FlightSetup, aircraft: Aircraft, track: Track, ended: str, hurry: Callable[[], bool] | None = None
-) -> tuple[Verdict, FlownBeside | None]:
+) -> tuple[Verdict, ReferenceFlights | None]:
     """Judge an autopilot's flight beside the aircraft's own, and look for the parameter that decides where they differ.
 
     track, ended: of the flight with the setup.  A flight of planfly's own guidance has none beside it.
@@ -186,15 +186,15 @@ def judge_with_flights_beside(
     if setup.parameters is None:
         return judge_flight(setup, track, ended), None
     try:
-        beside = FlownBeside(airframe_answer(setup, aircraft, watch))
+        reference = ReferenceFlights(airframe_answer(setup, aircraft, watch))
     except _GivenUp:
         return judge_flight(setup, track, ended), None
-    verdict = judge_flight(setup, track, ended, beside=beside)
-    if beside.airframe is not None and beside.airframe.flyable and not verdict.flyable:
+    verdict = judge_flight(setup, track, ended, reference=reference)
+    if reference.airframe is not None and reference.airframe.flyable and not verdict.flyable:
         with contextlib.suppress(_GivenUp):
-            beside = replace(beside, deciding=find_deciding_parameter(setup, aircraft, verdict, watch))
-            verdict = judge_flight(setup, track, ended, beside=beside)
-    return verdict, beside
+            reference = replace(reference, deciding=find_deciding_parameter(setup, aircraft, verdict, watch))
+            verdict = judge_flight(setup, track, ended, reference=reference)
+    return verdict, reference
 
 
 def _flown_by_law(setup: FlightSetup, aircraft: Aircraft, progress: Progress | None = None) -> Verdict:

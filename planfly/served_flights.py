@@ -33,7 +33,7 @@ from logs.verdict.wording import deciding_text, place_text
 from planfly.airframe import Airframe, choose_seed, load_airframe
 from planfly.open_mission import NamedFences, open_mission
 from planfly.pipeline import make_setup
-from planfly.reference_flights import judge_with_flights_beside
+from planfly.reference_flights import judge_with_reference_flights
 from world.errors import PlanflyError
 from world.frames import to_geo
 from world.interruption import end_with_parent
@@ -182,15 +182,15 @@ class ServedLog:
         self._recorder.flush()
 
     def finish(self, ended: str, hurry: Callable[[], bool]) -> FlightJudged:
-        """Judge the flight and close the log; hurry: as of `planfly.reference_flights.judge_with_flights_beside`."""
+        """Judge the flight and close the log; hurry: as of `planfly.reference_flights.judge_with_reference_flights`."""
         track = join_tracks(self._blocks)
         if ended == "completed":
-            verdict, beside = judge_with_flights_beside(self._setup, self._aircraft, track, ended, hurry)
+            verdict, reference = judge_with_reference_flights(self._setup, self._aircraft, track, ended, hurry)
         else:
-            verdict, beside = judge_flight(self._setup, track, ended), None
+            verdict, reference = judge_flight(self._setup, track, ended), None
         end = float(track.time[-1]) if len(track) else 0.0
         self._recorder.event(end, f"flight ended: {ended}", "info" if ended == "completed" else "error")
-        self._recorder.finish(ended, verdict, beside)
+        self._recorder.finish(ended, verdict, reference)
         return FlightJudged(verdict.flyable, (*verdict_texts("flown", verdict), StatusText(f"log {self._path}", INFO)))
 
     def abandon(self) -> None:

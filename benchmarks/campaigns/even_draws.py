@@ -40,5 +40,5 @@ def fly_even(base: CampaignBase, index: int, wind: GivenWind | None = None) -> F
     """Fly one of them by its index; wind: mean wind in the scenario's place."""
     draw = even_draw(base.spread, base.seed, index)
     varied = vary(base, draw, wind)
-    flown = fly_and_judge(varied.setup, varied.airframe, None, off_nominal=varied.off_nominal, beside=False)
+    flown = fly_and_judge(varied.setup, varied.airframe, None, off_nominal=varied.off_nominal, reference=False)
     return FlightRow(draw, "flyable" if flown.verdict.flyable else "not flyable", flown.ended)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from aircraft.catalog import Aircraft
 from flight.dynamics.fdm import Variation
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from tests.setups import MakeSetup, standard
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ def _case(aircraft: Aircraft, make: MakeSetup, seed: int, number: int) -> Case:
 
     if tight:
         # What the turns need, from level legs that are long enough for any.
-        shape = route_demands(made(np.full(LEGS, 4.0 * scale * OPEN_LEGS[1]), np.zeros(LEGS)))
+        shape = route_requirements(made(np.full(LEGS, 4.0 * scale * OPEN_LEGS[1]), np.zeros(LEGS)))
         runs = np.maximum(shares * (shape.after[:-1] + shape.reversal + shape.before[1:]), scale * SHORTEST)
         # Room to settle before the first corner and after the last.
         runs[[0, -1]] += scale * OPEN_LEGS[0]

@@ -25,8 +25,8 @@ from logs.recording.mcap_reader import FRAME, MAGIC, PARSE_ERRORS, Container, re
 from logs.recording.mcap_writer import FRAME_SIZE, MESSAGE_HEADER
 from logs.recording.recorder import LONGEST
 from logs.recording.setup_attachments import (
-    BESIDE_FILE,
     RECOVERY_FILE,
+    REFERENCE_FILE,
     RESULT_FILE,
     SETUP_FILE,
     VERDICT_FILE,
@@ -46,8 +46,8 @@ from logs.recording.state_channel import (
     parse_row,
     state_class,
 )
-from logs.verdict.findings import parse_beside
-from logs.verdict.places import FlownBeside
+from logs.verdict.findings import parse_reference_flights
+from logs.verdict.places import ReferenceFlights
 from world.errors import LogError
 from world.html_table import html_table
 
@@ -166,7 +166,7 @@ class FlightLog:
     problem: what is, in a line; empty for a complete log.
     end_time: s, of the last row.
     lost: what of the flight is lost, in a line; ``problem`` adds to it that a recovered log is one.
-    beside: what other flights had to say of it; None where none were flown.
+    reference: what other flights had to say of it; None where none were flown.
     """
 
     source: str
@@ -180,7 +180,7 @@ class FlightLog:
     problem: str
     end_time: float
     lost: str = ""
-    beside: FlownBeside | None = None
+    reference: ReferenceFlights | None = None
 
     def __repr__(self) -> str:
         name, state = Path(self.source).name, self.ended or "cut short"
@@ -309,7 +309,7 @@ def read_log(path: Path | str) -> FlightLog:
         )
     ended, wrong = _result(found.attachments, len(rows))
     verdict, garbled = _verdict(found.attachments)
-    beside, unread = _beside(found.attachments)
+    reference, unread = _reference(found.attachments)
     lost = fault or found.problem
     recovered = not lost and RECOVERY_FILE in found.attachments
     lost = _loss(found.attachments[RECOVERY_FILE]) if recovered else lost or wrong or garbled or unread
@@ -326,7 +326,7 @@ def read_log(path: Path | str) -> FlightLog:
         problem=f"recovered: {lost}" if recovered else lost,
         end_time=float(track.time[-1]),
         lost=lost,
-        beside=beside,
+        reference=reference,
     )
 
 
@@ -382,11 +382,11 @@ def _verdict(attachments: dict[str, bytes]) -> tuple[dict[str, Any] | None, str]
     return (verdict, "") if verdict else (None, f"{VERDICT_FILE} is not a JSON object")
 
 
-def _beside(attachments: dict[str, bytes]) -> tuple[FlownBeside | None, str]:
-    if BESIDE_FILE not in attachments:
+def _reference(attachments: dict[str, bytes]) -> tuple[ReferenceFlights | None, str]:
+    if REFERENCE_FILE not in attachments:
         return None, ""
     try:
-        return parse_beside(attachments[BESIDE_FILE], BESIDE_FILE), ""
+        return parse_reference_flights(attachments[REFERENCE_FILE], REFERENCE_FILE), ""
     except LogError as error:
         return None, str(error)
 

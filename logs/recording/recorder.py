@@ -39,7 +39,7 @@ from logs.recording.mcap_writer import (
     lay_out,
     single_record,
 )
-from logs.recording.setup_attachments import BESIDE_FILE, RESULT_FILE, VERDICT_FILE, media_type, pack_setup
+from logs.recording.setup_attachments import REFERENCE_FILE, RESULT_FILE, VERDICT_FILE, media_type, pack_setup
 from logs.recording.state_channel import (
     EPOCH_NS,
     EVENT_TOPIC,
@@ -51,9 +51,9 @@ from logs.recording.state_channel import (
     state_schema,
     times_ns,
 )
-from logs.verdict.findings import Verdict, beside_json, verdict_json
+from logs.verdict.findings import Verdict, reference_flights_json, verdict_json
 from logs.verdict.measures.route_requirements import with_fence_zones
-from logs.verdict.places import FlownBeside
+from logs.verdict.places import ReferenceFlights
 
 CHUNK_SIZE = 64 * 1024
 RESULT_SCHEMA = "planfly.result/1"
@@ -203,7 +203,7 @@ class Recorder:
         message = scene.log_message(log_time, text, level).SerializeToString(deterministic=True)
         self._events.append(single_record(self._channels[EVENT_TOPIC], log_time, message))
 
-    def finish(self, ended: str, verdict: Verdict | None = None, beside: FlownBeside | None = None) -> None:
+    def finish(self, ended: str, verdict: Verdict | None = None, reference: ReferenceFlights | None = None) -> None:
         """Write how the flight ended, its verdict and what other flights had to say of it, and close the file."""
         if self._skipped is not None:
             self._append(self._skipped)
@@ -211,8 +211,8 @@ class Recorder:
         self._emit(None)
         end = max(self._last_ns, EPOCH_NS)
         self._write([*self._poses.whole(end)])
-        if beside is not None:
-            self._attach(BESIDE_FILE, beside_json(beside).encode(), end)
+        if reference is not None:
+            self._attach(REFERENCE_FILE, reference_flights_json(reference).encode(), end)
         if verdict is not None:
             self._attach(VERDICT_FILE, verdict_json(verdict).encode(), end)
         result = {

@@ -91,7 +91,7 @@ def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str])
 
 def _judge(log: FlightLog) -> Verdict:
     ended = log.ended or "the log ends before the flight does"
-    return judge_flight(log.setup, log.track, ended, whole=log.complete, beside=log.beside)
+    return judge_flight(log.setup, log.track, ended, whole=log.complete, reference=log.reference)
 
 
 def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:

@@ -13,10 +13,10 @@ from flight.simulation.setup import AutopilotProgram
 from logs.verdict.places import (
     AirframeAnswer,
     DecidingParameter,
-    FlownBeside,
     LevelAnswer,
     Place,
     PlaceKind,
+    ReferenceFlights,
     Suggestion,
 )
 from logs.verdict.wording import deciding_text, disagreement_text, place_text, suggestions_text
@@ -316,7 +316,7 @@ def _finding_data(finding: Finding) -> dict[str, Any]:
 #
 # A log's verdict is worked out anew from its rows; the flights beside it are not in it, and their answers are kept.
 
-BESIDE_SCHEMA = "planfly.beside/1"
+REFERENCE_SCHEMA = "planfly.reference/1"
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -361,26 +361,26 @@ class _Deciding(_Table):
 
 
 class _Beside(_Table):
-    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{BESIDE_SCHEMA}$")] = BESIDE_SCHEMA
+    file_schema: Annotated[str, Field(alias="schema", pattern=f"^{REFERENCE_SCHEMA}$")] = REFERENCE_SCHEMA
     airframe: _Airframe | None
     deciding: _Deciding | None
 
 
-def beside_json(beside: FlownBeside) -> str:
+def reference_flights_json(reference: ReferenceFlights) -> str:
     """Write the answers as text.
 
-    >>> beside = FlownBeside(AirframeAnswer(True, "flyable"))
-    >>> parse_beside(beside_json(beside), "a.mcap") == beside
+    >>> reference = ReferenceFlights(AirframeAnswer(True, "flyable"))
+    >>> parse_reference_flights(reference_flights_json(reference), "a.mcap") == reference
     True
     """
-    return json.dumps({"schema": BESIDE_SCHEMA, **asdict(beside)}, indent=1, allow_nan=False) + "\n"
+    return json.dumps({"schema": REFERENCE_SCHEMA, **asdict(reference)}, indent=1, allow_nan=False) + "\n"
 
 
-def parse_beside(text: str | bytes, source: str) -> FlownBeside:
+def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     """Read the answers of a text.  Raises LogError, in one line, for what does not fit; source names it.
 
-    >>> parse_beside('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
-    FlownBeside(airframe=None, deciding=None)
+    >>> parse_reference_flights('{"schema": "planfly.reference/1", "airframe": null, "deciding": null}', "a.mcap")
+    ReferenceFlights(airframe=None, deciding=None)
     """
     try:
         file = _Beside.model_validate_json(text)
@@ -391,7 +391,7 @@ def parse_beside(text: str | bytes, source: str) -> FlownBeside:
     unknown = [rule for rule in (*rules, *([deciding.rule] if deciding else [])) if rule not in RULES]
     if unknown:
         raise LogError(f"{source}: {unknown[0]!r} is no rule", file=source, field="rule", value=unknown[0])
-    return FlownBeside(
+    return ReferenceFlights(
         None if airframe is None else airframe.answer(),
         None if deciding is None else deciding.parameter(),
     )

@@ -19,9 +19,9 @@ from logs.verdict.judge_geometry import (
     judge_unflown,
     unflyable_items,
 )
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import lay_track
-from logs.verdict.places import Disagreement, FlownBeside, LevelAnswer, Place
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.track_alignment import align_track
+from logs.verdict.places import Disagreement, LevelAnswer, Place, ReferenceFlights
 from logs.verdict.suggestions import with_suggestions
 from logs.verdict.summary import headline, summary_lines
 
@@ -35,7 +35,7 @@ def judge_flight(
     *,
     whole: bool = True,
     envelope: bool = True,
-    beside: FlownBeside | None = None,
+    reference: ReferenceFlights | None = None,
 ) -> Verdict:
     """Judge a flown track: level "flown".
 
@@ -44,7 +44,7 @@ def judge_flight(
 
     ended: how the flight ended, "completed" or what stopped it.  whole: the record has its end.
     envelope: whether the aircraft's envelope counts beside what the flight showed, and not that alone.
-    beside: what other flights have to say of this one.
+    reference: what other flights have to say of this one.
 
     >>> from aircraft.catalog import find_aircraft
     >>> from flight.dynamics.envelope_tables import load_envelope
@@ -64,16 +64,16 @@ def judge_flight(
     """
     if setup.source is not None:
         return judge_field_flight(setup, track, whole=whole)
-    demands = route_demands(setup, envelope=envelope)
+    requirements = route_requirements(setup, envelope=envelope)
     if not len(track):
-        return judge_unflown(demands, ended, whole=whole)
-    aligned = lay_track(demands, track)
-    findings = flown_findings(demands, aligned, ended, whole, envelope)
+        return judge_unflown(requirements, ended, whole=whole)
+    aligned = align_track(requirements, track)
+    findings = flown_findings(requirements, aligned, ended, whole, envelope)
     complete = all(item.ok is True for item in findings if item.rule == "completion")
     flyable = complete and not any(item.ok is False for item in findings)
-    findings = with_suggestions(demands, aligned, findings)
-    levels = _levels(demands, findings, flyable, beside)
-    deciding = None if beside is None or flyable else beside.deciding
+    findings = with_suggestions(requirements, aligned, findings)
+    levels = _levels(requirements, findings, flyable, reference)
+    deciding = None if reference is None or flyable else reference.deciding
     lines = summary_lines(findings, setup, "flown", levels, deciding)
     return Verdict(
         findings,
@@ -91,24 +91,24 @@ def judge_flight(
 
 
 def _levels(
-    demands: RouteDemands, flown: tuple[Finding, ...], flyable: bool, beside: FlownBeside | None
+    requirements: RouteRequirements, flown: tuple[Finding, ...], flyable: bool, reference: ReferenceFlights | None
 ) -> tuple[LevelAnswer, ...]:
     """What geometry says, and the airframe where it was flown beside, where each differs; and the flight's own answer.
 
     Without the envelope there is nothing beside the flight.
     """
     levels = []
-    if demands.envelope:
-        predicted = (*unflyable_items(demands.setup), *geometric_findings(demands))
+    if requirements.envelope:
+        predicted = (*unflyable_items(requirements.setup), *geometric_findings(requirements))
         passes = not any(item.ok is False for item in predicted)
         differing = _differing("geometry", {(item.rule, item.place): item.ok for item in predicted}, flown)
         levels.append(LevelAnswer("geometry", passes, headline(predicted, passes), differing))
-    if demands.envelope and beside is not None and beside.airframe is not None:
-        airframe = beside.airframe
+    if requirements.envelope and reference is not None and reference.airframe is not None:
+        airframe = reference.airframe
         passed = {(item.rule, item.place): (item.rule, item.place) not in airframe.failed for item in flown}
         differing = _differing("airframe", passed, flown)
         levels.append(LevelAnswer("airframe", airframe.flyable, airframe.headline, differing))
-    return (*levels, LevelAnswer(flown_level(demands.setup), flyable, headline(flown, flyable)))
+    return (*levels, LevelAnswer(flown_level(requirements.setup), flyable, headline(flown, flyable)))
 
 
 def _differing(

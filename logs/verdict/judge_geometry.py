@@ -4,7 +4,7 @@ import math
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Verdict, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, PLAN, LevelAnswer, LevelName
 from logs.verdict.rules.bounds_rule import bounds_findings
@@ -29,24 +29,24 @@ from logs.verdict.summary import headline, summary_lines
 from planner.plan import Plan, Violation
 
 
-def geometric_findings(demands: RouteDemands) -> tuple[Finding, ...]:
+def geometric_findings(requirements: RouteRequirements) -> tuple[Finding, ...]:
     """Findings of a route's geometry against the aircraft's envelope."""
     findings: tuple[Finding, ...] = (
-        *turn_findings(demands, None, geometric=True),
-        *slope_findings(demands, None, geometric=True),
-        *clearance_findings(demands, None, geometric=True),
-        *height_findings(demands, None, geometric=True),
-        *fence_findings(demands, None, geometric=True),
-        *threat_findings(demands, None, geometric=True),
-        *bounds_findings(demands, None, geometric=True),
-        *waypoint_findings(demands, None, geometric=True),
-        *corridor_findings(demands, None, geometric=True),
-        *speed_findings(demands, None, geometric=True),
-        *stall_findings(demands, None, geometric=True),
-        *takeoff_landing_findings(demands),
-        *energy_findings(demands, None, geometric=True),
+        *turn_findings(requirements, None, geometric=True),
+        *slope_findings(requirements, None, geometric=True),
+        *clearance_findings(requirements, None, geometric=True),
+        *height_findings(requirements, None, geometric=True),
+        *fence_findings(requirements, None, geometric=True),
+        *threat_findings(requirements, None, geometric=True),
+        *bounds_findings(requirements, None, geometric=True),
+        *waypoint_findings(requirements, None, geometric=True),
+        *corridor_findings(requirements, None, geometric=True),
+        *speed_findings(requirements, None, geometric=True),
+        *stall_findings(requirements, None, geometric=True),
+        *takeoff_landing_findings(requirements),
+        *energy_findings(requirements, None, geometric=True),
     )
-    return fold_loiters(demands, None, findings)
+    return fold_loiters(requirements, None, findings)
 
 
 def judge_geometry(setup: FlightSetup) -> Verdict:
@@ -68,10 +68,10 @@ def judge_geometry(setup: FlightSetup) -> Verdict:
     >>> [[change.what for change in one] for finding in verdict.findings for one in finding.suggestions]
     [['airspeed'], ['rise'], ['length']]
     """
-    demands = route_demands(setup)
+    requirements = route_requirements(setup)
     findings = (
         *mission_findings(setup),
-        *with_suggestions(demands, None, geometric_findings(demands)),
+        *with_suggestions(requirements, None, geometric_findings(requirements)),
         *([_not_feasible(setup.plan)] if setup.plan is not None and not setup.plan.feasible else []),
     )
     complete = setup.plan is None or setup.plan.feasible
@@ -91,24 +91,24 @@ def flown_level(setup: FlightSetup) -> LevelName:
     return "airframe" if setup.parameters is None else "autopilot"
 
 
-def judge_unflown(demands: RouteDemands, ended: str, *, whole: bool = True) -> Verdict:
+def judge_unflown(requirements: RouteRequirements, ended: str, *, whole: bool = True) -> Verdict:
     """Judge a flight of which there is no row: its route's geometry, and why nothing was flown; never complete.
 
     ended: why not.  whole: the record has its end.
 
     >>> from logs.recording.example_log import example_log
-    >>> verdict = judge_unflown(route_demands(example_log().setup), "not started: no way made against the wind")
+    >>> verdict = judge_unflown(route_requirements(example_log().setup), "not started: no way made against the wind")
     >>> verdict.level, verdict.headline
     ('geometric', 'not flyable: completion (not started: no way made against the wind), ...')
     """
-    setup = demands.setup
+    setup = requirements.setup
     faults = [message(ended), *([] if whole else [message("the log is damaged or unfinished")])]
     stopped = make_finding(
         "completion", FLIGHT, ok=False, reason=reason_of(faults), faults=faults, method="nothing was flown"
     )
-    predicted = geometric_findings(demands)
+    predicted = geometric_findings(requirements)
     passes = not any(item.ok is False for item in predicted)
-    findings = (*with_suggestions(demands, None, predicted), stopped)
+    findings = (*with_suggestions(requirements, None, predicted), stopped)
     levels = (
         LevelAnswer("geometry", passes, headline(predicted, passes)),
         LevelAnswer(flown_level(setup), False, headline(findings, False)),
@@ -184,25 +184,25 @@ def _plan_lines(findings: list[Finding], plan: Plan) -> tuple[str, ...]:
 
 
 def flown_findings(
-    demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
+    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, whole: bool, envelope: bool
 ) -> tuple[Finding, ...]:
     """Findings of a flight against its route and the aircraft's envelope, in the verdict's order."""
     findings = (
-        *unflyable_items(demands.setup),
-        *turn_findings(demands, aligned),
-        *slope_findings(demands, aligned),
-        *clearance_findings(demands, aligned),
-        *height_findings(demands, aligned),
-        *fence_findings(demands, aligned),
-        *threat_findings(demands, aligned),
-        *bounds_findings(demands, aligned),
-        *waypoint_findings(demands, aligned),
-        *corridor_findings(demands, aligned),
-        *speed_findings(demands, aligned),
-        *(stall_findings(demands, aligned) if envelope else ()),
-        *takeoff_landing_findings(demands),
-        *energy_findings(demands, aligned),
-        *departure_findings(demands, aligned),
-        *completion_findings(demands, aligned, ended, whole),
+        *unflyable_items(requirements.setup),
+        *turn_findings(requirements, aligned),
+        *slope_findings(requirements, aligned),
+        *clearance_findings(requirements, aligned),
+        *height_findings(requirements, aligned),
+        *fence_findings(requirements, aligned),
+        *threat_findings(requirements, aligned),
+        *bounds_findings(requirements, aligned),
+        *waypoint_findings(requirements, aligned),
+        *corridor_findings(requirements, aligned),
+        *speed_findings(requirements, aligned),
+        *(stall_findings(requirements, aligned) if envelope else ()),
+        *takeoff_landing_findings(requirements),
+        *energy_findings(requirements, aligned),
+        *departure_findings(requirements, aligned),
+        *completion_findings(requirements, aligned, ended, whole),
     )
-    return fold_loiters(demands, aligned, findings)
+    return fold_loiters(requirements, aligned, findings)

@@ -152,7 +152,7 @@ class DecidingParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class FlownBeside:
+class ReferenceFlights:
     """What other flights than the one that is judged have to say of it; they are not flown again to judge a log.
 
     airframe: None where it was not flown.

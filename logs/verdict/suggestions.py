@@ -11,15 +11,15 @@ from logs.verdict.findings import Finding
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
 from logs.verdict.measures.path_sweeps import path_spheres
 from logs.verdict.measures.route_requirements import (
-    RouteDemands,
+    RouteRequirements,
     available_lengths,
     performance_tables,
     slope_limit,
     steep_arc,
     tighter_turn,
-    turn_demands,
     turn_lengths,
     turn_limit,
+    turn_requirements,
 )
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import DEPTH_PRECISION, path_zones
@@ -55,7 +55,9 @@ _LEVEL: tuple[tuple[Quantity, str, float], ...] = (
 _UPRIGHT: tuple[tuple[Quantity, str, float], ...] = (("height", "up", 1.0), ("descent", "up", -1.0))
 
 
-def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def zone_suggestions(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding
+) -> tuple[Suggestion, ...]:
     """Pass a zone further to one side, or higher or lower; the least change first.
 
     item: the finding of the zone that is violated.  All of the legs on which it is are shifted: of the planned path
@@ -65,12 +67,12 @@ def zone_suggestions(demands: RouteDemands, aligned: AlignedTrack | None, item: 
     if "entry leg" not in facts:
         return ()
     first, last = int(facts["entry leg"]), int(facts["exit leg"])
-    record, terrain = zone_records([demands.airspace.zones[z]]), demands.setup.scenario.terrain
+    record, terrain = zone_records([requirements.airspace.zones[z]]), requirements.setup.scenario.terrain
     planned, flown = item.planned or 0.0, item.flown or 0.0
     if aligned is not None and planned <= ROUNDING:
         moves, deeper = flown_moves(aligned, first, last), 0.0
     else:
-        moves, deeper = planned_moves(demands, first, last), max(0.0, flown - planned)
+        moves, deeper = planned_moves(requirements, first, last), max(0.0, flown - planned)
     near = moves[(moves["leg"] >= first) & (moves["leg"] <= last)]
     found = []
     for ways in (_LEVEL, _UPRIGHT):
@@ -111,36 +113,37 @@ _Sized = tuple[float, Suggestion]
 
 
 def with_suggestions(
-    demands: RouteDemands, aligned: AlignedTrack | None, findings: tuple[Finding, ...]
+    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: tuple[Finding, ...]
 ) -> tuple[Finding, ...]:
     """Fill in ``suggestions`` of every failed finding that a change of the plan could mend."""
     return tuple(
-        replace(item, suggestions=_suggest(demands, aligned, item)) if item.ok is False else item for item in findings
+        replace(item, suggestions=_suggest(requirements, aligned, item)) if item.ok is False else item
+        for item in findings
     )
 
 
-def _suggest(demands: RouteDemands, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
+def _suggest(requirements: RouteRequirements, aligned: AlignedTrack | None, item: Finding) -> tuple[Suggestion, ...]:
     match item.rule, item.place:
         case "slope", Place("leg", int(leg)):
-            return slope_suggestions(demands, leg, item)
+            return slope_suggestions(requirements, leg, item)
         case "turn", Place("waypoint", int(i)):
-            return turn_suggestions(demands, i)
+            return turn_suggestions(requirements, i)
         case "threat", Place("missile", int(m)):
-            return _further(demands, aligned, item.place, m)
+            return _further(requirements, aligned, item.place, m)
         case "clearance", _:
             return _higher(item)
         case "height", Place("leg"):
             return _lower(item)
         case "fence", Place("exclusion" | "inclusion"):
-            return zone_suggestions(demands, aligned, item)
+            return zone_suggestions(requirements, aligned, item)
         case "bounds", _:
             return _inside(item)
         case "energy", _:
-            return _less_energy(demands, item)
+            return _less_energy(requirements, item)
         case "stall", _ if item.limit is not None:
-            return _faster(demands, item.place, item.limit)
+            return _faster(requirements, item.place, item.limit)
         case "speed", Place("leg", int(leg)) if item.limit is not None and item.margin is not None:
-            return _level_speeds(demands, item.place, leg)
+            return _level_speeds(requirements, item.place, leg)
     return ()
 
 
@@ -149,126 +152,126 @@ def _least_first(alternatives: list[_Sized]) -> tuple[Suggestion, ...]:
     return tuple(suggestion for _, suggestion in sorted(alternatives, key=lambda sized: sized[0]))
 
 
-def slope_suggestions(demands: RouteDemands, leg: int, item: Finding) -> tuple[Suggestion, ...]:
+def slope_suggestions(requirements: RouteRequirements, leg: int, item: Finding) -> tuple[Suggestion, ...]:
     """A gentler slope, a longer leg or another speed for one leg; the least relative change first."""
-    limit, source = slope_limit(demands, leg)
-    planned = abs(float(demands.slopes[leg]))
-    rise = abs(float(demands.points[leg + 1, 2] - demands.points[leg, 2]))
-    run = float(demands.runs[leg])
+    limit, source = slope_limit(requirements, leg)
+    planned = abs(float(requirements.slopes[leg]))
+    rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
+    run = float(requirements.runs[leg])
     if planned <= limit and item.flown is not None:
         # The geometry passes and the flight did not: what it managed is its limit.
         limit = min(limit, abs(math.radians(item.flown)))
     allowed = limit - BUFFER_ANGLE
     if allowed <= 0.0 or planned <= allowed:
-        return _gentler_arc(demands, leg)
-    place, sign = demands.leg(leg), 1.0 if demands.slopes[leg] >= 0.0 else -1.0
+        return _gentler_arc(requirements, leg)
+    place, sign = requirements.leg(leg), 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     gentler, longer = run * math.tan(allowed), rise / math.tan(allowed)
     alternatives: list[_Sized] = []
     if gentler >= MIN_RISE:
         change = Change("rise", place, sign * rise, sign * math.floor(gentler), "m")
         alternatives.append((1.0 - gentler / rise, (change,)))
-    speed = _slope_speed(demands, leg, planned + BUFFER_ANGLE) if source == "aircraft" else None
+    speed = _slope_speed(requirements, leg, planned + BUFFER_ANGLE) if source == "aircraft" else None
     if speed is not None:
-        now = float(demands.setup.route.airspeed[leg])
+        now = float(requirements.setup.route.airspeed[leg])
         alternatives.append((abs(speed - now) / now, (Change("airspeed", place, now, speed, "m/s"),)))
     alternatives.append((longer / run - 1.0, (Change("length", place, run, float(math.ceil(longer)), "m"),)))
     return _least_first(alternatives)
 
 
-def _gentler_arc(demands: RouteDemands, leg: int) -> tuple[Suggestion, ...]:
+def _gentler_arc(requirements: RouteRequirements, leg: int) -> tuple[Suggestion, ...]:
     """Gentler legs on either side of a fly-by arc that is too steep where they are not."""
-    steep = steep_arc(demands, leg)
+    steep = steep_arc(requirements, leg)
     if steep is None:
         return ()
     share = math.tan(math.atan(steep.limit) - BUFFER_ANGLE) / abs(steep.tangent)
     changes = []
     for k in (leg, leg + 1):
-        rise = share * float(demands.points[k + 1, 2] - demands.points[k, 2])
+        rise = share * float(requirements.points[k + 1, 2] - requirements.points[k, 2])
         # A leg that goes the other way makes the arc flatter, and stays.
         if rise * steep.tangent > 0.0:
             wanted = math.copysign(math.floor(abs(rise)), rise)
-            changes.append(Change("rise", demands.leg(k), None, wanted, "m"))
+            changes.append(Change("rise", requirements.leg(k), None, wanted, "m"))
     return (tuple(changes),) if changes else ()
 
 
-def turn_suggestions(demands: RouteDemands, i: int) -> tuple[Suggestion, ...]:
+def turn_suggestions(requirements: RouteRequirements, i: int) -> tuple[Suggestion, ...]:
     """A gentler turn, longer legs or a lower speed for one waypoint; the least relative change first."""
-    limit, source = turn_limit(demands, i)
-    planned = abs(float(demands.turns[i]))
+    limit, source = turn_limit(requirements, i)
+    planned = abs(float(requirements.turns[i]))
     if planned <= limit or limit <= BUFFER_ANGLE:
         return ()
-    place, allowed = demands.waypoint(i), limit - BUFFER_ANGLE
+    place, allowed = requirements.waypoint(i), limit - BUFFER_ANGLE
     alternatives: list[_Sized] = []
-    if source == "aircraft" and math.isfinite(demands.before[i]):
-        speed = _turn_speed(demands, i)
+    if source == "aircraft" and math.isfinite(requirements.before[i]):
+        speed = _turn_speed(requirements, i)
         if speed is not None:
-            now = float(max(demands.setup.route.airspeed[i - 1 : i + 1]))
+            now = float(max(requirements.setup.route.airspeed[i - 1 : i + 1]))
             alternatives.append((1.0 - speed / now, (Change("airspeed", place, now, speed, "m/s"),)))
-        alternatives += _longer_legs(demands, i)
-    degrees = _gentler_turn(demands, i, allowed)
+        alternatives += _longer_legs(requirements, i)
+    degrees = _gentler_turn(requirements, i, allowed)
     if degrees > 0.0:
         change = Change("turn", place, math.degrees(planned), degrees, "deg")
         alternatives.append((1.0 - allowed / planned, (change,)))
     return _least_first(alternatives)
 
 
-def _longer_legs(demands: RouteDemands, i: int) -> list[_Sized]:
+def _longer_legs(requirements: RouteRequirements, i: int) -> list[_Sized]:
     """Both legs at a waypoint long enough for its turn beside its neighbours; none where they are."""
-    before = demands.before[i] + demands.after[i - 1] + demands.reversal[i - 1] + BUFFER_LENGTH
-    after = demands.after[i] + demands.before[i + 1] + demands.reversal[i] + BUFFER_LENGTH
+    before = requirements.before[i] + requirements.after[i - 1] + requirements.reversal[i - 1] + BUFFER_LENGTH
+    after = requirements.after[i] + requirements.before[i + 1] + requirements.reversal[i] + BUFFER_LENGTH
     changes = []
     grown = 0.0
     for leg, needed in ((i - 1, before), (i, after)):
-        run = float(demands.runs[leg])
+        run = float(requirements.runs[leg])
         if math.isfinite(needed) and needed > run:
-            changes.append(Change("length", demands.leg(leg), run, float(math.ceil(needed)), "m"))
+            changes.append(Change("length", requirements.leg(leg), run, float(math.ceil(needed)), "m"))
             grown = max(grown, needed / run - 1.0)
     return [(grown, tuple(changes))] if changes else []
 
 
-def _gentler_turn(demands: RouteDemands, i: int, allowed: float) -> float:
+def _gentler_turn(requirements: RouteRequirements, i: int, allowed: float) -> float:
     """Largest turn in tenths of a degree, up to ``allowed`` (rad), that passes with all that follows turned along.
 
     In wind the next turns change with their courses, and with them the length available to this one.  0 where none
     was found.
     """
-    first, last = max(0, i - 2), min(len(demands.points), i + 3)
-    route = demands.route
+    first, last = max(0, i - 2), min(len(requirements.points), i + 3)
+    route = requirements.route
     near = replace(
         route,
         waypoints=route.waypoints[first:last],
         airspeed=route.airspeed[first : last - 1],
         **{name: getattr(route, name)[first:last] for name in ("acceptance", "fly_over", "items", "arcs")},
     )
-    tables, at = performance_tables(near, demands.limits), i - first
+    tables, at = performance_tables(near, requirements.limits), i - first
     for _ in range(TRIES):
         degrees = math.floor(10.0 * math.degrees(allowed)) / 10.0
         if degrees <= 0.0:
             return 0.0
-        points = np.array(demands.points[first:last])
-        change = math.copysign(math.radians(degrees), demands.turns[i]) - float(demands.turns[i])
+        points = np.array(requirements.points[first:last])
+        change = math.copysign(math.radians(degrees), requirements.turns[i]) - float(requirements.turns[i])
         cos, sin = math.cos(change), math.sin(change)
         onward = points[at + 1 :, :2] - points[at, :2]
         points[at + 1 :, :2] = points[at, :2] + onward @ np.array([[cos, -sin], [sin, cos]])
-        turning = turn_demands(replace(near, waypoints=points), tables)
-        limit, _ = tighter_turn(demands, i, float(turning.limit[at]))
+        turning = turn_requirements(replace(near, waypoints=points), tables)
+        limit, _ = tighter_turn(requirements, i, float(turning.limit[at]))
         if limit >= math.radians(degrees):
             return degrees
         allowed = min(allowed, limit) - BUFFER_ANGLE
     return 0.0
 
 
-def _true(demands: RouteDemands, leg: int) -> float:
+def _true(requirements: RouteRequirements, leg: int) -> float:
     """True airspeed by the airspeed that is commanded on a leg."""
-    return float(demands.route.airspeed[leg] / demands.setup.route.airspeed[leg])
+    return float(requirements.route.airspeed[leg] / requirements.setup.route.airspeed[leg])
 
 
-def _speeds(demands: RouteDemands, amsl: float, now: float, factor: float) -> list[float]:
+def _speeds(requirements: RouteRequirements, amsl: float, now: float, factor: float) -> list[float]:
     """Speeds to command for level flight at this height in the envelope, the nearest to ``now`` first.
 
     factor: true airspeed by the one commanded.
     """
-    envelope = demands.setup.envelope
+    envelope = requirements.setup.envelope
     low, high = envelope.level_speeds(amsl)
     low, high = max(low * ABOVE_SLOWEST, float(envelope.airspeed[0])), min(high, float(envelope.airspeed[-1]))
     low, high = low / factor, high / factor
@@ -276,28 +279,32 @@ def _speeds(demands: RouteDemands, amsl: float, now: float, factor: float) -> li
     return sorted((float(v) for v in steps), key=lambda v: (abs(v - now), v))
 
 
-def _slope_speed(demands: RouteDemands, leg: int, slope: float) -> float | None:
+def _slope_speed(requirements: RouteRequirements, leg: int, slope: float) -> float | None:
     """Airspeed nearest to the commanded one at which the aircraft can hold a slope on a leg, or None."""
-    course, side = float(demands.courses[leg]), 0 if demands.slopes[leg] >= 0.0 else 1
-    heights = (float(demands.points[leg, 2]), float(demands.points[leg + 1, 2]))
-    factor = _true(demands, leg)
-    for speed in _speeds(demands, max(heights), float(demands.setup.route.airspeed[leg]), factor):
-        table = demands.limits.performance(speed * factor)
+    course, side = float(requirements.courses[leg]), 0 if requirements.slopes[leg] >= 0.0 else 1
+    heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
+    factor = _true(requirements, leg)
+    for speed in _speeds(requirements, max(heights), float(requirements.setup.route.airspeed[leg]), factor):
+        table = requirements.limits.performance(speed * factor)
         if min(aircraft_slopes(table, course, up)[side] for up in heights) >= slope:
             return speed
     return None
 
 
-def _turn_speed(demands: RouteDemands, i: int) -> float | None:
+def _turn_speed(requirements: RouteRequirements, i: int) -> float | None:
     """Highest lower airspeed at which the turn at a waypoint fits its legs beside its neighbours, or None."""
-    now = float(max(demands.setup.route.airspeed[i - 1 : i + 1]))
-    available = min(available_lengths(demands.runs, demands.before, demands.after, demands.reversal, i))
-    factor = _true(demands, i)
-    speeds = _speeds(demands, float(demands.points[i, 2]), now, factor)
+    now = float(max(requirements.setup.route.airspeed[i - 1 : i + 1]))
+    available = min(
+        available_lengths(requirements.runs, requirements.before, requirements.after, requirements.reversal, i)
+    )
+    factor = _true(requirements, i)
+    speeds = _speeds(requirements, float(requirements.points[i, 2]), now, factor)
     for speed in sorted((v for v in speeds if v < now), reverse=True):
-        table = demands.limits.performance(speed * factor)
-        radius = turn_radius_between(table, demands.courses[i - 1], demands.courses[i], float(demands.points[i, 2]))
-        used = turn_lengths(abs(float(demands.turns[i])), radius, bool(demands.setup.route.fly_over[i]))
+        table = requirements.limits.performance(speed * factor)
+        radius = turn_radius_between(
+            table, requirements.courses[i - 1], requirements.courses[i], float(requirements.points[i, 2])
+        )
+        used = turn_lengths(abs(float(requirements.turns[i])), radius, bool(requirements.setup.route.fly_over[i]))
         if max(used) + BUFFER_LENGTH <= available:
             return speed
     return None
@@ -308,11 +315,13 @@ def _whole(metres: float) -> float:
     return float(round(metres))
 
 
-def _further(demands: RouteDemands, aligned: AlignedTrack | None, place: Place, m: int) -> tuple[Suggestion, ...]:
-    threats = demands.setup.scenario.threats
+def _further(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, place: Place, m: int
+) -> tuple[Suggestion, ...]:
+    threats = requirements.setup.scenario.threats
     one = slice(m, m + 1)
     spheres = (threats.position[one], threats.kill_radius[one], threats.kill_scale[one])
-    nearest = path_spheres(demands.path.points, demands.path.times, *spheres).closest[0]
+    nearest = path_spheres(requirements.path.points, requirements.path.times, *spheres).closest[0]
     if aligned is not None and len(aligned.track) > 1:
         nearest = min(nearest, path_spheres(aligned.track.position, aligned.track.time, *spheres).closest[0])
     away = _whole(threats.kill_radius[m] - nearest + BUFFER_LENGTH)
@@ -343,29 +352,29 @@ def _inside(item: Finding) -> tuple[Suggestion, ...]:
     return ((Change("inset", FLIGHT, None, _whole(-item.margin + BUFFER_LENGTH), "m"),),)
 
 
-def _less_energy(demands: RouteDemands, item: Finding) -> tuple[Suggestion, ...]:
+def _less_energy(requirements: RouteRequirements, item: Finding) -> tuple[Suggestion, ...]:
     used = item.planned if item.flown is None else item.flown
     if used is None or item.limit is None or item.margin is None or used <= item.limit:
         return ()
     more = used / item.limit
-    envelope = demands.setup.envelope
+    envelope = requirements.setup.envelope
     store: Quantity = "battery" if envelope.volts or not envelope.power_level.size else "tank"
     shorter = Change("duration", FLIGHT, None, float(math.ceil(100.0 * (1.0 - 1.0 / more))), "%")
     larger = Change(store, FLIGHT, None, math.ceil(100.0 * more) / 100.0, "1")
     return (shorter,), (larger,)
 
 
-def _faster(demands: RouteDemands, place: Place, stall: float) -> tuple[Suggestion, ...]:
-    leg = int(np.argmin(demands.route.airspeed))
-    now = float(demands.setup.route.airspeed[leg])
-    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED) / _true(demands, leg)) / 10.0
+def _faster(requirements: RouteRequirements, place: Place, stall: float) -> tuple[Suggestion, ...]:
+    leg = int(np.argmin(requirements.route.airspeed))
+    now = float(requirements.setup.route.airspeed[leg])
+    wanted = math.ceil(10.0 * stall * (1.0 + BUFFER_SPEED) / _true(requirements, leg)) / 10.0
     return ((Change("airspeed", place, now, wanted, "m/s"),),) if wanted > now else ()
 
 
-def _level_speeds(demands: RouteDemands, place: Place, leg: int) -> tuple[Suggestion, ...]:
-    commanded = float(demands.setup.route.airspeed[leg])
-    up = float(max(demands.points[leg, 2], demands.points[leg + 1, 2]))
-    low, high = (speed / _true(demands, leg) for speed in demands.setup.envelope.level_speeds(up))
+def _level_speeds(requirements: RouteRequirements, place: Place, leg: int) -> tuple[Suggestion, ...]:
+    commanded = float(requirements.setup.route.airspeed[leg])
+    up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
+    low, high = (speed / _true(requirements, leg) for speed in requirements.setup.envelope.level_speeds(up))
     if low <= commanded <= high:
         return ()
     low = math.ceil(10.0 * low * (1.0 + BUFFER_SPEED)) / 10.0

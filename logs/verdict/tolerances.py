@@ -46,11 +46,11 @@ WATCHED = 10.0
 # Radii of the planned arc.  A flown radius from this on is a nearly straight flight's, and says nothing of a turn.
 STRAIGHT = 10.0
 
-# Share of the corridor's half width.  A corner is a jog where the way without it passes it within this: an aircraft
-# that takes that way, or swings out as far again beyond it, is still well inside.
-JOG_SHARE = 0.25
-# Waypoints.  No more in a row are looked at as one jog, or as one step: a survey's shortest lines are longer.
-JOG_WAYPOINTS = 8
+# Share of the corridor's half width.  A corner is a negligible kink where the way without it passes it within this: an
+# aircraft that takes that way, or swings out as far again beyond it, is still well inside.
+KINK_SHARE = 0.25
+# Waypoints.  No more in a row are looked at as one kink, or as one step: a survey's shortest lines are longer.
+KINK_WAYPOINTS = 8
 
 # The slope rule
 

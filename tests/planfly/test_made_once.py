@@ -1,6 +1,6 @@
 """Through a whole command every stage is entered once, and what it made is handed on.
 
-Limits, airframe, plan, path, local map, the route's demands and the track's alignment are each made there alone.
+Limits, airframe, plan, path, local map, the route's requirements and the track's alignment are each made there alone.
 """
 
 import sys
@@ -47,17 +47,17 @@ STAGES = (
     "flight.simulation.simulate:fly_to_end",
     "logs.verdict.judge_flight:judge_flight",
     "logs.verdict.judge_flight:judge_geometry",
-    "logs.verdict.measures.route_requirements:route_demands",
-    "logs.verdict.measures.track_alignment:lay_track",
+    "logs.verdict.measures.route_requirements:route_requirements",
+    "logs.verdict.measures.track_alignment:align_track",
 )
 OURS = ("planfly", "logs", "flight", "planner", "world", "aircraft")
 ONCE = dict.fromkeys(("load_airframe", "load_envelope", "make_limits"), 1)
 ROUTED = dict.fromkeys(("make_itinerary", "place_stops", "lay_route", "make_setup", "fly_by_path"), 1)
 OPENED = ROUTED | {"plan_mission": 1}
-ALIGNED = dict.fromkeys(("route_demands", "lay_track"), 1)
+ALIGNED = dict.fromkeys(("route_requirements", "align_track"), 1)
 FLIGHT = OPENED | ALIGNED | dict.fromkeys(("around", "fly_to_end", "judge_flight"), 1)
 # An autopilot's flight has the aircraft's own beside it, at true airspeeds along a path of its own.
-BESIDE = dict.fromkeys(("fly_by_path", "around", "fly_to_end", "route_demands", "lay_track", "judge_flight"), 2)
+BESIDE = dict.fromkeys(("fly_by_path", "around", "fly_to_end", "route_requirements", "align_track", "judge_flight"), 2)
 LOG = ALIGNED | dict.fromkeys(("make_limits", "fly_by_path"), 1)
 MISSION = Path(__file__).parents[1] / "flight" / "missions" / "qgc.waypoints"
 
@@ -126,10 +126,10 @@ def test_plan_loads_the_airframe_alone(count: Count) -> None:
 def test_a_plan_is_opened_once_to_be_flown_judged_or_exported(count: Count, flight: Path) -> None:
     plan = str(flight / "plan.json")
     assert count("fly", plan, code=4) == ONCE | FLIGHT
-    assert count("check", plan, code=4) == ONCE | OPENED | {"judge_geometry": 1, "route_demands": 1}
+    assert count("check", plan, code=4) == ONCE | OPENED | {"judge_geometry": 1, "route_requirements": 1}
     # Its fence is what the planned path keeps to.
-    assert count("export", plan, "a.plan", code=0) == ONCE | OPENED | {"route_demands": 1}
-    assert count("export", plan, "a.kml", "b.plan", "b.fence", code=0) == ONCE | OPENED | {"route_demands": 1}
+    assert count("export", plan, "a.plan", code=0) == ONCE | OPENED | {"route_requirements": 1}
+    assert count("export", plan, "a.kml", "b.plan", "b.fence", code=0) == ONCE | OPENED | {"route_requirements": 1}
 
 
 @pytest.mark.parametrize("command", ["check", "report"])
@@ -144,7 +144,7 @@ def test_a_replay_aligns_its_track_once(count: Count, flight: Path) -> None:
 def test_a_mission_that_a_person_brought_is_flown_or_judged_along_one_path(count: Count) -> None:
     flown = count("fly", str(MISSION), "--terrain", "jacksboro", code=0)
     assert flown == {key: n for key, n in (ONCE | FLIGHT | BESIDE).items() if key != "plan_mission"}
-    judged = ONCE | ROUTED | {"judge_geometry": 1, "route_demands": 1}
+    judged = ONCE | ROUTED | {"judge_geometry": 1, "route_requirements": 1}
     assert count("check", str(MISSION), "--terrain", "jacksboro", code=0) == judged
     assert count("check", str(MISSION), "--scenario", "jacksboro", code=4) == judged
 
@@ -174,5 +174,5 @@ def test_a_served_mission_is_prepared_once_and_flown_from_that(entered: Counter[
     link_end.send(EndFlight(quit=True))
     process.join(20.0)
     # The mission is judged before its flight, too.
-    judged = BESIDE | {"judge_geometry": 1, "route_demands": 3, "fly_to_end": 1}
+    judged = BESIDE | {"judge_geometry": 1, "route_requirements": 3, "fly_to_end": 1}
     assert dict(entered) == ROUTED | judged

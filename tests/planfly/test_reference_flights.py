@@ -183,14 +183,14 @@ def test_in_a_hurry_flights_beside_are_given_up_and_the_verdict_is_not(
     assert log.complete
     assert log.recorded_verdict is not None
     assert log.recorded_verdict["flyable"] is False
-    assert judged.beside is not None
-    assert log.beside == (None if patience == 0 else replace(judged.beside, deciding=None))
+    assert judged.reference is not None
+    assert log.reference == (None if patience == 0 else replace(judged.reference, deciding=None))
 
 
 def test_its_log_repeats_the_verdict_byte_for_byte(flown: tuple[JudgedFlight, Path]) -> None:
     judged, path = flown
     log = read_log(path)
-    assert log.beside == judged.beside
+    assert log.reference == judged.reference
     assert verdict_json(judge_log(log)) == verdict_json(judged.verdict)
 
 
@@ -198,16 +198,16 @@ def test_nothing_is_looked_for_where_nothing_failed() -> None:
     setup = over_a_hill(30.0)
     judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
     assert judged.verdict.flyable
-    assert judged.beside is not None
-    assert judged.beside.airframe == airframe_answer(setup, AIRCRAFT)
-    assert judged.beside.deciding is None
+    assert judged.reference is not None
+    assert judged.reference.airframe == airframe_answer(setup, AIRCRAFT)
+    assert judged.reference.deciding is None
     assert find_deciding_parameter(setup, AIRCRAFT, judged.verdict) is None
 
 
 def test_planflys_guidance_has_no_flight_beside_it() -> None:
     setup = replace(over_a_hill(30.0), parameters=None)
     judged = fly_and_judge(setup, load_airframe(setup.scenario), None)
-    assert judged.beside is None
+    assert judged.reference is None
     assert [level.name for level in judged.verdict.levels] == ["geometry", "airframe"]
 
 

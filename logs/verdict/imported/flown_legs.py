@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup, MissionStretch
 from flight.simulation.track import Track
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import AlignedTrack, approaches, lay_track
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track, approaches
 from logs.verdict.tolerances import (
     ANOTHER_PLACE,
     ARRIVED,
@@ -31,14 +31,14 @@ class FlownLegs:
     stretch: when, and how it ended.
     first, last: waypoints that were flown between.
     partial: whether the last of them was not reached.
-    demands, aligned: of the route between them alone, and the rows flown on it.
+    requirements, aligned: of the route between them alone, and the rows flown on it.
     """
 
     stretch: MissionStretch
     first: int
     last: int
     partial: bool
-    demands: RouteDemands
+    requirements: RouteRequirements
     aligned: AlignedTrack
 
 
@@ -55,8 +55,8 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     (0, 2, True)
     """
     rows = between(track, stretch.start, stretch.end)
-    whole = route_demands(setup)
-    aligned = lay_track(whole, rows)
+    whole = route_requirements(setup)
+    aligned = align_track(whole, rows)
     if aligned is None:
         return None
     met = met_waypoints(whole, aligned)
@@ -73,8 +73,8 @@ def flown_legs(setup: FlightSetup, track: Track, stretch: MissionStretch) -> Flo
     # Rows before the first waypoint are of no leg, and rows after the route's end are none of it.
     stop = None if partial or last < ended else int(aligned.rows[last]) + 2
     flown = aligned.track.rows(int(aligned.rows[first]), stop if stop is not None else len(aligned.track))
-    part = route_demands(replace(setup, route=part_of_route(setup.route, first, until)))
-    laid = lay_track(part, flown)
+    part = route_requirements(replace(setup, route=part_of_route(setup.route, first, until)))
+    laid = align_track(part, flown)
     if laid is None:
         return None
     # A log or a stretch that ends a few metres before the waypoint does not show that it was passed.
@@ -94,9 +94,9 @@ def _earliest_lap(
     for end in np.flatnonzero(items[:last] == items[last]).tolist():
         if end < 1:
             continue
-        demands = route_demands(replace(setup, route=part_of_route(setup.route, 0, end)))
-        laid = lay_track(demands, rows)
-        found = met if laid is None else met_waypoints(demands, laid)
+        requirements = route_requirements(replace(setup, route=part_of_route(setup.route, 0, end)))
+        laid = align_track(requirements, rows)
+        found = met if laid is None else met_waypoints(requirements, laid)
         # Each item once: a place that was passed once is near to its waypoints of all laps.
         if laid is not None and len(np.unique(items[found])) >= len(np.unique(items[met])):
             return laid, found
@@ -109,9 +109,9 @@ def between(track: Track, start: float, end: float) -> Track:
     return track.rows(int(low), int(high))
 
 
-def met_waypoints(demands: RouteDemands, aligned: AlignedTrack) -> NDArray[np.intp]:
+def met_waypoints(requirements: RouteRequirements, aligned: AlignedTrack) -> NDArray[np.intp]:
     """Waypoints that a flight passed near enough to be told by, in order; one that it began or ended beside is not."""
-    edge = np.maximum(demands.fly_by_offset + ARRIVED, demands.setup.corridor)
+    edge = np.maximum(requirements.fly_by_offset + ARRIVED, requirements.setup.corridor)
     inside = (aligned.rows > 0) & (aligned.rows < len(aligned.track) - 1)
     near = np.where(inside, aligned.distance < CAPTURE_RADIUS, aligned.distance <= edge)
     return np.flatnonzero(near)
@@ -198,10 +198,10 @@ def plan_mismatch(setup: FlightSetup, track: Track) -> PlanMismatch | None:
     passed = nearest <= near
     if passed.sum() < 3:
         return None
-    demands = route_demands(setup)
+    requirements = route_requirements(setup)
     in_order = np.zeros(len(points), bool)
     for rows in flown:
-        aligned = lay_track(demands, rows)
+        aligned = align_track(requirements, rows)
         if aligned is not None:
             low = np.maximum(0, aligned.rows - 1)
             off = np.hypot(*(aligned.track.position[aligned.rows, :2] - points[:, :2]).T)

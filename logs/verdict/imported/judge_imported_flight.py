@@ -225,7 +225,7 @@ def judge_field_flight(setup: FlightSetup, track: Track, *, whole: bool) -> Verd
 
 def _of_stretch(setup: FlightSetup, legs: FlownLegs) -> list[Finding]:
     """Findings of one stretch, at the places of the whole route."""
-    found = flown_findings(legs.demands, legs.aligned, "completed", True, True)
+    found = flown_findings(legs.requirements, legs.aligned, "completed", True, True)
     out = []
     for item in found:
         if item.rule == "completion":
@@ -301,13 +301,13 @@ def _within_gaps(item: Finding, legs: FlownLegs) -> Finding:
 
 def gaps_between(legs: FlownLegs, start: float, end: float) -> list[Gap]:
     """Pauses of the log between two times, s."""
-    source = legs.demands.setup.source
+    source = legs.requirements.setup.source
     return [] if source is None else [gap for gap in source.gaps if gap.start < end and gap.end > start]
 
 
 def _in_part(item: Finding, legs: FlownLegs) -> Finding:
     """The last waypoint was not reached: it is not judged, and what of the leg before it passed is its first part."""
-    leg, waypoint = legs.demands.legs - 1, legs.demands.legs
+    leg, waypoint = legs.requirements.legs - 1, legs.requirements.legs
     unreached = item.place.kind == "waypoint" and item.place.index == waypoint
     of_leg = item.place.kind == "leg" and item.place.index == leg
     if unreached:

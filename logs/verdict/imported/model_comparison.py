@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from flight.simulation.setup import FlightSetup, MissionStretch
 from flight.simulation.track import ROLL, Track
 from logs.verdict.imported.flown_legs import FlownLegs
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import AlignedTrack, along_across, lay_track
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track, along_across
 from logs.verdict.measures.turns import CornerPass, corner_passes, measure_turn
 from world.errors import LogError
 
@@ -120,22 +120,22 @@ def compare_with_model(
     >>> [(one.name, one.most) for one in again.spreads]
     [('cross_track', 0.0), ('height_error', 0.0), ('ground_speed', 0.0), ('bank', 0.0)]
     """
-    demands = route_demands(setup)
-    aligned = lay_track(demands, simulated)
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, simulated)
     if aligned is None:
         raise LogError(f"{setup.scenario.name}: the model's flight has too few rows", file=setup.scenario.name)
-    pairs = (flown.demands, flown.aligned), (demands, aligned)
-    ends = np.cumsum(demands.runs)
-    places = [np.arange(0.0, run, STEP) for run in demands.runs]
+    pairs = (flown.requirements, flown.aligned), (requirements, aligned)
+    ends = np.cumsum(requirements.runs)
+    places = [np.arange(0.0, run, STEP) for run in requirements.runs]
     profiles = [_profile(one, track, places) for one, track in pairs]
     begins = np.concatenate([[0.0], ends[:-1]])
     distance = np.concatenate([begin + along for begin, along in zip(begins, places, strict=True)])
     counts = np.concatenate([[0], np.cumsum([len(along) for along in places])])
     legs = tuple(
-        _leg(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles) for k in range(demands.legs)
+        _leg(flown.first + k, slice(int(counts[k]), int(counts[k + 1])), profiles) for k in range(requirements.legs)
     )
     corners = [corner_passes(one, track) for one, track in pairs]
-    turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, demands.legs))
+    turns = tuple(_turn(flown.first, k, pairs, corners) for k in range(1, requirements.legs))
     flown_profile, model_profile = profiles
     return Reflight(
         stretch=flown.stretch,
@@ -154,7 +154,7 @@ def compare_with_model(
     )
 
 
-def _profile(demands: RouteDemands, aligned: AlignedTrack, places: Sequence[Floats]) -> Profile:
+def _profile(requirements: RouteRequirements, aligned: AlignedTrack, places: Sequence[Floats]) -> Profile:
     parts: list[Floats] = []
     track = aligned.track
     speed = np.hypot(track.velocity[:, 0], track.velocity[:, 1]).astype(np.float64)
@@ -164,10 +164,10 @@ def _profile(demands: RouteDemands, aligned: AlignedTrack, places: Sequence[Floa
             parts.append(np.full((5, len(along_leg)), math.nan))
             continue
         rows = aligned.leg_rows(leg)
-        along, across = along_across(demands, leg, track.position[rows])
+        along, across = along_across(requirements, leg, track.position[rows])
         # Where a flight goes back, as on a circle, the first time counts.
         forward = np.concatenate([[True], along[1:] > np.maximum.accumulate(along)[:-1]])
-        line = demands.points[leg, 2] + along * math.tan(demands.slopes[leg])
+        line = requirements.points[leg, 2] + along * math.tan(requirements.slopes[leg])
         off = track.position[rows, 2] - line
         columns = (across, off, speed[rows], bank[rows], energy[rows])
         parts.append(
@@ -217,10 +217,10 @@ def _reduced(values: Floats, reduce: str) -> float:
 def _turn(
     first: int,
     k: int,
-    pairs: Sequence[tuple[RouteDemands, AlignedTrack]],
+    pairs: Sequence[tuple[RouteRequirements, AlignedTrack]],
     corners: Sequence[Sequence[CornerPass]],
 ) -> TurnPair:
-    one, other = (measure_turn(demands, aligned, k) for demands, aligned in pairs)
+    one, other = (measure_turn(requirements, aligned, k) for requirements, aligned in pairs)
     passed, again = (passes[k] for passes in corners)
 
     def both(left: float | None, right: float | None, factor: float = 1.0) -> tuple[float, float]:

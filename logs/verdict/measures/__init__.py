@@ -1,1 +1,1 @@
-"""What rules measure with: route demands, the track laid along its path, turns and slopes."""
+"""What rules measure with: route requirements, the track laid along its path, turns and slopes."""

@@ -11,13 +11,13 @@ from flight.guidance.navigation_error import ERRORS
 from flight.mission.route import Route
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures.route_requirements import (
-    RouteDemands,
+    RouteRequirements,
     performance_tables,
     slope_limit,
     tighter_turn,
-    turn_demands,
+    turn_requirements,
 )
-from logs.verdict.tolerances import CLOSER, JOG_SHARE, JOG_WAYPOINTS, NAVIGATION_SIGMAS, PASS, PLAN_TOLERANCE, STEP
+from logs.verdict.tolerances import CLOSER, KINK_SHARE, KINK_WAYPOINTS, NAVIGATION_SIGMAS, PASS, PLAN_TOLERANCE, STEP
 
 Floats = NDArray[np.float64]
 
@@ -37,20 +37,20 @@ class Reach:
     tolerance: float
 
 
-def reach(demands: RouteDemands, i: int) -> Reach:
+def reach(requirements: RouteRequirements, i: int) -> Reach:
     """What counts as having reached waypoint i: the mission's own radius, else that of whoever flies.
 
     ArduPlane turns to the next leg at WP_RADIUS from a right angle or a sharper corner and at a share of it from a
     gentler one, and at the mission's end at all of it.
     """
-    setup, own = demands.setup, float(demands.fly_by_offset[i]) + PASS
+    setup, own = requirements.setup, float(requirements.fly_by_offset[i]) + PASS
     stated = float(setup.route.acceptance[i])
     tolerance = position_error(setup) + CLOSER[setup.scenario.wind.turbulence]
     if stated > 0.0:
         return Reach(stated, "mission", tolerance)
     if setup.parameters is not None:
-        factor = float(true_by_equivalent(float(demands.points[i, 2])))
-        turn = abs(float(demands.turns[i])) if 0 < i < demands.legs else math.pi
+        factor = float(true_by_equivalent(float(requirements.points[i, 2])))
+        turn = abs(float(requirements.turns[i])) if 0 < i < requirements.legs else math.pi
         return Reach(
             float(turn_distance(0.0, turn, setup.parameters.wp_radius, math.inf, factor)), "autopilot", tolerance
         )
@@ -62,29 +62,29 @@ def position_error(setup: FlightSetup) -> float:
     return NAVIGATION_SIGMAS * ERRORS[setup.nav][0]
 
 
-def corner_depths(demands: RouteDemands) -> Floats:
+def corner_depths(requirements: RouteRequirements) -> Floats:
     """How far from the legs the turn at each waypoint leads by itself, (w,) m.
 
     A fly-by arc passes R (1 - cos(turn / 2)) inside the legs.  A fly-over waypoint is passed on the course of the leg
     before it, and the arc from there swings R (1 - cos(turn)) beyond the next leg.
     """
-    turns = np.abs(demands.turns)
-    share = np.where(demands.setup.route.fly_over, 1.0 - np.cos(turns), 1.0 - np.cos(0.5 * turns))
-    return np.where(np.isfinite(demands.radius), demands.radius, 0.0) * share
+    turns = np.abs(requirements.turns)
+    share = np.where(requirements.setup.route.fly_over, 1.0 - np.cos(turns), 1.0 - np.cos(0.5 * turns))
+    return np.where(np.isfinite(requirements.radius), requirements.radius, 0.0) * share
 
 
-def corridor_limit(demands: RouteDemands, leg: int) -> tuple[float, str]:
+def corridor_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Half width of the corridor along a leg, m, and whose it is.
 
     A corridor that the scenario does not state is wide enough for the turns at the leg's ends, as they are planned.
     """
-    half = demands.setup.corridor
-    if demands.setup.scenario.limits.corridor_m is not None:
+    half = requirements.setup.corridor
+    if requirements.setup.scenario.limits.corridor_m is not None:
         return half, "scenario"
-    turning = float(corner_depths(demands)[leg : leg + 2].max()) + PASS
+    turning = float(corner_depths(requirements)[leg : leg + 2].max()) + PASS
     if turning > half:
         return turning, "fly-by path"
-    return half, "default" if demands.setup.parameters is None else "autopilot"
+    return half, "default" if requirements.setup.parameters is None else "autopilot"
 
 
 def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
@@ -113,34 +113,34 @@ def farthest_from_legs(points: Floats, legs: Floats) -> tuple[float, int]:
 # both.  A step of a few metres in a level path is a cliff; a climb that begins a little early is within its height.
 
 
-def jog(demands: RouteDemands, i: int) -> float | None:
+def negligible_kink(requirements: RouteRequirements, i: int) -> float | None:
     """How near (m) a flyable way passes a corner that is none itself; None where there is no such way.
 
-    The way leaves out the waypoint and up to `JOG_WAYPOINTS` - 1 of its neighbours, passes each of them within
-    `JOG_SHARE` of the corridor, and has room for the turns at its own ends.
+    The way leaves out the waypoint and up to `KINK_WAYPOINTS` - 1 of its neighbours, passes each of them within
+    `KINK_SHARE` of the corridor, and has room for the turns at its own ends.
     """
-    most, circles = JOG_SHARE * demands.setup.corridor, demands.setup.route.arcs > 0.0
-    for count in range(1, JOG_WAYPOINTS + 1):
-        for first in range(max(1, i - count + 1), min(i, demands.legs - count) + 1):
+    most, circles = KINK_SHARE * requirements.setup.corridor, requirements.setup.route.arcs > 0.0
+    for count in range(1, KINK_WAYPOINTS + 1):
+        for first in range(max(1, i - count + 1), min(i, requirements.legs - count) + 1):
             last = first + count - 1
-            chord = demands.points[[first - 1, last + 1]]
-            away, _ = farthest_from_legs(demands.points[first : last + 1], chord)
+            chord = requirements.points[[first - 1, last + 1]]
+            away, _ = farthest_from_legs(requirements.points[first : last + 1], chord)
             apart = math.dist(chord[0, :2], chord[1, :2]) > 0.0
-            if away <= most and apart and not circles[first : last + 1].any() and _has_room(demands, first, last):
+            if away <= most and apart and not circles[first : last + 1].any() and _has_room(requirements, first, last):
                 return away
     return None
 
 
-def _has_room(demands: RouteDemands, first: int, last: int) -> bool:
+def _has_room(requirements: RouteRequirements, first: int, last: int) -> bool:
     """Whether the route without the waypoints first..last has room for the turns where it leaves them out."""
     # Two waypoints beyond the ends of the gap: what their turns take of the legs counts.
-    start, stop = max(0, first - 4), min(len(demands.points), last + 5)
-    near = _part(demands.setup.route, np.r_[start:first, last + 1 : stop])
-    made = turn_demands(near, performance_tables(near, demands.limits))
+    start, stop = max(0, first - 4), min(len(requirements.points), last + 5)
+    near = _part(requirements.setup.route, np.r_[start:first, last + 1 : stop])
+    made = turn_requirements(near, performance_tables(near, requirements.limits))
     for new, old in ((first - 1 - start, first - 1), (first - start, last + 1)):
-        if not 0 < old < demands.legs:
+        if not 0 < old < requirements.legs:
             continue
-        limit, _ = tighter_turn(demands, old, float(made.limit[new]))
+        limit, _ = tighter_turn(requirements, old, float(made.limit[new]))
         if abs(float(made.turns[new])) > limit + PLAN_TOLERANCE:
             return False
     return True
@@ -152,18 +152,18 @@ def _part(route: Route, kept: NDArray[np.int64]) -> Route:
     return replace(route, airspeed=route.airspeed[kept[:-1]], **{name: getattr(route, name)[kept] for name in names})
 
 
-def step(demands: RouteDemands, leg: int) -> float | None:
+def step(requirements: RouteRequirements, leg: int) -> float | None:
     """Height (m, positive) of the step that a leg beyond its slope limit is part of; None for one higher than `STEP`.
 
     All that is too steep on the whole, with this leg in it, is one step: a staircase is as high as its stairs together.
     """
-    limit, _ = slope_limit(demands, leg)
-    sign = 1.0 if demands.slopes[leg] >= 0.0 else -1.0
-    rises = sign * np.diff(demands.points[:, 2])
+    limit, _ = slope_limit(requirements, leg)
+    sign = 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
+    rises = sign * np.diff(requirements.points[:, 2])
     highest = float(rises[leg])
-    for first in range(leg, max(-1, leg - JOG_WAYPOINTS), -1):
-        for last in range(leg, min(demands.legs, leg + JOG_WAYPOINTS)):
-            rise, run = float(rises[first : last + 1].sum()), float(demands.runs[first : last + 1].sum())
+    for first in range(leg, max(-1, leg - KINK_WAYPOINTS), -1):
+        for last in range(leg, min(requirements.legs, leg + KINK_WAYPOINTS)):
+            rise, run = float(rises[first : last + 1].sum()), float(requirements.runs[first : last + 1].sum())
             if math.atan2(rise, run) > limit + PLAN_TOLERANCE:
                 highest = max(highest, rise)
     return highest if highest <= STEP else None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.guidance.path import FlyByPath, arc_point, profile
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from world.frames import PolyMapRecord, polymap
 from world.kernels import Record, Records, compiled, record_dtype
@@ -54,14 +54,14 @@ def move_point(move: Record, share: float) -> tuple[float, float, float]:  # pra
     )
 
 
-def planned_moves(demands: RouteDemands, first: int = 0, last: int | None = None) -> Records:
+def planned_moves(requirements: RouteRequirements, first: int = 0, last: int | None = None) -> Records:
     """Moves of a route's fly-by path, passed at each leg's ground speed, or its airspeed where there is none.
 
     first, last: legs of which they are wanted, default all.
     """
-    speeds = np.where(np.isfinite(demands.ground_speed), demands.ground_speed, demands.route.airspeed)
-    moves = path_moves(demands.setup.path, speeds, first, demands.legs - 1 if last is None else last)
-    return moves[(moves["leg"] >= first) & (moves["leg"] <= (demands.legs if last is None else last))]
+    speeds = np.where(np.isfinite(requirements.ground_speed), requirements.ground_speed, requirements.route.airspeed)
+    moves = path_moves(requirements.setup.path, speeds, first, requirements.legs - 1 if last is None else last)
+    return moves[(moves["leg"] >= first) & (moves["leg"] <= (requirements.legs if last is None else last))]
 
 
 def path_moves(path: FlyByPath, speeds: Floats, first_leg: int, last_leg: int) -> Records:

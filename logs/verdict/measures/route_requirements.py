@@ -94,7 +94,7 @@ def with_fence_zones(setup: FlightSetup) -> FlightSetup:
 
 
 @dataclass(frozen=True, slots=True)
-class TurnDemands:
+class TurnRequirements:
     """A route's turns, for w waypoints.
 
     turns: (w,) rad, positive to the right, 0 at the ends.
@@ -119,7 +119,7 @@ def performance_tables(route: Route, limits: Limits) -> dict[float, PerformanceT
     return {float(speed): limits.performance(float(speed)) for speed in route.airspeed}
 
 
-def turn_demands(route: Route, tables: dict[float, PerformanceTable]) -> TurnDemands:
+def turn_requirements(route: Route, tables: dict[float, PerformanceTable]) -> TurnRequirements:
     """Work out what each turn takes, by the aircraft's performance at the route's airspeeds."""
     points = np.asarray(route.waypoints, dtype=np.float64)
     courses, runs, count = leg_courses(points), leg_runs(points), len(points)
@@ -134,7 +134,7 @@ def turn_demands(route: Route, tables: dict[float, PerformanceTable]) -> TurnDem
         before[i], after[i] = turn_lengths(abs(float(turns[i])), float(radius[i]), bool(route.fly_over[i]))
     reversal = _reversals(route, tables, courses, turns, radius, points[:, 2])
     limit = _sharpest_turns(route, runs, tightest, before, after, reversal)
-    return TurnDemands(turns, tightest, radius, before, after, reversal, limit)
+    return TurnRequirements(turns, tightest, radius, before, after, reversal, limit)
 
 
 def turn_lengths(turn: float, radius: float, fly_over: bool) -> tuple[float, float]:
@@ -219,7 +219,7 @@ class PlannedPath:
 
 
 @dataclass(frozen=True, slots=True)
-class RouteDemands:
+class RouteRequirements:
     """A route's turns and legs in numbers, the aircraft's limits at each, and its planned path: made once a verdict.
 
     route: the setup's, with true airspeeds where an autopilot takes those that are commanded for equivalent ones.
@@ -229,10 +229,10 @@ class RouteDemands:
     points: (w, 3) m.
     runs: (w - 1,) m, horizontal.
     courses, slopes: (w - 1,) rad.
-    turns, tightest, radius, before, after, reversal: as of `TurnDemands`.
+    turns, tightest, radius, before, after, reversal: as of `TurnRequirements`.
     blend: (w,) m of leg beyond each turn on which the slope still changes.
     fly_by_offset: (w,) m by which the fly-by passes the waypoint.
-    turn_limit: (w,) rad, as `TurnDemands.limit`; inf where the envelope is left out.
+    turn_limit: (w,) rad, as `TurnRequirements.limit`; inf where the envelope is left out.
     climb, dive: (w - 1,) rad over the ground, the least along the leg, inf where the envelope is left out.
     ground_speed: (w - 1,) m/s, NaN where the wind leaves no way.
     envelope: whether the aircraft's limits count; where they do not, what the flight showed of them does.
@@ -305,7 +305,7 @@ class RouteDemands:
         return out
 
 
-def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
+def route_requirements(setup: FlightSetup, *, envelope: bool = True) -> RouteRequirements:
     """Work out what a setup's route asks for.
 
     envelope: False leaves the aircraft's limits out, for flown evidence alone.
@@ -313,12 +313,12 @@ def route_demands(setup: FlightSetup, *, envelope: bool = True) -> RouteDemands:
     route, limits = true_route(setup), setup.limits
     points = np.asarray(route.waypoints, dtype=np.float64)
     tables = performance_tables(route, limits)
-    turning = turn_demands(route, tables)
+    turning = turn_requirements(route, tables)
     courses, runs = leg_courses(points), leg_runs(points)
     climb, dive, speeds = _leg_limits(route, tables, points, courses)
     if not envelope:
         climb, dive = np.full_like(climb, math.inf), np.full_like(dive, math.inf)
-    return RouteDemands(
+    return RouteRequirements(
         setup=setup,
         route=route,
         points=points,
@@ -385,7 +385,7 @@ def _leg_limits(
     return climb, dive, speeds
 
 
-def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
+def _fly_by_offsets(route: Route, turning: TurnRequirements) -> Floats:
     """Distance by which the fly-by passes each waypoint, (w,) m."""
     out = np.zeros(len(turning.radius))
     for i in np.flatnonzero(np.isfinite(turning.radius) & ~route.fly_over).tolist():
@@ -394,7 +394,7 @@ def _fly_by_offsets(route: Route, turning: TurnDemands) -> Floats:
     return out
 
 
-def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnDemands) -> Floats:
+def _blends(setup: FlightSetup, route: Route, points: Floats, runs: Floats, turning: TurnRequirements) -> Floats:
     """Length of leg beside each turn on which the slope still changes, (w,) m.
 
     A parabola about each end of the arc, or about the waypoint where there is none.
@@ -428,46 +428,46 @@ class SteepArc:
     limit: float
 
 
-def turn_limit(demands: RouteDemands, i: int) -> tuple[float, str]:
+def turn_limit(requirements: RouteRequirements, i: int) -> tuple[float, str]:
     """Tighter of the scenario's and the aircraft's limit at a waypoint, rad, and whose it is."""
-    return tighter_turn(demands, i, float(demands.turn_limit[i]))
+    return tighter_turn(requirements, i, float(requirements.turn_limit[i]))
 
 
-def tighter_turn(demands: RouteDemands, i: int, aircraft: float) -> tuple[float, str]:
+def tighter_turn(requirements: RouteRequirements, i: int, aircraft: float) -> tuple[float, str]:
     """Tighter of the scenario's limit at a waypoint and this one of the aircraft, rad, and whose it is."""
-    fixed = demands.limits.max_turn
+    fixed = requirements.limits.max_turn
     # A circle has no angle: its corners are of our making.
-    if fixed is not None and fixed <= aircraft and demands.setup.route.arcs[i] == 0.0:
+    if fixed is not None and fixed <= aircraft and requirements.setup.route.arcs[i] == 0.0:
         return fixed, "scenario"
     return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
 
 
-def slope_limit(demands: RouteDemands, leg: int) -> tuple[float, str]:
+def slope_limit(requirements: RouteRequirements, leg: int) -> tuple[float, str]:
     """Tighter limit on a leg's climb or, for a leg that falls, dive: rad, positive, and whose it is."""
-    rising = demands.slopes[leg] >= 0.0
-    fixed = demands.limits.max_climb if rising else demands.limits.max_dive
-    aircraft = float((demands.climb if rising else demands.dive)[leg])
+    rising = requirements.slopes[leg] >= 0.0
+    fixed = requirements.limits.max_climb if rising else requirements.limits.max_dive
+    aircraft = float((requirements.climb if rising else requirements.dive)[leg])
     if fixed is not None and fixed <= aircraft:
         return fixed, "scenario"
     return aircraft, "aircraft" if math.isfinite(aircraft) else "none"
 
 
-def steep_arc(demands: RouteDemands, leg: int) -> SteepArc | None:
+def steep_arc(requirements: RouteRequirements, leg: int) -> SteepArc | None:
     """The fly-by arc at a leg's end, where it is too steep.
 
     None where it leaves the airspeed within `OFF_SPEED`: what the aircraft cannot climb or sink on the arc it takes
     from its speed or adds to it, g dh / V.
     """
     i = leg + 1
-    if i == demands.legs or demands.setup.route.fly_over[i] or demands.setup.route.arcs[i] > 0.0:
+    if i == requirements.legs or requirements.setup.route.fly_over[i] or requirements.setup.route.arcs[i] > 0.0:
         return None
-    before, length = float(demands.before[i]), float(demands.radius[i]) * abs(float(demands.turns[i]))
-    if not 0.0 < before < min(demands.runs[leg : leg + 2]):
+    before, length = float(requirements.before[i]), float(requirements.radius[i]) * abs(float(requirements.turns[i]))
+    if not 0.0 < before < min(requirements.runs[leg : leg + 2]):
         return None
-    into, out = math.tan(demands.slopes[leg]), math.tan(demands.slopes[i])
-    tangent = arc_slope(into, out, before, float(demands.radius[i]))
-    limits = (demands.climb if tangent > 0.0 else demands.dive)[leg : leg + 2]
+    into, out = math.tan(requirements.slopes[leg]), math.tan(requirements.slopes[i])
+    tangent = arc_slope(into, out, before, float(requirements.radius[i]))
+    limits = (requirements.climb if tangent > 0.0 else requirements.dive)[leg : leg + 2]
     if not np.isfinite(limits).all() or not (limits > 0.0).all():
         return None
-    limit, speed = float(np.tan(limits).mean()), float(demands.route.airspeed[leg])
+    limit, speed = float(np.tan(limits).mean()), float(requirements.route.airspeed[leg])
     return SteepArc(tangent, limit) if GRAVITY * (abs(tangent) - limit) * length / speed > OFF_SPEED else None

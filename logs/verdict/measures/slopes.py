@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from aircraft.envelope import GRAVITY, ground_slope
 from flight.simulation.track import THROTTLE
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across
 from logs.verdict.tolerances import (
     ACCELERATION,
@@ -71,35 +71,39 @@ def fit_line(x: Floats, y: Floats) -> tuple[float, float]:
     return slope, float(np.sqrt(np.mean((dy - slope * dx) ** 2)))
 
 
-def straight_span(demands: RouteDemands, leg: int, clear: float, *, level: bool = False) -> tuple[float, float]:
+def straight_span(
+    requirements: RouteRequirements, leg: int, clear: float, *, level: bool = False
+) -> tuple[float, float]:
     """Where on a leg (m from its start) the turns at its ends are over, and ``clear`` metres further in.
 
     level: the blends of slope are to be over too.
     """
     start, end = clear, clear
     if level:
-        start, end = (max(clear, float(blend) + CLEAR_OF_BLEND) for blend in demands.blend[leg : leg + 2])
-    low = demands.after[leg] + (start if leg > 0 else min(clear, CLEAR_OF_BLEND))
-    return low, demands.runs[leg] - demands.before[leg + 1] - (end if leg + 1 < demands.legs else 0.0)
+        start, end = (max(clear, float(blend) + CLEAR_OF_BLEND) for blend in requirements.blend[leg : leg + 2])
+    low = requirements.after[leg] + (start if leg > 0 else min(clear, CLEAR_OF_BLEND))
+    return low, requirements.runs[leg] - requirements.before[leg + 1] - (end if leg + 1 < requirements.legs else 0.0)
 
 
-def leg_course(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> LegFit | None:
+def leg_course(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Course that a leg was flown on; None where too little of it was flown."""
     if not aligned.flew(leg):
         return None
     rows = aligned.leg_rows(leg)
-    along, across = along_across(demands, leg, aligned.track.position[rows])
-    low, high = straight_span(demands, leg, CLEAR_OF_TURN)
+    along, across = along_across(requirements, leg, aligned.track.position[rows])
+    low, high = straight_span(requirements, leg, CLEAR_OF_TURN)
     inside = (along >= low) & (along <= high)
     if inside.sum() >= 20 and np.ptp(along[inside]) >= SHORTEST_COURSE:
         bend, rest = fit_line(along[inside], across[inside])
         run = float(np.ptp(along[inside]))
-        return LegFit(demands.courses[leg] + math.atan(bend), _unsteady(COURSE_FLOOR, rest, run), run, True)
+        return LegFit(requirements.courses[leg] + math.atan(bend), _unsteady(COURSE_FLOOR, rest, run), run, True)
     # A short leg: the mean course between its turns, over a second at least.
-    low, high = straight_span(demands, leg, 0.0)
+    low, high = straight_span(requirements, leg, 0.0)
     between = np.flatnonzero((along >= low) & (along <= high))
     if not between.size:
-        middle = 0.5 * (low + high) if math.isfinite(low) and math.isfinite(high) else 0.5 * float(demands.runs[leg])
+        middle = (
+            0.5 * (low + high) if math.isfinite(low) and math.isfinite(high) else 0.5 * float(requirements.runs[leg])
+        )
         between = np.array([np.argmin(np.abs(along - middle))])
     first, last = rows.start + int(between[0]), rows.start + int(between[-1])
     if aligned.track.time[last] - aligned.track.time[first] < 1.0:
@@ -109,14 +113,14 @@ def leg_course(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> LegFit
     return LegFit(float(aligned.course[first : last + 1].mean()), ROUGH_COURSE, float(np.ptp(along)), False)
 
 
-def leg_slope(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> LegFit | None:
+def leg_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> LegFit | None:
     """Slope that a leg was flown at; None where less than a second of it was flown."""
     if not aligned.flew(leg):
         return None
     rows = aligned.leg_rows(leg)
     position = aligned.track.position[rows]
-    along, _ = along_across(demands, leg, position)
-    low, high = straight_span(demands, leg, CLEAR_OF_TURN, level=True)
+    along, _ = along_across(requirements, leg, position)
+    low, high = straight_span(requirements, leg, CLEAR_OF_TURN, level=True)
     inside = (along >= low) & (along <= high)
     if inside.sum() >= 20 and np.ptp(along[inside]) >= SHORTEST_SLOPE:
         rise, rest = fit_line(along[inside], position[inside, 2])
@@ -126,7 +130,7 @@ def leg_slope(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> LegFit 
     if time[-1] - time[0] < 1.0:
         return None
     # A short leg: the least-squares slope of at least four seconds about its middle, or of all there is of it.
-    middle = float(np.interp(0.5 * demands.runs[leg], np.maximum.accumulate(along), time))
+    middle = float(np.interp(0.5 * requirements.runs[leg], np.maximum.accumulate(along), time))
     start = min(max(middle - 0.5 * SHORTEST_TIME, float(time[0])), max(float(time[0]), float(time[-1]) - SHORTEST_TIME))
     window = (time >= start) & (time <= start + SHORTEST_TIME)
     run_at = aligned.distance_run[rows][window]
@@ -185,63 +189,63 @@ class SlopeMeasure:
     finished: bool = False
 
 
-def measure_slope(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> SlopeMeasure:
+def measure_slope(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> SlopeMeasure:
     """Measure the slope of a leg as flown."""
     if not aligned.flew(leg):
         return SlopeMeasure()
     rows = aligned.leg_rows(leg)
-    error, short = _height_error(demands, leg, aligned.track.position[rows])
-    full, idle, slow, fast = _saturation(demands, aligned, leg)
+    error, short = _height_error(requirements, leg, aligned.track.position[rows])
+    full, idle, slow, fast = _saturation(requirements, aligned, leg)
     return SlopeMeasure(
-        slope=leg_slope(demands, aligned, leg),
+        slope=leg_slope(requirements, aligned, leg),
         height_error=error,
         short=short,
         at_full=full,
         at_idle=idle,
         slow=slow,
         fast=fast,
-        ability=measure_ability(demands, aligned, leg),
+        ability=measure_ability(requirements, aligned, leg),
         finished=bool(aligned.passed[leg + 1]),
     )
 
 
-def _height_error(demands: RouteDemands, leg: int, position: Floats) -> tuple[float | None, bool]:
+def _height_error(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[float | None, bool]:
     """Largest signed distance from the leg's line where it is clear of blends, m, and whether nothing is."""
-    along, _ = along_across(demands, leg, position)
-    low, high = straight_span(demands, leg, CLEAR_OF_TURN, level=True)
+    along, _ = along_across(requirements, leg, position)
+    low, high = straight_span(requirements, leg, CLEAR_OF_TURN, level=True)
     inside = (along >= low) & (along <= high)
     short = not inside.any()
     if short:
-        low, high = straight_span(demands, leg, 0.0)
+        low, high = straight_span(requirements, leg, 0.0)
         inside = (along >= low) & (along <= high)
         if not inside.any():
             return None, True
-    line = demands.points[leg, 2] + along[inside] * math.tan(demands.slopes[leg])
+    line = requirements.points[leg, 2] + along[inside] * math.tan(requirements.slopes[leg])
     off = position[inside, 2] - line
     return float(off[np.argmax(np.abs(off))]), short
 
 
-def steady_rows(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> slice:
+def steady_rows(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> slice:
     """Rows of a leg after the aircraft has had time to take up its commanded speed; empty for a leg as short."""
     rows = aligned.leg_rows(leg)
-    speeds = demands.route.airspeed
+    speeds = requirements.route.airspeed
     change = abs(float(speeds[leg] - speeds[leg - 1])) if leg else 0.0
     start = float(aligned.track.time[rows.start]) + change / ACCELERATION
     return slice(max(rows.start, int(np.searchsorted(aligned.track.time, start))), rows.stop)
 
 
-def _saturation(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[float, float, float, float]:
+def _saturation(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float, float]:
     """Seconds at full and idle throttle, and the speed lost and gained meanwhile, as `SlopeMeasure` has them."""
-    rows = steady_rows(demands, aligned, leg)
+    rows = steady_rows(requirements, aligned, leg)
     track = aligned.track
     if rows.stop - rows.start < 2:
         return 0.0, 0.0, 0.0, 0.0
     tick = aligned.tick
-    full, idle = _at_limits(demands, aligned, rows)
-    commanded = float(demands.route.airspeed[leg])
+    full, idle = _at_limits(requirements, aligned, rows)
+    commanded = float(requirements.route.airspeed[leg])
     error = track.airspeed[rows].astype(np.float64) - commanded
     # A gust along the track changes the airspeed without any energy, so it has to be off without the gust as well.
-    steady = _speed_in_mean_wind(demands, aligned, rows) - commanded
+    steady = _speed_in_mean_wind(requirements, aligned, rows) - commanded
     width = max(1, round(SATURATED / tick))
     lifted = lifted_speed(aligned.track.time, aligned.track.airspeed, aligned.track.wind[:, 2], rows.stop)[rows]
     slow = _mean_while(full, np.minimum(-error, -steady) - np.maximum(0.0, -lifted), width)
@@ -249,19 +253,19 @@ def _saturation(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple
     return float(full.sum() * tick), float(idle.sum() * tick), slow, fast
 
 
-def _at_limits(demands: RouteDemands, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
+def _at_limits(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> tuple[Flags, Flags]:
     """Which rows have the throttle at full, and which at idle."""
     track = aligned.track
     throttle = track.controls[rows, THROTTLE]
     full = throttle >= FULL
     idle = throttle <= IDLE
     # An aircraft that burns fuel draws no current at all.
-    if not demands.setup.envelope.motor_braking and track.current.any():
+    if not requirements.setup.envelope.motor_braking and track.current.any():
         idle |= (track.current[rows] <= NO_CURRENT) & ~full
     return full, idle
 
 
-def measure_ability(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> Ability | None:
+def measure_ability(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> Ability | None:
     """What the aircraft could do at the throttle limit that a leg asks for: full to climb, idle to dive.
 
     Thrust less drag gives an aircraft the climb rate v_up + v . a / g, where v is its velocity relative to the air and
@@ -269,14 +273,14 @@ def measure_ability(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> A
     and height gives it at the commanded airspeed and the greatest height where it was seen, where an aircraft climbs
     least.
     """
-    rows = steady_rows(demands, aligned, leg)
-    track, sign = aligned.track, 1.0 if demands.slopes[leg] >= 0.0 else -1.0
+    rows = steady_rows(requirements, aligned, leg)
+    track, sign = aligned.track, 1.0 if requirements.slopes[leg] >= 0.0 else -1.0
     if rows.stop - rows.start < 3:
         return None
-    full, idle = _at_limits(demands, aligned, rows)
+    full, idle = _at_limits(requirements, aligned, rows)
     full &= track.controls[rows, THROTTLE] >= WHOLE_THROTTLE
-    along, _ = along_across(demands, leg, track.position[rows])
-    low, high = straight_span(demands, leg, 0.0)
+    along, _ = along_across(requirements, leg, track.position[rows])
+    low, high = straight_span(requirements, leg, 0.0)
     use = _held_for(full if sign > 0.0 else idle, round(SETTLED_AFTER / aligned.tick))
     use &= (along >= low) & (along <= high)
     seconds = float(use.sum() * aligned.tick)
@@ -286,13 +290,13 @@ def measure_ability(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> A
     air = velocity - track.wind[rows]
     push = np.gradient(velocity, track.time[rows], axis=0)
     rate = (air[:, 2] + (air * push).sum(axis=1) / GRAVITY)[use]
-    commanded, up = float(demands.route.airspeed[leg]), track.position[rows, 2][use]
+    commanded, up = float(requirements.route.airspeed[leg]), track.position[rows, 2][use]
     top = float(up.max())
     faster = np.sqrt((air[use] ** 2).sum(axis=1)) - commanded
     fit = _plane_at_origin(rate, faster, 0.01 * (up - top), seconds / INDEPENDENT)
     if fit is None:
         return None
-    tail, cross = demands.setup.scenario.wind.along(float(demands.courses[leg]), top)
+    tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), top)
     slopes = [
         ground_slope(math.asin(min(1.0, max(-1.0, value / commanded))), commanded, tail, cross)
         for value in (fit[0], fit[0] + fit[1])
@@ -321,9 +325,9 @@ def _plane_at_origin(value: Floats, x: Floats, y: Floats, independent: float) ->
     return float(found[0]), math.sqrt(float((rest.var() + KNOWN_TO**2) * inverse[0, 0]) / independent)
 
 
-def _speed_in_mean_wind(demands: RouteDemands, aligned: AlignedTrack, rows: slice) -> Floats:
+def _speed_in_mean_wind(requirements: RouteRequirements, aligned: AlignedTrack, rows: slice) -> Floats:
     """Speed that the air would see without gusts, m/s."""
-    wind, track = demands.setup.scenario.wind, aligned.track
+    wind, track = requirements.setup.scenario.wind, aligned.track
     mean = wind.at_each(np.ascontiguousarray(track.position[rows, 2]))
     east, north = track.velocity[rows, 0] - mean[:, 0], track.velocity[rows, 1] - mean[:, 1]
     return np.asarray(np.sqrt(east**2 + north**2 + track.velocity[rows, 2].astype(np.float64) ** 2))

@@ -15,7 +15,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures.acceptance import reach
 from logs.verdict.measures.path_sweeps import path_clearance
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.tolerances import ARRIVED, CAPTURE_RADIUS, CHORD_TIME, FARTHEST, FASTEST, MAX_PLAUSIBLE
 from world.kernels import compiled
 
@@ -78,9 +78,9 @@ class AlignedTrack:
         return slice(start, int(np.searchsorted(time, time[last] + seconds, side="right")))
 
 
-def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
+def align_track(requirements: RouteRequirements, track: Track) -> AlignedTrack | None:
     """Lay a track beside a route; None where it has fewer than two usable rows."""
-    good = _usable(track, own=demands.setup.source is None)
+    good = _usable(track, own=requirements.setup.source is None)
     if int(good.sum()) < 2:
         return None
     if good.all():
@@ -88,16 +88,19 @@ def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     else:
         first_bad = float(track.time[int(np.argmin(good))])
         clean = Track(*(getattr(track, item.name)[good] for item in fields(track)))
-    apexes = demands.apexes()
+    apexes = requirements.apexes()
     rows, distance = _assign(clean, apexes)
     last = len(clean) - 1
     off = np.hypot(*(clean.position[rows, :2] - apexes[:, :2]).T)
-    arrived = [max(float(offset) + ARRIVED, reach(demands, i).radius) for i, offset in enumerate(demands.fly_by_offset)]
+    arrived = [
+        max(float(offset) + ARRIVED, reach(requirements, i).radius)
+        for i, offset in enumerate(requirements.fly_by_offset)
+    ]
     passed = (rows < last) | (off <= arrived)
     passed = np.logical_and.accumulate(passed)
     step = np.diff(clean.position[:, :2], axis=0)
     course = np.unwrap(np.arctan2(step[:, 0], step[:, 1]))
-    ground = demands.setup.scenario.terrain
+    ground = requirements.setup.scenario.terrain
     low, low_at = np.full(last, math.nan), np.zeros(last)
     if ground is not None:
         low, low_at = path_clearance(ground.heights, ground.to_pixel.record, clean.position)
@@ -116,10 +119,10 @@ def lay_track(demands: RouteDemands, track: Track) -> AlignedTrack | None:
     )
 
 
-def along_across(demands: RouteDemands, leg: int, position: Floats) -> tuple[Floats, Floats]:
+def along_across(requirements: RouteRequirements, leg: int, position: Floats) -> tuple[Floats, Floats]:
     """Distance along a leg from its start and to the right of its line, m, of positions (n, 3)."""
-    east, north = position[:, 0] - demands.points[leg, 0], position[:, 1] - demands.points[leg, 1]
-    ux, uy = math.sin(demands.courses[leg]), math.cos(demands.courses[leg])
+    east, north = position[:, 0] - requirements.points[leg, 0], position[:, 1] - requirements.points[leg, 1]
+    ux, uy = math.sin(requirements.courses[leg]), math.cos(requirements.courses[leg])
     return east * ux + north * uy, east * uy - north * ux
 
 
@@ -260,7 +263,7 @@ def find_leg_ends(setup: FlightSetup, track: Track) -> tuple[float, ...]:
     (20.0,)
     """
     places = replace(track, **{name: np.zeros_like(getattr(track, name)) for name in _ASIDE})
-    aligned = lay_track(route_demands(setup), places)
+    aligned = align_track(route_requirements(setup), places)
     return () if aligned is None else aligned.leg_ends()
 
 

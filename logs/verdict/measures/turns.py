@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flight.simulation.track import ROLL
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import leg_course
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.tolerances import WATCHED
@@ -41,31 +41,31 @@ class CornerPass:
     beyond: float = 0.0
 
 
-def corner_passes(demands: RouteDemands, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
+def corner_passes(requirements: RouteRequirements, aligned: AlignedTrack) -> tuple[CornerPass, ...]:
     """How each waypoint of a route was passed, in its order: each after the one before it.
 
     >>> from logs.recording.example_log import example_log
-    >>> from logs.verdict.measures.route_requirements import route_demands
-    >>> from logs.verdict.measures.track_alignment import lay_track
+    >>> from logs.verdict.measures.route_requirements import route_requirements
+    >>> from logs.verdict.measures.track_alignment import align_track
     >>> log = example_log()
-    >>> demands = route_demands(log.setup)
-    >>> passes = corner_passes(demands, lay_track(demands, log.track))
-    >>> len(passes) == demands.legs + 1, passes[1].nearest < 60.0
+    >>> requirements = route_requirements(log.setup)
+    >>> passes = corner_passes(requirements, align_track(requirements, log.track))
+    >>> len(passes) == requirements.legs + 1, passes[1].nearest < 60.0
     (True, True)
     """
-    found = _nearest(demands, aligned)
+    found = _nearest(requirements, aligned)
     times, tick = [time for time, _ in found], aligned.tick
     out = []
     for k, (time, nearest) in enumerate(found):
         overshoot, beyond = None, 0.0
-        if 0 < k < demands.legs:
+        if 0 < k < requirements.legs:
             later = next((other for other in times[k + 1 :] if other > time + tick), float(aligned.track.time[-1]))
-            overshoot, beyond = _past_next_leg(demands, aligned, k, time, later)
+            overshoot, beyond = _past_next_leg(requirements, aligned, k, time, later)
         out.append(CornerPass(time, nearest, overshoot, beyond))
     return tuple(out)
 
 
-def _nearest(demands: RouteDemands, aligned: AlignedTrack) -> list[tuple[float, float]]:
+def _nearest(requirements: RouteRequirements, aligned: AlignedTrack) -> list[tuple[float, float]]:
     """Time (s) and distance (m) of each waypoint's nearest pass, between the pass before it and the next one's."""
     time, rows = aligned.track.time, aligned.rows
     out: list[tuple[float, float]] = []
@@ -74,7 +74,7 @@ def _nearest(demands: RouteDemands, aligned: AlignedTrack) -> list[tuple[float, 
         # Of waypoints that lie by the same row none is a bound for the others.
         later = rows[k + 1 :][time[rows[k + 1 :]] > max(float(time[rows[k]]), begin)]
         moments, place = _way(aligned, begin, float(time[later[0]] if later.size else time[-1]))
-        away, fraction = approaches(place, demands.points[k])
+        away, fraction = approaches(place, requirements.points[k])
         nearest = int(np.argmin(away))
         begin = float(moments[nearest] + fraction[nearest] * (moments[nearest + 1] - moments[nearest]))
         out.append((begin, float(away[nearest])))
@@ -89,14 +89,14 @@ def _way(aligned: AlignedTrack, start: float, end: float) -> tuple[Floats, Float
 
 
 def _past_next_leg(
-    demands: RouteDemands, aligned: AlignedTrack, k: int, start: float, end: float
+    requirements: RouteRequirements, aligned: AlignedTrack, k: int, start: float, end: float
 ) -> tuple[float | None, float]:
     """Overshoot (m; None without one) of the corner at a waypoint, and how far past the leg's end it began (m)."""
-    run = float(demands.runs[k])
-    along, across = along_across(demands, k, _way(aligned, start, end)[1])
+    run = float(requirements.runs[k])
+    along, across = along_across(requirements, k, _way(aligned, start, end)[1])
     if along[0] > run:
         return None, float(along[0]) - run
-    outside = -math.copysign(1.0, float(demands.turns[k])) * across
+    outside = -math.copysign(1.0, float(requirements.turns[k])) * across
     gone = np.flatnonzero(along >= OF_NEXT_LEG * run)
     until = int(gone[0]) if gone.size else len(along)
     if 0 < until < len(along):
@@ -138,36 +138,38 @@ class TurnMeasure:
     corner: CornerPass | None = None
 
 
-def measure_turns(demands: RouteDemands, aligned: AlignedTrack) -> list[TurnMeasure]:
+def measure_turns(requirements: RouteRequirements, aligned: AlignedTrack) -> list[TurnMeasure]:
     """Measure the turn at every inner waypoint, in order."""
-    measures = [measure_turn(demands, aligned, i) for i in range(1, demands.legs)]
-    if demands.setup.source is None:
+    measures = [measure_turn(requirements, aligned, i) for i in range(1, requirements.legs)]
+    if requirements.setup.source is None:
         return measures
-    corners = corner_passes(demands, aligned)[1:-1]
+    corners = corner_passes(requirements, aligned)[1:-1]
     return [
         replace(measure, overshoot=corner.overshoot, passed=corner.nearest, corner=corner)
         for measure, corner in zip(measures, corners, strict=True)
     ]
 
 
-def measure_turn(demands: RouteDemands, aligned: AlignedTrack, i: int) -> TurnMeasure:
+def measure_turn(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> TurnMeasure:
     """Measure the turn at inner waypoint i."""
     if not aligned.flew(i - 1) or not aligned.flew(i):
         return TurnMeasure()
     track = aligned.track
     first, middle, last = (int(aligned.rows[k]) for k in (i - 1, i, i + 1))
     position = track.position[first : last + 1]
-    before, _ = along_across(demands, i - 1, position)
-    along, across = along_across(demands, i, position)
-    entry = _first(before >= demands.runs[i - 1] - demands.before[i], middle - first)
+    before, _ = along_across(requirements, i - 1, position)
+    along, across = along_across(requirements, i, position)
+    entry = _first(before >= requirements.runs[i - 1] - requirements.before[i], middle - first)
     leaving = np.arange(first, last + 1) >= middle
-    leave = _first(leaving & (along >= demands.after[i]), last - first)
+    leave = _first(leaving & (along >= requirements.after[i]), last - first)
     # A neighbour that asks for more than the leg has gets half of it: it is at fault, not this turn.
-    ahead = min(float(demands.before[i + 1]), max(0.5 * demands.runs[i], demands.runs[i] - demands.after[i]))
-    end = _first(leaving & (along >= demands.runs[i] - ahead), last - first)
+    ahead = min(
+        float(requirements.before[i + 1]), max(0.5 * requirements.runs[i], requirements.runs[i] - requirements.after[i])
+    )
+    end = _first(leaving & (along >= requirements.runs[i] - ahead), last - first)
     around = aligned.around(first + entry, first + max(entry, leave), 1.0)
     held, radius = _second_by_second(aligned, around)
-    angle, tolerance, fitted = _angle(demands, aligned, i)
+    angle, tolerance, fitted = _angle(requirements, aligned, i)
     watched = np.arange(position.shape[0]) <= max(leave, end)
     watched &= track.time[first : last + 1] <= track.time[first + leave] + WATCHED
     turned = abs(float(aligned.course[first + leave] - aligned.course[first + entry]))
@@ -178,10 +180,10 @@ def measure_turn(demands: RouteDemands, aligned: AlignedTrack, i: int) -> TurnMe
         peak_bank=None if math.isnan(held) else float(np.abs(track.attitude[around, ROLL]).max()),
         held_bank=None if math.isnan(held) else held,
         radius=radius,
-        overshoot=_overshoot(demands, i, position[watched], before[watched], along[watched], across[watched]),
-        settled=_settled(demands, aligned, i, first, end, along, across),
-        passed=float(approaches(position, demands.points[i])[0].min()),
-        full_circles=max(0, round((turned - abs(float(demands.turns[i]))) / (2.0 * math.pi))),
+        overshoot=_overshoot(requirements, i, position[watched], before[watched], along[watched], across[watched]),
+        settled=_settled(requirements, aligned, i, first, end, along, across),
+        passed=float(approaches(position, requirements.points[i])[0].min()),
+        full_circles=max(0, round((turned - abs(float(requirements.turns[i]))) / (2.0 * math.pi))),
         over=bool(aligned.passed[i + 1] or end < last - first or leave < last - first),
     )
 
@@ -191,8 +193,8 @@ def _first(mask: NDArray[np.bool_], otherwise: int) -> int:
     return found if mask[found] else otherwise
 
 
-def _angle(demands: RouteDemands, aligned: AlignedTrack, i: int) -> tuple[float | None, float | None, bool]:
-    into, out = leg_course(demands, aligned, i - 1), leg_course(demands, aligned, i)
+def _angle(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> tuple[float | None, float | None, bool]:
+    into, out = leg_course(requirements, aligned, i - 1), leg_course(requirements, aligned, i)
     if into is None or out is None:
         return None, None, False
     change = abs(math.remainder(out.value - into.value, 2.0 * math.pi))
@@ -215,32 +217,34 @@ def _second_by_second(aligned: AlignedTrack, rows: slice) -> tuple[float, float]
 
 
 def _overshoot(
-    demands: RouteDemands, i: int, position: Floats, before: Floats, along: Floats, across: Floats
+    requirements: RouteRequirements, i: int, position: Floats, before: Floats, along: Floats, across: Floats
 ) -> float | None:
     """Largest distance outside the arc, and outside the next leg after it, m; 0 where always within."""
-    if demands.setup.route.fly_over[i] or not math.isfinite(demands.before[i]):
+    if requirements.setup.route.fly_over[i] or not math.isfinite(requirements.before[i]):
         return None
-    side = math.copysign(1.0, demands.turns[i])
-    ux, uy = demands.leg_unit(i - 1)
+    side = math.copysign(1.0, requirements.turns[i])
+    ux, uy = requirements.leg_unit(i - 1)
     centre = (
-        demands.points[i, :2] - demands.before[i] * np.array([ux, uy]) + side * demands.radius[i] * np.array([uy, -ux])
+        requirements.points[i, :2]
+        - requirements.before[i] * np.array([ux, uy])
+        + side * requirements.radius[i] * np.array([uy, -ux])
     )
-    started = np.maximum.accumulate(before >= demands.runs[i - 1] - demands.before[i])
-    in_arc = started & (along < demands.after[i])
+    started = np.maximum.accumulate(before >= requirements.runs[i - 1] - requirements.before[i])
+    in_arc = started & (along < requirements.after[i])
     outside = np.where(started & ~in_arc, -side * across, 0.0)
     off = position[in_arc, :2] - centre
-    outside[in_arc] = np.hypot(off[:, 0], off[:, 1]) - demands.radius[i]
+    outside[in_arc] = np.hypot(off[:, 0], off[:, 1]) - requirements.radius[i]
     return max(0.0, float(outside.max())) if outside.size else 0.0
 
 
 def _settled(
-    demands: RouteDemands, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
+    requirements: RouteRequirements, aligned: AlignedTrack, i: int, first: int, end: int, along: Floats, across: Floats
 ) -> float:
     """Mean distance from the next leg's line in its last second before the next turn, or there, m."""
     time = aligned.track.time[first : first + end + 1]
     start = int(np.searchsorted(time, time[-1] - 1.0))
     rows = np.arange(start, end + 1)
-    rows = rows[along[rows] >= demands.after[i]]
+    rows = rows[along[rows] >= requirements.after[i]]
     if rows.size:
         return float(np.abs(across[rows]).mean())
     return float(abs(across[end]))

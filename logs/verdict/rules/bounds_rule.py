@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import ROUNDING
@@ -15,20 +15,22 @@ from logs.verdict.wording import place_text
 Floats = NDArray[np.float64]
 
 
-def bounds_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def bounds_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """One finding: the least distance inside the area's box, its floor and its ceiling."""
-    scenario = demands.setup.scenario
+    scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so there is no area to stay in"
         return [make_finding("bounds", FLIGHT, ok=None, reason=reason, unit="m")]
-    planned, side, k = _inside_box(demands, demands.points)
-    found, at = planned, f"at {place_text(demands.waypoint(k))}"
+    planned, side, k = _inside_box(requirements, requirements.points)
+    found, at = planned, f"at {place_text(requirements.waypoint(k))}"
     ok: bool | None = planned >= -ROUNDING
     flown_margin = math.nan
     if not geometric and aligned is None:
         ok, at = None, "nothing was flown"
     elif aligned is not None:
-        found, side, k = _inside_box(demands, aligned.track.position)
+        found, side, k = _inside_box(requirements, aligned.track.position)
         flown_margin, ok = found, found >= -ROUNDING
         at = f"at {aligned.track.time[k]:.1f} s"
     where = f"{abs(found):.0f} m {'inside' if found >= 0.0 else 'beyond'} the {side} {at}"
@@ -50,9 +52,9 @@ def bounds_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
     ]
 
 
-def _inside_box(demands: RouteDemands, points: Floats) -> tuple[float, str, int]:
+def _inside_box(requirements: RouteRequirements, points: Floats) -> tuple[float, str, int]:
     """Least distance inside the box (negative: outside), the side that is meant, and the row."""
-    scenario = demands.setup.scenario
+    scenario = requirements.setup.scenario
     (west, east), (south, north) = scenario.bounds
     inside = {
         "western edge": points[:, 0] - west,

@@ -6,34 +6,34 @@ import numpy as np
 
 from logs.verdict.findings import Finding, make_finding
 from logs.verdict.measures.path_sweeps import path_clearance
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import HEIGHT_ROUNDING
 
 
 def clearance_findings(
-    demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
 ) -> list[Finding]:
     """Judge the least height above ground on each leg."""
-    ground = demands.setup.scenario.terrain
-    limit = demands.limits.min_clearance
+    ground = requirements.setup.scenario.terrain
+    limit = requirements.limits.min_clearance
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
         return [
             make_finding(
-                "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=demands.limits_source, unit="m"
+                "clearance", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
             )
         ]
-    legs = demands.path.legs
-    low, _ = path_clearance(ground.heights, ground.to_pixel.record, demands.path.points)
-    planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(demands.legs)]
+    legs = requirements.path.legs
+    low, _ = path_clearance(ground.heights, ground.to_pixel.record, requirements.path.points)
+    planned = [float(low[legs == leg].min()) if (legs == leg).any() else math.nan for leg in range(requirements.legs)]
     out = []
-    for leg in range(demands.legs):
+    for leg in range(requirements.legs):
         if geometric:
-            out.append(_planned_clearance(demands, leg, planned[leg], limit, ground.vertical_error))
+            out.append(_planned_clearance(requirements, leg, planned[leg], limit, ground.vertical_error))
         else:
-            out.append(_flown_clearance(demands, aligned, leg, planned[leg], limit))
+            out.append(_flown_clearance(requirements, aligned, leg, planned[leg], limit))
     return out
 
 
@@ -45,20 +45,22 @@ def _less_error(clearance: float, limit: float, error: float | None) -> str:
     return f"; {clearance - error:.1f} m less the terrain's stated error of {error:g} m{short}"
 
 
-def _planned_clearance(demands: RouteDemands, leg: int, planned: float, limit: float, error: float | None) -> Finding:
+def _planned_clearance(
+    requirements: RouteRequirements, leg: int, planned: float, limit: float, error: float | None
+) -> Finding:
     reason = f"{planned:.1f} m above ground at the lowest"
     if math.isnan(planned):
         reason = "the leg leaves the known terrain"
     return make_finding(
         "clearance",
-        demands.leg(leg),
+        requirements.leg(leg),
         ok=None if math.isnan(planned) else planned >= limit - HEIGHT_ROUNDING,
         reason=reason
         + ("" if math.isnan(planned) or planned >= limit - HEIGHT_ROUNDING else f"; {limit:.0f} m are required")
         + _less_error(planned, limit, error),
         planned=planned,
         limit=limit,
-        source=demands.limits_source,
+        source=requirements.limits_source,
         tolerance=HEIGHT_ROUNDING,
         margin=planned - limit,
         unit="m",
@@ -67,13 +69,13 @@ def _planned_clearance(demands: RouteDemands, leg: int, planned: float, limit: f
 
 
 def _flown_clearance(
-    demands: RouteDemands, aligned: AlignedTrack | None, leg: int, planned: float, limit: float
+    requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, planned: float, limit: float
 ) -> Finding:
     least, ok, reason = math.nan, None, "the leg was not flown"
     if aligned is not None and aligned.flew(leg):
         # The first leg has what came before it, the last what came after.
         first = 0 if leg == 0 else int(aligned.rows[leg])
-        last = len(aligned.track) - 1 if leg + 1 == demands.legs else int(aligned.rows[leg + 1])
+        last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
         span = aligned.low[first:last]
         known = np.isfinite(span)
         if known.any():
@@ -88,19 +90,19 @@ def _flown_clearance(
             ok = None if ok is not False else False
         if ok is False:
             reason += f"; {limit:.0f} m are required"
-        ground = demands.setup.scenario.terrain
+        ground = requirements.setup.scenario.terrain
         reason += _less_error(least, limit, None if ground is None else ground.vertical_error)
     if planned < limit - HEIGHT_ROUNDING:
         reason += f"; the planned path comes down to {planned:.1f} m"
     return make_finding(
         "clearance",
-        demands.leg(leg),
+        requirements.leg(leg),
         ok=ok,
         reason=reason,
         planned=planned,
         flown=least,
         limit=limit,
-        source=demands.limits_source,
+        source=requirements.limits_source,
         tolerance=HEIGHT_ROUNDING,
         margin=least - limit,
         unit="m",

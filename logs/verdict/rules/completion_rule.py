@@ -3,15 +3,17 @@
 import numpy as np
 
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import CONTRADICTION, GAP_STEPS, LONGEST_GAP
 
 
-def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, ended: str, whole: bool) -> list[Finding]:
+def completion_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, ended: str, whole: bool
+) -> list[Finding]:
     """One finding: planned feasibly, flown to the last waypoint, recorded whole and without contradiction."""
-    plan = demands.setup.plan
+    plan = requirements.setup.plan
     faults = []
     if plan is not None and not plan.feasible:
         faults.append(message("the plan is not feasible"))
@@ -24,11 +26,11 @@ def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, end
         faults.append(message("the track has fewer than two usable rows"))
     else:
         legs = int(aligned.passed[1:].sum())
-        if legs < demands.legs:
-            faults.append(message(f"{legs} of {demands.legs} legs flown"))
+        if legs < requirements.legs:
+            faults.append(message(f"{legs} of {requirements.legs} legs flown"))
         faults += _record_faults(aligned)
-    notes = "; ".join(demands.setup.route.notes)
-    reason = reason_of(faults) if faults else f"all {demands.legs} legs flown"
+    notes = "; ".join(requirements.setup.route.notes)
+    reason = reason_of(faults) if faults else f"all {requirements.legs} legs flown"
     return [
         make_finding(
             "completion",
@@ -36,12 +38,12 @@ def completion_findings(demands: RouteDemands, aligned: AlignedTrack | None, end
             ok=not faults,
             reason=reason + (f" (not flown as written: {notes})" if notes else ""),
             faults=faults,
-            planned=demands.legs,
+            planned=requirements.legs,
             flown=legs,
-            limit=demands.legs,
+            limit=requirements.legs,
             source="route",
             tolerance=0.0,
-            margin=legs - demands.legs,
+            margin=legs - requirements.legs,
             unit="legs",
             method="waypoints passed in order",
         )

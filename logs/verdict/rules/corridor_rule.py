@@ -4,19 +4,21 @@ import math
 
 from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import corner_depths, corridor_limit, farthest_from_legs
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import ROUNDING
 
 
-def corridor_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def corridor_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge how far from the legs the flight of each leg got; ``geometric``: how far its planned turns lead."""
-    return [_corridor(demands, aligned, leg, geometric) for leg in range(demands.legs)]
+    return [_corridor(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
 
 
-def _corridor(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    limit, source = corridor_limit(demands, leg)
-    planned, flown, ok = float(corner_depths(demands)[leg : leg + 2].max()), math.nan, None
+def _corridor(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+    limit, source = corridor_limit(requirements, leg)
+    planned, flown, ok = float(corner_depths(requirements)[leg : leg + 2].max()), math.nan, None
     faults, facts = [], []
     if geometric:
         ok = planned <= limit + ROUNDING
@@ -27,8 +29,8 @@ def _corridor(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geo
         facts.append("the leg was not flown")
     else:
         rows = aligned.leg_rows(leg)
-        near = slice(max(0, leg - 1), min(demands.legs, leg + 2) + 1)
-        flown, row = farthest_from_legs(aligned.track.position[rows], demands.points[near])
+        near = slice(max(0, leg - 1), min(requirements.legs, leg + 2) + 1)
+        flown, row = farthest_from_legs(aligned.track.position[rows], requirements.points[near])
         ok = flown <= limit
         where = _when_and_where(aligned, rows.start + row)
         facts.append(f"within {flown:.1f} m of the legs, the farthest {where}")
@@ -36,7 +38,7 @@ def _corridor(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geo
             faults.append(message(f"{flown:.0f} m off the legs {where}", f"; the corridor is {limit:.0f} m"))
     return make_finding(
         "corridor",
-        demands.leg(leg),
+        requirements.leg(leg),
         ok=ok,
         reason=reason_of(faults) if faults else reason_of([], facts),
         faults=faults,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flight.simulation.track import ROLL
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
@@ -15,13 +15,13 @@ from logs.verdict.tolerances import MAX_BANK, SLOWEST, SLOWEST_SHARE
 Floats = NDArray[np.float64]
 
 
-def departure_findings(demands: RouteDemands, aligned: AlignedTrack | None) -> list[Finding]:
+def departure_findings(requirements: RouteRequirements, aligned: AlignedTrack | None) -> list[Finding]:
     """One finding: numbers that are none, extreme bank, too slow to fly, or ground contact."""
     if aligned is None:
         return [make_finding("departure", FLIGHT, ok=None, reason="no usable rows", unit="deg")]
     track = aligned.track
     bank = np.abs(track.attitude[:, ROLL].astype(np.float64))
-    most, slow = _most(bank), _too_slow(demands, aligned)
+    most, slow = _most(bank), _too_slow(requirements, aligned)
     faults = []
     if aligned.bad_rows:
         faults.append(
@@ -61,13 +61,13 @@ def _most(values: Floats) -> float:
     return float(finite.max()) if finite.size else math.nan
 
 
-def _too_slow(demands: RouteDemands, aligned: AlignedTrack) -> list[Message]:
+def _too_slow(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Message]:
     """That the aircraft was too slow to fly; nothing of one that is not known."""
-    source = demands.setup.source
+    source = requirements.setup.source
     if source is not None and not source.aircraft_known:
         return []
     track = aligned.track
-    slowest = _slowest(demands, track.position[:, 2])
+    slowest = _slowest(requirements, track.position[:, 2])
     slow = np.flatnonzero(track.airspeed < slowest)
     if not slow.size:
         return []
@@ -79,9 +79,9 @@ def _time_text(time: float) -> str:
     return f"at {time:.1f} s" if math.isfinite(time) else "without a time"
 
 
-def _slowest(demands: RouteDemands, up: Floats) -> Floats:
+def _slowest(requirements: RouteRequirements, up: Floats) -> Floats:
     """Airspeed below which the aircraft is taken to have stopped flying, at each height."""
-    if demands.setup.aircraft == "aerosonde":
+    if requirements.setup.aircraft == "aerosonde":
         return np.full(up.shape, SLOWEST)
-    envelope = demands.setup.envelope
+    envelope = requirements.setup.envelope
     return np.asarray(SLOWEST_SHARE * np.interp(up, envelope.amsl, envelope.level_speed_min))

@@ -7,18 +7,20 @@ import numpy as np
 from aircraft.envelope import ground_speed
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import RESERVE
 
 
-def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def energy_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """One finding: the energy used against the battery less its reserve; a jump without end needs more than any."""
-    setup = demands.setup
+    setup = requirements.setup
     usable = (1.0 - RESERVE) * setup.battery
-    predicted, peak = predicted_energy(demands)
-    faults = [_never_ends(demands, usable)] if setup.route.endless >= 0 else []
+    predicted, peak = predicted_energy(requirements)
+    faults = [_never_ends(requirements, usable)] if setup.route.endless >= 0 else []
     used, current = predicted, peak
     if not geometric:
         used = math.nan if aligned is None else float(aligned.track.energy.max())
@@ -26,7 +28,7 @@ def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
     if math.isnan(used):
         reason = "the aircraft's power is not known at these speeds" if geometric else "nothing was flown"
     else:
-        reason = _used_text(demands, used, current) + (" by prediction" if geometric else "")
+        reason = _used_text(requirements, used, current) + (" by prediction" if geometric else "")
         if not geometric and math.isfinite(predicted):
             reason += f"; {predicted:.1f} Wh by prediction"
         if used > usable:
@@ -50,9 +52,9 @@ def energy_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
     ]
 
 
-def _never_ends(demands: RouteDemands, usable: float) -> Message:
+def _never_ends(requirements: RouteRequirements, usable: float) -> Message:
     """That a jump without end is flown until nothing is left, and how many of its rounds the usable energy lasts."""
-    route = demands.setup.route
+    route = requirements.setup.route
     last = len(route.items) - 1
     begin = last
     while begin > 0 and route.items[begin] == route.items[last]:
@@ -60,29 +62,29 @@ def _never_ends(demands: RouteDemands, usable: float) -> Message:
     # Where the round that ends the route began: at the item that it ends at.
     while begin > 0 and route.items[begin] != route.items[last]:
         begin -= 1
-    one = sum(leg_energies(demands)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
+    one = sum(leg_energies(requirements)[0][begin:]) if route.items[begin] == route.items[last] else math.nan
     lasts = f": the energy lasts for {usable / one:.0f} rounds" if one > 0.0 else ""
     return message(f"the jump of item {route.endless} has no end{lasts}")
 
 
-def _used_text(demands: RouteDemands, used: float, current: float) -> str:
+def _used_text(requirements: RouteRequirements, used: float, current: float) -> str:
     """Energy used (Wh) and the peak current (A), or what an aircraft without a battery has instead."""
-    whole = demands.setup.battery
-    if demands.setup.envelope.power_level.size and not demands.setup.envelope.volts:
+    whole = requirements.setup.battery
+    if requirements.setup.envelope.power_level.size and not requirements.setup.envelope.volts:
         share = used / whole
         return f"{used:.0f} Wh of {whole:.0f} Wh of fuel heat used, {share:.1%} of the fuel; no battery, so no current"
     peak = f", peak current {current:.1f} A" if math.isfinite(current) else ""
     return f"{used:.1f} Wh of {whole:.0f} Wh used{peak}"
 
 
-def predicted_energy(demands: RouteDemands) -> tuple[float, float]:
+def predicted_energy(requirements: RouteRequirements) -> tuple[float, float]:
     """Energy (Wh) and peak current (A) of steady flight along a route, NaN where the envelope knows no power.
 
     Each leg at its commanded airspeed, its slope over the ground in the mean wind, and its middle height; what turns
     and gusts take beside that is a few per cent.
     """
-    volts = demands.setup.envelope.volts
-    energies, most = leg_energies(demands)
+    volts = requirements.setup.envelope.volts
+    energies, most = leg_energies(requirements)
     return float(sum(energies)), most / volts if volts else math.nan
 
 
@@ -93,28 +95,33 @@ def needed_energy(setup: FlightSetup) -> float:
     >>> needed_energy(example_log().setup)
     nan
     """
-    return predicted_energy(route_demands(setup))[0]
+    return predicted_energy(route_requirements(setup))[0]
 
 
-def leg_energies(demands: RouteDemands) -> tuple[list[float], float]:
+def leg_energies(requirements: RouteRequirements) -> tuple[list[float], float]:
     """Energy (Wh) of steady flight on each leg, and the highest power (W); NaN where the envelope knows none."""
-    envelope, route = demands.setup.envelope, demands.route
-    if not np.isfinite(demands.ground_speed).all():
-        return [math.nan] * demands.legs, math.nan
+    envelope, route = requirements.setup.envelope, requirements.route
+    if not np.isfinite(requirements.ground_speed).all():
+        return [math.nan] * requirements.legs, math.nan
     energies, most = [], 0.0
-    seconds_on = np.bincount(demands.path.legs, weights=np.diff(demands.path.times), minlength=demands.legs)
+    seconds_on = np.bincount(
+        requirements.path.legs, weights=np.diff(requirements.path.times), minlength=requirements.legs
+    )
     for leg, seconds in enumerate(seconds_on):
-        speed, up = float(route.airspeed[leg]), float(0.5 * (demands.points[leg, 2] + demands.points[leg + 1, 2]))
-        power = envelope.power(speed, up, air_angle(demands, leg, speed, up))
+        speed, up = (
+            float(route.airspeed[leg]),
+            float(0.5 * (requirements.points[leg, 2] + requirements.points[leg + 1, 2])),
+        )
+        power = envelope.power(speed, up, air_angle(requirements, leg, speed, up))
         energies.append(power * float(seconds) / 3600.0)
         most = max(most, power) if math.isfinite(power) else math.nan
     return energies, most
 
 
-def air_angle(demands: RouteDemands, leg: int, speed: float, up: float) -> float:
+def air_angle(requirements: RouteRequirements, leg: int, speed: float, up: float) -> float:
     """Path angle to the air of a leg's slope over the ground in the mean wind at a height (m), rad."""
-    tail, cross = demands.setup.scenario.wind.along(float(demands.courses[leg]), up)
-    rise, angle = math.tan(float(demands.slopes[leg])), 0.0
+    tail, cross = requirements.setup.scenario.wind.along(float(requirements.courses[leg]), up)
+    rise, angle = math.tan(float(requirements.slopes[leg])), 0.0
     for _ in range(4):
         along = ground_speed(speed * math.cos(angle), tail, cross)
         angle = math.asin(min(1.0, max(-1.0, rise * along / speed)))

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.path_moves import flown_moves, planned_moves
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.zone_visits import path_zones
 from logs.verdict.places import FLIGHT, MISSION
@@ -32,7 +32,7 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
     >>> [is_entered(Zone("mast", "exclusion", Cylinder(0.0, y, 50.0))) for y in (40.0, -60.0)]
     [True, False]
     """
-    moves = planned_moves(route_demands(setup, envelope=False))
+    moves = planned_moves(route_requirements(setup, envelope=False))
 
     def is_entered(zone: Zone) -> bool:
         return bool(path_zones(moves, zone_records([zone]), setup.scenario.terrain)[0].depth > ROUNDING)
@@ -40,9 +40,11 @@ def zone_test(setup: FlightSetup) -> Callable[[Zone], bool]:
     return is_entered
 
 
-def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def fence_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge each zone that plan or flight violates, or say that there is none; nothing where there are no zones."""
-    airspace = demands.airspace
+    airspace = requirements.airspace
     out = []
     if airspace.fault:
         out.append(make_finding("fence", MISSION, ok=None, reason=f"its fence is not judged: {airspace.fault}"))
@@ -50,22 +52,22 @@ def fence_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geome
         return out
     if not geometric and aligned is None:
         return [*out, make_finding("fence", FLIGHT, ok=None, reason="nothing was flown", unit="m", method=_METHOD)]
-    terrain = demands.setup.scenario.terrain
-    planned = path_zones(planned_moves(demands), airspace.records, terrain)
+    terrain = requirements.setup.scenario.terrain
+    planned = path_zones(planned_moves(requirements), airspace.records, terrain)
     flown = None if aligned is None else path_zones(flown_moves(aligned), airspace.records, terrain)
     touched = []
     for z in range(len(airspace.zones)):
         visits = [planned[z]] if flown is None else [planned[z], flown[z]]
         if any(visit.depth > 0.0 or visit.unknown for visit in visits):
-            touched.append(_touched(demands, z, planned[z], None if flown is None else flown[z]))
+            touched.append(_touched(requirements, z, planned[z], None if flown is None else flown[z]))
     if not any(item.ok is False for item in touched):
-        touched.insert(0, _kept(demands, planned, flown))
+        touched.insert(0, _kept(requirements, planned, flown))
     return out + touched
 
 
-def _kept(demands: RouteDemands, planned: Records, flown: Records | None) -> Finding:
+def _kept(requirements: RouteRequirements, planned: Records, flown: Records | None) -> Finding:
     """Every zone that could be judged was kept to."""
-    airspace, corridor = demands.airspace, demands.setup.corridor
+    airspace, corridor = requirements.airspace, requirements.setup.corridor
     count, visits = len(airspace.zones), planned if flown is None else flown
     nearest = int(visits["depth"].argmax())
     margin = -float(visits[nearest].depth)
@@ -74,7 +76,7 @@ def _kept(demands: RouteDemands, planned: Records, flown: Records | None) -> Fin
     if math.isfinite(margin) and not visits[nearest].unknown:
         facts = [Fact("nearest", margin, "m"), Fact("less the corridor", margin - corridor, "m")]
         name = place_text(airspace.place(nearest))
-        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_where(demands, visits[nearest], 'at')}"
+        reason += f"; the nearest, {name}, is {margin:.1f} m away at {_where(requirements, visits[nearest], 'at')}"
         if margin < corridor:
             reason += f", within the corridor of {corridor:.0f} m about the legs"
     return make_finding(
@@ -94,8 +96,8 @@ def _kept(demands: RouteDemands, planned: Records, flown: Records | None) -> Fin
     )
 
 
-def _touched(demands: RouteDemands, z: int, planned: Record, flown: Record | None) -> Finding:
-    airspace = demands.airspace
+def _touched(requirements: RouteRequirements, z: int, planned: Record, flown: Record | None) -> Finding:
+    airspace = requirements.airspace
     zone = airspace.zones[z]
     visit = planned if flown is None else flown
     ok: bool | None = visit.depth <= ROUNDING
@@ -107,8 +109,9 @@ def _touched(demands: RouteDemands, z: int, planned: Record, flown: Record | Non
         faults.append(
             message(
                 f"{visit.depth:.1f} m {wrong}",
-                f" at {_where(demands, visit, 'at')}, for {visit.beyond:.1f} s in all:"
-                f" {stay} at {_where(demands, visit, 'entry')} and is back at {_where(demands, visit, 'exit')}"
+                f" at {_where(requirements, visit, 'at')}, for {visit.beyond:.1f} s in all:"
+                f" {stay} at {_where(requirements, visit, 'entry')}"
+                f" and is back at {_where(requirements, visit, 'exit')}"
                 + (f"; {visit.entries} times" if visit.entries > 1 else ""),
             )
         )
@@ -117,7 +120,7 @@ def _touched(demands: RouteDemands, z: int, planned: Record, flown: Record | Non
     if visit.unknown:
         notes.append("the ground that it counts from is not known all along")
     if flown is not None and planned.depth > ROUNDING:
-        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(demands, planned, 'at')}")
+        notes.append(f"the planned path is {planned.depth:.1f} m {wrong} at {_where(requirements, planned, 'at')}")
     return make_finding(
         "fence",
         airspace.place(z),
@@ -127,7 +130,7 @@ def _touched(demands: RouteDemands, z: int, planned: Record, flown: Record | Non
         planned=max(0.0, planned.depth),
         flown=None if flown is None else max(0.0, flown.depth),
         limit=0.0,
-        source=_source(demands, z),
+        source=_source(requirements, z),
         tolerance=ROUNDING,
         margin=-visit.depth,
         unit="m",
@@ -145,15 +148,15 @@ def _facts(visit: Record) -> list[Fact]:
     return facts
 
 
-def _source(demands: RouteDemands, z: int) -> str:
+def _source(requirements: RouteRequirements, z: int) -> str:
     """Whose a zone is: zones of a mission without a scenario are those that were named beside it."""
-    if z >= demands.airspace.of_scenario:
+    if z >= requirements.airspace.of_scenario:
         return "mission"
-    return "fence" if demands.setup.scenario.external else "scenario"
+    return "fence" if requirements.setup.scenario.external else "scenario"
 
 
-def _where(demands: RouteDemands, visit: Record, event: str) -> str:
+def _where(requirements: RouteRequirements, visit: Record, event: str) -> str:
     """When and where a path was at an event of a visit, in words."""
-    leg = place_text(demands.leg(int(visit[f"{event}_leg"])))
+    leg = place_text(requirements.leg(int(visit[f"{event}_leg"])))
     time, east, north, up = (visit[f"{event}_{name}"] for name in ("time", "east", "north", "up"))
     return f"{time:.1f} s, east {east:.0f} m, north {north:.0f} m, {up:.0f} m AMSL ({leg})"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, make_finding, message, reason_of
 from logs.verdict.measures.path_sweeps import path_clearance
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import HEIGHT_ROUNDING
@@ -20,31 +20,40 @@ from world.terrain import Terrain
 Floats = NDArray[np.float64]
 
 
-def height_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def height_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge the greatest height above ground on each leg; nothing where the scenario has no limit of it."""
-    scenario = demands.setup.scenario
+    scenario = requirements.setup.scenario
     limit, ground = scenario.limits.max_height_m, scenario.terrain
     if limit is None:
         return []
     if ground is None:
         reason = "no terrain was given, so heights above ground are not known"
         return [
-            make_finding("height", FLIGHT, ok=None, reason=reason, limit=limit, source=demands.limits_source, unit="m")
+            make_finding(
+                "height", FLIGHT, ok=None, reason=reason, limit=limit, source=requirements.limits_source, unit="m"
+            )
         ]
-    path = demands.path
+    path = requirements.path
     way = _Way(path.points, path.times, *greatest_heights(ground, path.points))
-    planned = [_highest(way, np.flatnonzero(path.legs == leg)) for leg in range(demands.legs)]
+    planned = [_highest(way, np.flatnonzero(path.legs == leg)) for leg in range(requirements.legs)]
     if geometric:
-        return [_finding(demands, leg, limit, planned[leg], planned[leg], "fly-by path") for leg in range(demands.legs)]
-    flown: list[_Highest | None] = [None] * demands.legs
+        return [
+            _finding(requirements, leg, limit, planned[leg], planned[leg], "fly-by path")
+            for leg in range(requirements.legs)
+        ]
+    flown: list[_Highest | None] = [None] * requirements.legs
     if aligned is not None:
         track = aligned.track
         way = _Way(track.position, track.time, *greatest_heights(ground, track.position))
         flown = [
-            _highest(way, _segments(demands, aligned, leg)) if aligned.flew(leg) else None
-            for leg in range(demands.legs)
+            _highest(way, _segments(requirements, aligned, leg)) if aligned.flew(leg) else None
+            for leg in range(requirements.legs)
         ]
-    return [_finding(demands, leg, limit, planned[leg], flown[leg], "flown track") for leg in range(demands.legs)]
+    return [
+        _finding(requirements, leg, limit, planned[leg], flown[leg], "flown track") for leg in range(requirements.legs)
+    ]
 
 
 def greatest_heights(terrain: Terrain, points: Floats) -> tuple[Floats, Floats]:
@@ -96,21 +105,21 @@ def _highest(way: _Way, segments: NDArray[np.intp]) -> _Highest | None:
     return _Highest(float(way.greatest[k]), amsl, where, bool(known.all()))
 
 
-def _segments(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
+def _segments(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> NDArray[np.intp]:
     """Segments of the track on a leg: the first leg has what came before it, the last what came after."""
     first = 0 if leg == 0 else int(aligned.rows[leg])
-    last = len(aligned.track) - 1 if leg + 1 == demands.legs else int(aligned.rows[leg + 1])
+    last = len(aligned.track) - 1 if leg + 1 == requirements.legs else int(aligned.rows[leg + 1])
     return np.arange(first, last)
 
 
 def _finding(
-    demands: RouteDemands, leg: int, limit: float, planned: _Highest | None, judged: _Highest | None, by: str
+    requirements: RouteRequirements, leg: int, limit: float, planned: _Highest | None, judged: _Highest | None, by: str
 ) -> Finding:
     faults, facts, ok = [], [], None
     if judged is None:
         facts.append("the leg was not flown")
     else:
-        ceiling = demands.setup.scenario.ceiling
+        ceiling = requirements.setup.scenario.ceiling
         high = f"{judged.height:.1f} m above ground {judged.where}"
         if judged.height > limit + HEIGHT_ROUNDING:
             faults.append(message(high, f"; {limit:g} m are allowed"))
@@ -125,14 +134,14 @@ def _finding(
         facts.append(f"the planned path comes up to {planned.height:.1f} m")
     return make_finding(
         "height",
-        demands.leg(leg),
+        requirements.leg(leg),
         ok=ok,
         reason=reason_of(faults, facts),
         faults=faults,
         planned=None if planned is None else planned.height,
         flown=None if judged is None or judged is planned else judged.height,
         limit=limit,
-        source=demands.limits_source,
+        source=requirements.limits_source,
         tolerance=HEIGHT_ROUNDING,
         margin=None if judged is None else limit - judged.height,
         unit="m",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from logs.verdict.findings import Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
 from logs.verdict.tolerances import RADIUS_TOLERANCE
@@ -39,9 +39,9 @@ class Circle:
     turns: float
 
 
-def circles(demands: RouteDemands) -> list[Circle]:
+def circles(requirements: RouteRequirements) -> list[Circle]:
     """Loiters of a route, in flying order."""
-    arcs, items = demands.setup.route.arcs, demands.setup.route.items
+    arcs, items = requirements.setup.route.arcs, requirements.setup.route.items
     found: list[Circle] = []
     i = 0
     while i < len(arcs):
@@ -49,34 +49,34 @@ def circles(demands: RouteDemands) -> list[Circle]:
         while last + 1 < len(arcs) and arcs[last + 1] > 0.0 and items[last + 1] == items[i]:
             last += 1
         if arcs[i] > 0.0:
-            angle = float(np.abs(demands.turns[i : last + 1]).sum())
-            found.append(Circle(i, last, _middle(demands, i), float(arcs[i]), angle / (2.0 * math.pi)))
+            angle = float(np.abs(requirements.turns[i : last + 1]).sum())
+            found.append(Circle(i, last, _middle(requirements, i), float(arcs[i]), angle / (2.0 * math.pi)))
             i = last
         i += 1
     return found
 
 
-def _middle(demands: RouteDemands, i: int) -> Floats:
+def _middle(requirements: RouteRequirements, i: int) -> Floats:
     """Middle of the circle that a corner's arc is part of, (2,) m."""
-    ux, uy = demands.leg_unit(i - 1)
-    side = math.copysign(1.0, demands.turns[i])
-    tangent = tangent_length(abs(float(demands.turns[i])), float(demands.radius[i]))
+    ux, uy = requirements.leg_unit(i - 1)
+    side = math.copysign(1.0, requirements.turns[i])
+    tangent = tangent_length(abs(float(requirements.turns[i])), float(requirements.radius[i]))
     return np.array(
-        demands.points[i, :2] - tangent * np.array([ux, uy]) + side * demands.radius[i] * np.array([uy, -ux])
+        requirements.points[i, :2] - tangent * np.array([ux, uy]) + side * requirements.radius[i] * np.array([uy, -ux])
     )
 
 
 def fold_loiters(
-    demands: RouteDemands, aligned: AlignedTrack | None, findings: Sequence[Finding]
+    requirements: RouteRequirements, aligned: AlignedTrack | None, findings: Sequence[Finding]
 ) -> tuple[Finding, ...]:
     """Findings with those at a loiter's corners replaced by one, and those of its legs by the worst of each rule."""
     found = list(findings)
-    for circle in circles(demands):
-        corners = {demands.waypoint(i) for i in range(circle.first, circle.last + 1)}
-        legs = {demands.leg(leg) for leg in range(circle.first, circle.last)}
+    for circle in circles(requirements):
+        corners = {requirements.waypoint(i) for i in range(circle.first, circle.last + 1)}
+        legs = {requirements.leg(leg) for leg in range(circle.first, circle.last)}
         at = [item for item in found if item.rule in ("turn", "waypoint") and item.place in corners]
         if at:
-            found[found.index(at[0])] = _loiter(demands, aligned, circle, at)
+            found[found.index(at[0])] = _loiter(requirements, aligned, circle, at)
             found = [item for item in found if not any(item is other for other in at[1:])]
         for rule in ("slope", "speed", "clearance", "corridor"):
             mine = [item for item in found if item.rule == rule and item.place in legs]
@@ -91,17 +91,19 @@ def _badness(item: Finding) -> tuple[int, float]:
     return (0 if item.ok is False else 1 if item.ok is None else 2), 0.0 if item.margin is None else item.margin
 
 
-def _loiter(demands: RouteDemands, aligned: AlignedTrack | None, circle: Circle, at: list[Finding]) -> Finding:
+def _loiter(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, circle: Circle, at: list[Finding]
+) -> Finding:
     inner = slice(circle.first, circle.last + 1)
-    known = bool(np.isfinite(demands.turn_limit[inner]).all())
-    tightest = float(demands.tightest[inner].max()) if known else math.nan
+    known = bool(np.isfinite(requirements.turn_limit[inner]).all())
+    tightest = float(requirements.tightest[inner].max()) if known else math.nan
     bad = [item for item in at if item.ok is False]
-    faults = _too_small(demands, circle, tightest) if known else []
+    faults = _too_small(requirements, circle, tightest) if known else []
     if aligned is not None and bad:
         faults.append(_not_held(circle, bad))
     elif bad and not faults:
         first = bad[0]
-        text, placed = f"{place_text(first.place)}: {first.reason}", first.place == demands.waypoint(circle.first)
+        text, placed = f"{place_text(first.place)}: {first.reason}", first.place == requirements.waypoint(circle.first)
         faults.append(Message(text, _bare(first.place), placed))
     facts = [f"{circle.turns:.2f} turns with {circle.radius:.0f} m"]
     mean = math.nan
@@ -117,7 +119,7 @@ def _loiter(demands: RouteDemands, aligned: AlignedTrack | None, circle: Circle,
         facts.append("the flight did not get to its end")
     return make_finding(
         "loiter",
-        demands.waypoint(circle.first),
+        requirements.waypoint(circle.first),
         ok=ok,
         reason=reason_of(faults, facts),
         faults=faults,
@@ -132,11 +134,11 @@ def _loiter(demands: RouteDemands, aligned: AlignedTrack | None, circle: Circle,
     )
 
 
-def _too_small(demands: RouteDemands, circle: Circle, tightest: float) -> list[Message]:
+def _too_small(requirements: RouteRequirements, circle: Circle, tightest: float) -> list[Message]:
     """What is wrong with a circle smaller than the bank limit's (m)."""
     if circle.radius >= tightest - RADIUS_TOLERANCE:
         return []
-    speed, bank = float(demands.route.airspeed[circle.first]), math.degrees(demands.limits.max_bank)
+    speed, bank = float(requirements.route.airspeed[circle.first]), math.degrees(requirements.limits.max_bank)
     needs = f"at {speed:.0f} m/s and {bank:.0f}° bank the aircraft needs {tightest:.0f} m"
     if not math.isfinite(tightest):
         needs = f"at {speed:.0f} m/s the wind leaves no way around it"

@@ -4,7 +4,7 @@ import math
 
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import step
-from logs.verdict.measures.route_requirements import RouteDemands, slope_limit, steep_arc
+from logs.verdict.measures.route_requirements import RouteRequirements, slope_limit, steep_arc
 from logs.verdict.measures.slopes import LegFit, SlopeMeasure, measure_slope
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import Place
@@ -26,42 +26,44 @@ from logs.verdict.wording import place_text
 from world.wind import W20
 
 
-def slope_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def slope_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge each leg; ``geometric`` judges the route alone, without a flight."""
     out = []
-    for leg in range(demands.legs):
+    for leg in range(requirements.legs):
         measure = None if geometric else SlopeMeasure()
         if aligned is not None:
-            measure = measure_slope(demands, aligned, leg)
-        out.append(_judge(demands, leg, measure))
+            measure = measure_slope(requirements, aligned, leg)
+        out.append(_judge(requirements, leg, measure))
     return out
 
 
-def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Finding:
-    planned = float(demands.slopes[leg])
-    limit, source = slope_limit(demands, leg)
+def _judge(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> Finding:
+    planned = float(requirements.slopes[leg])
+    limit, source = slope_limit(requirements, leg)
     sign = 1.0 if planned >= 0.0 else -1.0
-    if abs(planned) <= LEVEL and not _in_envelope(demands, leg):
+    if abs(planned) <= LEVEL and not _in_envelope(requirements, leg):
         # A level leg at a speed that the aircraft cannot fly fails by its speed, not by its slope.
         limit = max(limit, LEVEL)
     faults, facts = [], [f"slope {math.degrees(planned):+.2f}°"]
     if abs(planned) > limit + PLAN_TOLERANCE:
-        rise = step(demands, leg)
+        rise = step(requirements, leg)
         if rise is None:
-            faults.append(_too_steep(demands, leg, limit, source))
+            faults.append(_too_steep(requirements, leg, limit, source))
         else:
             facts.append(f"a step of {rise:.1f} m, beyond {math.degrees(limit):.1f}°, flown within its own height")
-    faults += _steep_arc(demands, leg)
+    faults += _steep_arc(requirements, leg)
     fit: LegFit | None = None
     method = "route"
     if measure is not None:
         facts += _flown_facts(measure)
-        weak = _too_weak(demands, leg, measure)
-        shown = _shown(demands, leg, measure, limit, weak)
+        weak = _too_weak(requirements, leg, measure)
+        shown = _shown(requirements, leg, measure, limit, weak)
         # Where the aircraft's limits count they judge, and what it showed that it cannot; how closely it kept to the
         # leg is told beside.
-        facts += [one.brief for one in shown] if demands.envelope else []
-        faults += weak if demands.envelope else [*shown, *weak]
+        facts += [one.brief for one in shown] if requirements.envelope else []
+        faults += weak if requirements.envelope else [*shown, *weak]
         fit = measure.slope
         method = "not flown"
         if fit is not None:
@@ -74,7 +76,7 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
     judged = planned if fit is None else fit.value
     return make_finding(
         "slope",
-        demands.leg(leg),
+        requirements.leg(leg),
         ok=ok,
         reason=reason_of(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -86,60 +88,60 @@ def _judge(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> Fin
         margin=math.degrees(limit - sign * judged),
         unit="deg",
         method=method,
-        facts=_measured(demands, leg, measure),
+        facts=_measured(requirements, leg, measure),
     )
 
 
-def _steep_arc(demands: RouteDemands, leg: int) -> list[Message]:
+def _steep_arc(requirements: RouteRequirements, leg: int) -> list[Message]:
     """What the fly-by arc at a leg's end asks beyond the aircraft's limit."""
-    found = steep_arc(demands, leg)
+    found = steep_arc(requirements, leg)
     if found is None:
         return []
     i = leg + 1
-    place = demands.waypoint(i)
-    length = float(demands.radius[i]) * abs(float(demands.turns[i]))
+    place = requirements.waypoint(i)
+    length = float(requirements.radius[i]) * abs(float(requirements.turns[i]))
     verb = "climbs" if found.tangent > 0.0 else "falls"
-    legs = " and ".join(f"{math.degrees(abs(float(demands.slopes[k]))):.1f}°" for k in (leg, i))
+    legs = " and ".join(f"{math.degrees(abs(float(requirements.slopes[k]))):.1f}°" for k in (leg, i))
     slope, missing = math.degrees(math.atan(abs(found.tangent))), (abs(found.tangent) - found.limit) * length
     asks = (
         f"the arc at {place_text(place)} {verb} {slope:.1f}° for {length:.0f} m, where legs {leg} and {i} have {legs}:"
-        f" flown by, it is shorter than the {2.0 * float(demands.before[i]):.0f} m of leg that it replaces"
+        f" flown by, it is shorter than the {2.0 * float(requirements.before[i]):.0f} m of leg that it replaces"
     )
     limit = f"; the aircraft can {math.degrees(math.atan(found.limit)):.1f}° there, {missing:.0f} m less"
     # A headline names the waypoint, not its item.
     return [Message(asks + limit, asks if place.item is None else f"the arc at {place_text(Place('waypoint', i))}")]
 
 
-def _in_envelope(demands: RouteDemands, leg: int) -> bool:
-    low, high = demands.setup.envelope.level_speeds(float(demands.points[leg, 2]))
-    return low <= float(demands.route.airspeed[leg]) <= high
+def _in_envelope(requirements: RouteRequirements, leg: int) -> bool:
+    low, high = requirements.setup.envelope.level_speeds(float(requirements.points[leg, 2]))
+    return low <= float(requirements.route.airspeed[leg]) <= high
 
 
-def _too_steep(demands: RouteDemands, leg: int, limit: float, source: str) -> Message:
+def _too_steep(requirements: RouteRequirements, leg: int, limit: float, source: str) -> Message:
     """What is wrong with a planned slope: what the leg asks for, and what the limit is there."""
-    planned = float(demands.slopes[leg])
+    planned = float(requirements.slopes[leg])
     verb = "climbs" if planned >= 0.0 else "falls"
-    asks = f"{math.degrees(abs(planned)):.1f}° for {_distance(float(demands.runs[leg]))}"
-    if demands.runs[leg] < ON_THE_SPOT:
-        rise = abs(float(demands.points[leg + 1, 2] - demands.points[leg, 2]))
+    asks = f"{math.degrees(abs(planned)):.1f}° for {_distance(float(requirements.runs[leg]))}"
+    if requirements.runs[leg] < ON_THE_SPOT:
+        rise = abs(float(requirements.points[leg + 1, 2] - requirements.points[leg, 2]))
         asks = f"{round(rise, 1):g} m on the spot, {math.degrees(abs(planned)):.1f}°"
-    return message(f"leg {leg} {verb} {asks}", f"; {_allowed(demands, leg, limit, source)}", placed=True)
+    return message(f"leg {leg} {verb} {asks}", f"; {_allowed(requirements, leg, limit, source)}", placed=True)
 
 
-def _allowed(demands: RouteDemands, leg: int, limit: float, source: str) -> str:
+def _allowed(requirements: RouteRequirements, leg: int, limit: float, source: str) -> str:
     """The limit on a leg's slope, in words, and what the wind has to do with it."""
     if source == "scenario":
         return f"the scenario allows {math.degrees(limit):.1f}°"
-    speed = float(demands.route.airspeed[leg])
-    up = float(max(demands.points[leg, 2], demands.points[leg + 1, 2]))
+    speed = float(requirements.route.airspeed[leg])
+    up = float(max(requirements.points[leg, 2], requirements.points[leg + 1, 2]))
     at = f"at {speed:.0f} m/s and {up:.0f} m"
     if limit <= 0.0:
         return f"{at} the aircraft has no steady flight on this course"
-    wind = demands.setup.scenario.wind
-    tail, cross = wind.along(float(demands.courses[leg]), up)
+    wind = requirements.setup.scenario.wind
+    tail, cross = wind.along(float(requirements.courses[leg]), up)
     if math.hypot(tail, cross) < CALM:
         return f"{at} the aircraft can {math.degrees(limit):.1f}° in calm air"
-    calm = demands.setup.envelope.slope_limits(speed, up)[0 if demands.slopes[leg] >= 0.0 else 1]
+    calm = requirements.setup.envelope.slope_limits(speed, up)[0 if requirements.slopes[leg] >= 0.0 else 1]
     blows = f"{abs(tail):.0f} m/s {'tailwind' if tail > 0.0 else 'headwind'}"
     if abs(cross) > abs(tail):
         blows = f"{abs(cross):.0f} m/s crosswind"
@@ -167,23 +169,25 @@ def _flown_facts(measure: SlopeMeasure) -> list[str]:
     return facts
 
 
-def _measured(demands: RouteDemands, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
+def _measured(requirements: RouteRequirements, leg: int, measure: SlopeMeasure | None) -> list[Fact]:
     """How the leg was flown, in numbers."""
     if measure is None:
         return []
     facts = [] if measure.height_error is None else [Fact("height error", measure.height_error, "m")]
     if measure.slope is not None:
-        off = math.degrees(measure.slope.value - float(demands.slopes[leg]))
+        off = math.degrees(measure.slope.value - float(requirements.slopes[leg]))
         facts.append(Fact("slope error", off, "deg"))
     for name, held, off, way in _throttle_times(measure):
         facts += [Fact(f"throttle at {name}", held, "s"), Fact(f"too {way}", off, "m/s")] if held > 0.0 else []
     return facts
 
 
-def _shown(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]) -> list[Message]:
+def _shown(
+    requirements: RouteRequirements, leg: int, measure: SlopeMeasure, limit: float, weak: list[Message]
+) -> list[Message]:
     """How the leg as flown differs from the leg as planned.  weak: what it shows that the aircraft cannot."""
     faults = []
-    planned = float(demands.slopes[leg])
+    planned = float(requirements.slopes[leg])
     sign = 1.0 if planned >= 0.0 else -1.0
     fit = measure.slope
     if fit is not None:
@@ -198,7 +202,7 @@ def _shown(demands: RouteDemands, leg: int, measure: SlopeMeasure, limit: float,
             side = "above" if measure.height_error > 0.0 else "below"
             faults.append(message(f"{off:.0f} m {side} the leg"))
     covered = not weak and measure.ability is not None and measure.ability.covers(planned)
-    most = OFF_SPEED + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
+    most = OFF_SPEED + GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
     for name, held, off, way in _throttle_times(measure):
         # Where the aircraft showed that it can more than the leg asks, the air took the speed.
         if held >= SATURATED and off > most and not (covered and name == _throttle(planned)):
@@ -211,15 +215,15 @@ def _throttle(planned: float) -> str:
     return "full" if planned >= 0.0 else "idle"
 
 
-def _too_weak(demands: RouteDemands, leg: int, measure: SlopeMeasure) -> list[Message]:
+def _too_weak(requirements: RouteRequirements, leg: int, measure: SlopeMeasure) -> list[Message]:
     """What is wrong where the aircraft showed a smaller limit than the leg asks for."""
-    ability, planned = measure.ability, float(demands.slopes[leg])
+    ability, planned = measure.ability, float(requirements.slopes[leg])
     if ability is None or abs(planned) <= LEVEL:
         return []
     if ability.slope - abs(planned) >= -SHOWN_TOLERANCE - SURE * ability.error:
         return []
     verb = "climb" if planned >= 0.0 else "sink"
-    speed = float(demands.route.airspeed[leg])
+    speed = float(requirements.route.airspeed[leg])
     return [
         message(
             f"in {ability.seconds:.0f} s at {_throttle(planned)} throttle the aircraft showed that it can {verb}"

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flight.autopilots.arduplane.parameters import takes_speed
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.slopes import measure_ability, steady_rows
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.tolerances import (
@@ -27,19 +27,21 @@ from world.wind import W20
 Floats = NDArray[np.float64]
 
 
-def speed_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def speed_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge each leg's commanded airspeed by the envelope, and say what was flown."""
-    return [_speed(demands, aligned, leg, geometric) for leg in range(demands.legs)]
+    return [_speed(requirements, aligned, leg, geometric) for leg in range(requirements.legs)]
 
 
-def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
-    commanded = float(demands.route.airspeed[leg])
-    slowest, fastest, faults = _commanded(demands, leg, commanded)
-    asked = float(demands.setup.route.airspeed[leg])
+def _speed(requirements: RouteRequirements, aligned: AlignedTrack | None, leg: int, geometric: bool) -> Finding:
+    commanded = float(requirements.route.airspeed[leg])
+    slowest, fastest, faults = _commanded(requirements, leg, commanded)
+    asked = float(requirements.setup.route.airspeed[leg])
     true = "" if asked == commanded else f" of equivalent airspeed, {commanded:.1f} m/s of true airspeed,"
     said = [f"{asked:.1f} m/s{true} commanded of {slowest:.1f} to {fastest:.1f} m/s in level flight"]
-    said += _not_taken(demands, asked)
-    said += _no_room(demands, leg, commanded)
+    said += _not_taken(requirements, asked)
+    said += _no_room(requirements, leg, commanded)
     margin = min(commanded - slowest, fastest - commanded)
     limit = slowest if commanded - slowest <= fastest - commanded else fastest
     mean, tolerance, facts = math.nan, 0.0, []
@@ -47,7 +49,7 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     if unflown:
         said.append("the leg was not flown")
     elif aligned is not None:
-        measured = _measured(demands, aligned, leg)
+        measured = _measured(requirements, aligned, leg)
         if measured is None:
             mean = _reached(aligned, leg, commanded)
             said.append(f"{mean:.1f} m/s reached; the leg is too short to hold it")
@@ -55,15 +57,15 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
             mean, tolerance, least = measured
             off = abs(mean - commanded)
             said.append(f"flown {mean:.2f} m/s on average, {least:.1f} m/s at the slowest second")
-            if off > OFF_MEAN + tolerance and not _by_the_air(demands, aligned, leg, mean - commanded):
+            if off > OFF_MEAN + tolerance and not _by_the_air(requirements, aligned, leg, mean - commanded):
                 text = f"flown {mean:.1f} m/s on average, {off:.1f} m/s off the commanded {commanded:.1f} m/s"
-                said += [text] if demands.envelope else []
-                faults += [] if demands.envelope else [message(text)]
+                said += [text] if requirements.envelope else []
+                faults += [] if requirements.envelope else [message(text)]
         facts.append(Fact("speed error", mean - commanded, "m/s"))
     ok: bool | None = not faults
     return make_finding(
         "speed",
-        demands.leg(leg),
+        requirements.leg(leg),
         ok=None if ok and unflown else ok,
         reason=reason_of(faults, said),
         faults=faults,
@@ -79,22 +81,22 @@ def _speed(demands: RouteDemands, aligned: AlignedTrack | None, leg: int, geomet
     )
 
 
-def _not_taken(demands: RouteDemands, asked: float) -> list[str]:
+def _not_taken(requirements: RouteRequirements, asked: float) -> list[str]:
     """That ArduPlane does not take a commanded speed (m/s, equivalent)."""
-    parameters = demands.setup.parameters
+    parameters = requirements.setup.parameters
     if parameters is None or takes_speed(asked, parameters):
         return []
     least, most = parameters.airspeed_min, parameters.airspeed_max
     return [f"ArduPlane takes speeds from AIRSPEED_MIN {least:g} to AIRSPEED_MAX {most:g} m/s, and ignores this one"]
 
 
-def _no_room(demands: RouteDemands, leg: int, commanded: float) -> list[str]:
+def _no_room(requirements: RouteRequirements, leg: int, commanded: float) -> list[str]:
     """What a leg has no room for: to take up its speed at `ACCELERATION` from that of the leg before."""
-    before = float(demands.route.airspeed[leg - 1]) if leg else commanded
-    change, run = commanded - before, float(demands.runs[leg])
+    before = float(requirements.route.airspeed[leg - 1]) if leg else commanded
+    change, run = commanded - before, float(requirements.runs[leg])
     seconds = abs(change) / ACCELERATION
     # Along the ground at the mean of both speeds, in the wind along the leg.
-    start = float(demands.ground_speed[leg]) - change
+    start = float(requirements.ground_speed[leg]) - change
     needs = seconds * (start + 0.5 * change)
     if not needs > run or not start > 0.0:
         return []
@@ -121,21 +123,21 @@ def _second_means(aligned: AlignedTrack, rows: slice) -> Floats:
     return np.asarray((total[width:] - total[:-width]) / width)
 
 
-def _by_the_air(demands: RouteDemands, aligned: AlignedTrack, leg: int, off: float) -> bool:
+def _by_the_air(requirements: RouteRequirements, aligned: AlignedTrack, leg: int, off: float) -> bool:
     """Whether rising or sinking air took the speed on a leg where the aircraft showed that it can more than it asks."""
-    if off * demands.slopes[leg] >= 0.0:
+    if off * requirements.slopes[leg] >= 0.0:
         return False
-    ability = measure_ability(demands, aligned, leg)
-    return ability is not None and ability.covers(float(demands.slopes[leg]))
+    ability = measure_ability(requirements, aligned, leg)
+    return ability is not None and ability.covers(float(requirements.slopes[leg]))
 
 
-def _commanded(demands: RouteDemands, leg: int, commanded: float) -> tuple[float, float, list[Message]]:
+def _commanded(requirements: RouteRequirements, leg: int, commanded: float) -> tuple[float, float, list[Message]]:
     """Level-flight speeds that hold all along a leg, and what is wrong with the commanded one."""
-    heights = (float(demands.points[leg, 2]), float(demands.points[leg + 1, 2]))
-    speeds = [demands.setup.envelope.level_speeds(up) for up in heights]
+    heights = (float(requirements.points[leg, 2]), float(requirements.points[leg + 1, 2]))
+    speeds = [requirements.setup.envelope.level_speeds(up) for up in heights]
     slowest, fastest = max(low for low, _ in speeds), min(high for _, high in speeds)
     faults = []
-    if math.isnan(demands.ground_speed[leg]):
+    if math.isnan(requirements.ground_speed[leg]):
         faults.append(message(f"the wind leaves no way along leg {leg} at {commanded:.0f} m/s"))
     top = max(heights)
     if commanded < slowest:
@@ -147,16 +149,16 @@ def _commanded(demands: RouteDemands, leg: int, commanded: float) -> tuple[float
     return slowest, fastest, faults
 
 
-def _measured(demands: RouteDemands, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
+def _measured(requirements: RouteRequirements, aligned: AlignedTrack, leg: int) -> tuple[float, float, float] | None:
     """Mean airspeed of a flown leg, what gusts and a new slope may add to it, and the least mean over a second, m/s."""
-    rows = steady_rows(demands, aligned, leg)
+    rows = steady_rows(requirements, aligned, leg)
     time = aligned.track.time[rows]
-    if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(demands.runs[leg]) / SLOWEST):
+    if time.size < 2 or time[-1] - time[0] < min(SATURATED, MEASURED_SHARE * float(requirements.runs[leg]) / SLOWEST):
         return None
     speed = aligned.track.airspeed[rows].astype(np.float64)
     lasts = float(time[-1] - time[0])
-    gust = GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
+    gust = GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
     least = float(_second_means(aligned, rows).min())
     spread = GUST_SIGMAS * gust * math.sqrt(min(1.0, 2.0 * GUST_TIME / max(lasts, 1e-3)))
-    steepened = leg > 0 and abs(float(demands.slopes[leg] - demands.slopes[leg - 1])) > LEVEL
+    steepened = leg > 0 and abs(float(requirements.slopes[leg] - requirements.slopes[leg - 1])) > LEVEL
     return float(speed.mean()), spread + (TAKE_UP / lasts if steepened else 0.0), least

@@ -16,7 +16,7 @@ from aircraft.envelope import GRAVITY
 from aircraft.path_limits import ROLL_TIME
 from flight.simulation.track import ROLL
 from logs.verdict.findings import Finding, make_finding, message
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT
 from logs.verdict.tolerances import GUST_SHARE, STALL_MEAN, STALL_TOLERANCE
@@ -40,25 +40,30 @@ class _Margin:
         return self.speed - self.stall
 
 
-def stall_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def stall_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """One finding: the least margin of airspeed over the stall in a bank; none for a route without a turn.
 
     A route that asks for a bank in which its speed is below the stall fails in flight too, at whatever speed it was
     flown: an autopilot that did not take the speed, or banked less, does not make it one to fly.
     """
-    planned = _planned(demands)
+    planned = _planned(requirements)
     if geometric:
         return planned
     if aligned is None:
         return []
-    return [found for found in planned if found.ok is False] or _flown(demands, aligned)
+    return [found for found in planned if found.ok is False] or _flown(requirements, aligned)
 
 
-def _planned(demands: RouteDemands) -> list[Finding]:
+def _planned(requirements: RouteRequirements) -> list[Finding]:
     worst: tuple[float, int, _Margin] | None = None
-    for i in range(1, demands.legs):
-        for speed in demands.route.airspeed[i - 1 : i + 1].tolist():
-            bank, level = planned_bank(demands, i, speed), level_stall(demands, float(demands.points[i, 2]))
+    for i in range(1, requirements.legs):
+        for speed in requirements.route.airspeed[i - 1 : i + 1].tolist():
+            bank, level = (
+                planned_bank(requirements, i, speed),
+                level_stall(requirements, float(requirements.points[i, 2])),
+            )
             found = _Margin(speed, level / math.sqrt(math.cos(bank)), level, bank)
             if bank > 0.0 and math.isfinite(level) and (worst is None or found.left < worst[0]):
                 worst = found.left, i, found
@@ -68,46 +73,46 @@ def _planned(demands: RouteDemands) -> list[Finding]:
     return [_finding(found, f"at waypoint {i}", 0.0, geometric=True)]
 
 
-def planned_bank(demands: RouteDemands, i: int, speed: float) -> float:
+def planned_bank(requirements: RouteRequirements, i: int, speed: float) -> float:
     """Bank (rad) that the turn at a waypoint takes at an airspeed (m/s) of its two legs, at most the bank limit.
 
     On an arc of radius R it is atan(v^2 / (g R)) at the highest ground speed v on the way, and a turn that is over
     before the aircraft has rolled into it takes no more than it can roll to.
     """
-    turn, radius, limit = abs(float(demands.turns[i])), float(demands.radius[i]), demands.limits.max_bank
+    turn, radius, limit = abs(float(requirements.turns[i])), float(requirements.radius[i]), requirements.limits.max_bank
     if turn <= 0.0 or not math.isfinite(radius):
         return 0.0
     # The bank limit's radius is that of the faster leg's ground speed.
-    fastest = math.sqrt(float(demands.tightest[i]) * GRAVITY * math.tan(limit))
-    slower = max(demands.route.airspeed[i - 1 : i + 1]) - speed
+    fastest = math.sqrt(float(requirements.tightest[i]) * GRAVITY * math.tan(limit))
+    slower = max(requirements.route.airspeed[i - 1 : i + 1]) - speed
     bank = math.atan(max(0.0, fastest - slower) ** 2 / (GRAVITY * radius))
     # Rolling in and out again at 1 / ROLL_TIME turns by (g / v) ROLL_TIME bank^2.
     rolled = math.sqrt(turn * speed / (GRAVITY * ROLL_TIME))
     return min(bank, rolled, limit)
 
 
-def level_stall(demands: RouteDemands, up: float) -> float:
+def level_stall(requirements: RouteRequirements, up: float) -> float:
     """Slowest level flight at a height (m AMSL), m/s true: the elevator is at its stop there."""
-    return demands.setup.envelope.level_speeds(up)[0]
+    return requirements.setup.envelope.level_speeds(up)[0]
 
 
-def _flown(demands: RouteDemands, aligned: AlignedTrack) -> list[Finding]:
+def _flown(requirements: RouteRequirements, aligned: AlignedTrack) -> list[Finding]:
     track = aligned.track
     width = max(1, min(len(track), round(STALL_MEAN / aligned.tick)))
     speed, load = _means(track.airspeed, width), _means(track.load_factor, width)
     bank = _means(np.abs(track.attitude[:, ROLL]), width)
     up = _means(track.position[:, 2], width)
-    envelope = demands.setup.envelope
+    envelope = requirements.setup.envelope
     level = np.interp(up, envelope.amsl, envelope.level_speed_min)
     # What the wing carried, or what it had to carry for the height to be held in a turn within the bank limit.
     # A log of the field may hold no load factor.
-    carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, demands.limits.max_bank)))
+    carried = np.fmax(load, 1.0 / np.cos(np.minimum(bank, requirements.limits.max_bank)))
     stall = level * np.sqrt(np.maximum(carried, 0.0))
     margin = speed - stall
     if not np.isfinite(margin).any():
         return []
     k = int(np.nanargmin(margin))
-    tolerance = STALL_TOLERANCE + GUST_SHARE * W20[demands.setup.scenario.wind.turbulence]
+    tolerance = STALL_TOLERANCE + GUST_SHARE * W20[requirements.setup.scenario.wind.turbulence]
     found = _Margin(float(speed[k]), float(stall[k]), float(level[k]), float(bank[k]))
     return [_finding(found, f"at {track.time[k + width // 2]:.1f} s", tolerance, geometric=False)]
 

@@ -9,7 +9,7 @@ import math
 
 from flight.mission.items import LANDINGS, TAKEOFFS, command_name
 from logs.verdict.findings import Finding, make_finding, message
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.tolerances import PLAN_TOLERANCE
 
 # How the flight does it instead.
@@ -18,55 +18,55 @@ _ENDS = {"takeoff": "begins", "landing": "ends"}
 _BEYOND = {"takeoff": None, "landing": False}
 
 
-def takeoff_landing_findings(demands: RouteDemands) -> list[Finding]:
+def takeoff_landing_findings(requirements: RouteRequirements) -> list[Finding]:
     """One finding for the take-off and one for the landing, of a mission that has them."""
-    return [*_takeoff(demands), *_landing(demands)]
+    return [*_takeoff(requirements), *_landing(requirements)]
 
 
-def _takeoff(demands: RouteDemands) -> list[Finding]:
+def _takeoff(requirements: RouteRequirements) -> list[Finding]:
     """Climb from the ground at home to where the take-off item has its place."""
-    route, mission = demands.setup.route, demands.setup.mission
+    route, mission = requirements.setup.route, requirements.setup.mission
     items = [item for item in mission.items if item.command in TAKEOFFS]
-    at = _waypoint_of(demands, items[0].seq) if items else -1
+    at = _waypoint_of(requirements, items[0].seq) if items else -1
     # One in the air is a waypoint like any other.
     if at < 0 or (route.items[:at] >= 0).any():
         return []
-    up, home = float(demands.points[at, 2]), mission.home
+    up, home = float(requirements.points[at, 2]), mission.home
     own = home is not None and (items[0].lat_deg, items[0].lon_deg) != (home.lat_deg, home.lon_deg)
     if at == 0 or not own:
         reason = f"to {up:.0f} m AMSL over home, on a course that is the autopilot's to choose"
-        return [make_finding("takeoff", demands.waypoint(at), ok=None, reason=reason, unit="deg")]
+        return [make_finding("takeoff", requirements.waypoint(at), ok=None, reason=reason, unit="deg")]
     # From home, over which the flight starts: `at` is the take-off item's own place.
-    return [_slope(demands, "takeoff", 0, at, route.takeoff_ground, up)]
+    return [_slope(requirements, "takeoff", 0, at, route.takeoff_ground, up)]
 
 
-def _landing(demands: RouteDemands) -> list[Finding]:
+def _landing(requirements: RouteRequirements) -> list[Finding]:
     """Descent from the last place before the landing to where it is."""
-    items = [item for item in demands.setup.mission.items if item.command in LANDINGS]
-    found = [at for item in items if (at := _waypoint_of(demands, item.seq)) > 0]
+    items = [item for item in requirements.setup.mission.items if item.command in LANDINGS]
+    found = [at for item in items if (at := _waypoint_of(requirements, item.seq)) > 0]
     if not found:
         if not items:
             return []
         reason = f"{command_name(items[-1].command)} has no place of its own on the route"
-        return [make_finding("landing", demands.waypoint(demands.legs), ok=None, reason=reason, unit="deg")]
-    at, ground = found[-1], demands.setup.route.landing_ground
-    return [_slope(demands, "landing", at - 1, at, float(demands.points[at - 1, 2]), ground)]
+        return [make_finding("landing", requirements.waypoint(requirements.legs), ok=None, reason=reason, unit="deg")]
+    at, ground = found[-1], requirements.setup.route.landing_ground
+    return [_slope(requirements, "landing", at - 1, at, float(requirements.points[at - 1, 2]), ground)]
 
 
-def _waypoint_of(demands: RouteDemands, seq: int) -> int:
+def _waypoint_of(requirements: RouteRequirements, seq: int) -> int:
     """The last waypoint of a mission's item, -1 for none."""
-    found = [k for k, item in enumerate(demands.setup.route.items) if int(item) == seq]
+    found = [k for k, item in enumerate(requirements.setup.route.items) if int(item) == seq]
     return found[-1] if found else -1
 
 
-def _slope(demands: RouteDemands, rule: str, first: int, last: int, low: float, high: float) -> Finding:
+def _slope(requirements: RouteRequirements, rule: str, first: int, last: int, low: float, high: float) -> Finding:
     """Judge the slope from the place of one waypoint to that of another, between two heights (m AMSL)."""
-    place = demands.waypoint(last)
-    run = float(demands.runs[first:last].sum())
+    place = requirements.waypoint(last)
+    run = float(requirements.runs[first:last].sum())
     if math.isnan(low) or math.isnan(high):
         return make_finding(rule, place, ok=None, reason="the height of the ground there is not known", unit="deg")
     slope = math.atan2(high - low, run)
-    limit, source = _limit(demands, first, low, high, slope)
+    limit, source = _limit(requirements, first, low, high, slope)
     verb = "climbs" if slope >= 0.0 else "sinks"
     text = f"{verb} {abs(high - low):.0f} m in {run:.0f} m, {math.degrees(abs(slope)):.1f}°"
     within = abs(slope) <= limit + PLAN_TOLERANCE
@@ -89,10 +89,10 @@ def _slope(demands: RouteDemands, rule: str, first: int, last: int, low: float, 
     )
 
 
-def _limit(demands: RouteDemands, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
+def _limit(requirements: RouteRequirements, leg: int, low: float, high: float, slope: float) -> tuple[float, str]:
     """Steepest slope of this sign over the ground on a leg's course (rad), and whose it is."""
-    side, limits = (0 if slope >= 0.0 else 1), demands.limits
-    speed, course = float(demands.route.airspeed[leg]), float(demands.courses[leg])
+    side, limits = (0 if slope >= 0.0 else 1), requirements.limits
+    speed, course = float(requirements.route.airspeed[leg]), float(requirements.courses[leg])
     by_aircraft = min(limits.slopes(course, up, speed)[side] for up in (low, high))
     by_scenario = (limits.max_climb, limits.max_dive)[side]
     if by_scenario is not None and by_scenario < by_aircraft:

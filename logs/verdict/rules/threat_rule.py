@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from logs.verdict.findings import Fact, Finding, make_finding
 from logs.verdict.measures.acceptance import position_error
 from logs.verdict.measures.path_sweeps import SphereVisits, path_spheres
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.places import FLIGHT, Place
 from world.threats import Threats, threat_label
@@ -21,9 +21,11 @@ Side = Literal["missile", "radar"]
 _METHOD = "time inside, exact on each segment"
 
 
-def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def threat_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge each missile and radar sphere that plan or flight touches, or say that there is none."""
-    scenario = demands.setup.scenario
+    scenario = requirements.setup.scenario
     if scenario.external:
         reason = "the mission came without a scenario, so threats are not known"
         return [make_finding("threat", FLIGHT, ok=None, reason=reason, unit="s")]
@@ -32,7 +34,7 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
     nearest, name = math.inf, ""
     for side in ("missile", "radar"):
         radii, scales = _spheres(threats, side)
-        plan = path_spheres(demands.path.points, demands.path.times, threats.position, radii, scales)
+        plan = path_spheres(requirements.path.points, requirements.path.times, threats.position, radii, scales)
         track = None
         if aligned is not None:
             track = path_spheres(aligned.track.position, aligned.track.time, threats.position, radii, scales)
@@ -49,7 +51,7 @@ def threat_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geom
                 place = Place(side, m, name=table.name or "")
                 touched.append(_touched(place, _visit(plan, m), visit, float(radii[m])))
     if not any(item.place.kind == "missile" for item in touched):
-        error = position_error(demands.setup)
+        error = position_error(requirements.setup)
         touched.insert(0, _untouched(len(threats), nearest, name, error, aligned is not None or geometric))
     return touched
 

@@ -5,8 +5,8 @@ import math
 from flight.guidance.navigation_error import ERRORS
 from flight.guidance.path import SHARPEST
 from logs.verdict.findings import Fact, Finding, Message, make_finding, message, reason_of
-from logs.verdict.measures.acceptance import jog
-from logs.verdict.measures.route_requirements import RouteDemands, turn_limit
+from logs.verdict.measures.acceptance import negligible_kink
+from logs.verdict.measures.route_requirements import RouteRequirements, turn_limit
 from logs.verdict.measures.track_alignment import AlignedTrack
 from logs.verdict.measures.turns import TurnMeasure, measure_turns
 from logs.verdict.tolerances import (
@@ -24,39 +24,41 @@ from logs.verdict.tolerances import (
 from world.geometry import fly_by_offset
 
 
-def turn_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def turn_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge each inner waypoint; ``geometric`` judges the route alone, without a flight."""
-    measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (demands.legs - 1)
+    measures: list[TurnMeasure | None] = [None if geometric else TurnMeasure()] * (requirements.legs - 1)
     if aligned is not None:
-        measures = [*measure_turns(demands, aligned)]
-    return [_judge(demands, i, measure) for i, measure in enumerate(measures, 1)]
+        measures = [*measure_turns(requirements, aligned)]
+    return [_judge(requirements, i, measure) for i, measure in enumerate(measures, 1)]
 
 
-def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Finding:
-    planned = abs(float(demands.turns[i]))
-    limit, source = turn_limit(demands, i)
-    if demands.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
+def _judge(requirements: RouteRequirements, i: int, measure: TurnMeasure | None) -> Finding:
+    planned = abs(float(requirements.turns[i]))
+    limit, source = turn_limit(requirements, i)
+    if requirements.runs[i - 1 : i + 1].min() < ON_THE_SPOT:
         reason = "a leg beside it goes straight up or down, which has no course to turn from or to"
-        return make_finding("turn", demands.waypoint(i), ok=None, reason=reason, unit="deg")
+        return make_finding("turn", requirements.waypoint(i), ok=None, reason=reason, unit="deg")
     faults, facts = (
         [],
         [f"turns {math.degrees(planned):.1f}°" + (f" of {math.degrees(limit):.1f}°" if math.isfinite(limit) else "")],
     )
     if planned > limit + PLAN_TOLERANCE:
-        beside = jog(demands, i)
+        beside = negligible_kink(requirements, i)
         if beside is None:
-            faults.append(_too_sharp(demands, i, planned, limit, source))
+            faults.append(_too_sharp(requirements, i, planned, limit, source))
         else:
-            facts.append(f"a jog: the way without it passes it at {beside:.1f} m and can be flown")
-    facts += _flown_over(demands, i, planned)
+            facts.append(f"a negligible kink: the way without it passes it at {beside:.1f} m and can be flown")
+    facts += _flown_over(requirements, i, planned)
     method, angle, tolerance = "route", None, PLAN_TOLERANCE
     if measure is not None:
         angle, tolerance = measure.angle, measure.tolerance or PLAN_TOLERANCE
-        facts += _flown_facts(demands, i, measure)
-        shown = _shown(demands, i, measure, limit)
+        facts += _flown_facts(requirements, i, measure)
+        shown = _shown(requirements, i, measure, limit)
         # Where the aircraft's limits count they judge; what the flight showed of them is told beside.
-        facts += [one.brief for one in shown] if demands.envelope else []
-        faults += [] if demands.envelope else shown
+        facts += [one.brief for one in shown] if requirements.envelope else []
+        faults += [] if requirements.envelope else shown
         method = "least-squares courses of both legs" if measure.fitted else "course change over the turn"
         if angle is None:
             method = "not flown"
@@ -66,7 +68,7 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
         ok = None if ok else False
     return make_finding(
         "turn",
-        demands.waypoint(i),
+        requirements.waypoint(i),
         ok=ok,
         reason=reason_of(faults, facts if measure is not None or not faults else ()),
         faults=faults,
@@ -82,10 +84,10 @@ def _judge(demands: RouteDemands, i: int, measure: TurnMeasure | None) -> Findin
     )
 
 
-def _flown_over(demands: RouteDemands, i: int, turn: float) -> list[str]:
+def _flown_over(requirements: RouteRequirements, i: int, turn: float) -> list[str]:
     """That a waypoint is flown over because its arc would miss its acceptance, and what that takes."""
-    radius, acceptance = float(demands.radius[i]), float(demands.setup.route.acceptance[i])
-    if not demands.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
+    radius, acceptance = float(requirements.radius[i]), float(requirements.setup.route.acceptance[i])
+    if not requirements.setup.route.fly_over[i] or not acceptance or not math.isfinite(radius):
         return []
     offset = fly_by_offset(turn, radius)
     if offset <= acceptance:
@@ -97,40 +99,41 @@ def _flown_over(demands: RouteDemands, i: int, turn: float) -> list[str]:
     ]
 
 
-def _too_sharp(demands: RouteDemands, i: int, planned: float, limit: float, source: str) -> Message:
+def _too_sharp(requirements: RouteRequirements, i: int, planned: float, limit: float, source: str) -> Message:
     sharp = f"turns {math.degrees(planned):.1f}°"
     if source == "scenario":
         return message(f"{sharp}, beyond the scenario's {math.degrees(limit):.1f}°")
-    speed, bank = float(max(demands.route.airspeed[i - 1 : i + 1])), math.degrees(demands.limits.max_bank)
-    radius = float(demands.radius[i])
+    speed, bank = float(max(requirements.route.airspeed[i - 1 : i + 1])), math.degrees(requirements.limits.max_bank)
+    radius = float(requirements.radius[i])
     if not math.isfinite(radius):
         return message(f"{sharp} where the wind leaves no way along a leg at {speed:.0f} m/s")
-    if demands.setup.route.arcs[i] > 0.0:
+    if requirements.setup.route.arcs[i] > 0.0:
         return message(
             f"circles with radius {radius:.0f} m",
-            f"; at {speed:.0f} m/s and {bank:.0f}° bank the aircraft turns with {demands.tightest[i]:.0f} m on these"
-            " courses in this wind",
+            f"; at {speed:.0f} m/s and {bank:.0f}° bank the aircraft turns with {requirements.tightest[i]:.0f} m on"
+            " these courses in this wind",
         )
     takes = "no length of leg is enough"
-    if math.isfinite(demands.after[i]):
-        takes = f"that takes {demands.after[i]:.0f} m of each leg"
-        if demands.setup.route.fly_over[i]:
-            takes = f"flying over it takes {demands.after[i]:.0f} m of the next leg"
+    if math.isfinite(requirements.after[i]):
+        takes = f"that takes {requirements.after[i]:.0f} m of each leg"
+        if requirements.setup.route.fly_over[i]:
+            takes = f"flying over it takes {requirements.after[i]:.0f} m of the next leg"
+    before, after = requirements.runs[i - 1], requirements.runs[i]
+    fits = f"its neighbours leave room for {math.degrees(limit):.1f}°" if limit > 0.0 else "no turn fits"
     return message(
-        f"{sharp} between legs of {demands.runs[i - 1]:.0f} m and {demands.runs[i]:.0f} m: at {speed:.0f} m/s and"
-        f" {bank:.0f}° bank",
-        f" (radius {radius:.0f} m) {takes}, and beside its neighbours there is room for {math.degrees(limit):.1f}°",
+        f"{sharp} between legs of {before:.0f} m and {after:.0f} m: at {speed:.0f} m/s and {bank:.0f}° bank",
+        f" (radius {radius:.0f} m) {takes}, and {fits}",
     )
 
 
-def _flown_facts(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[str]:
+def _flown_facts(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[str]:
     """How the turn was flown, in words."""
     facts = []
     if measure.angle is not None and measure.tolerance is not None:
         facts.append(f"flown {math.degrees(measure.angle):.2f}°")
     if measure.peak_bank is not None and measure.held_bank is not None:
         facts.append(f"bank up to {math.degrees(measure.peak_bank):.1f}°")
-    if measure.radius is not None and measure.radius < STRAIGHT * demands.radius[i]:
+    if measure.radius is not None and measure.radius < STRAIGHT * requirements.radius[i]:
         facts.append(f"radius {measure.radius:.0f} m")
     if measure.corner is not None:
         facts.append(f"nearest pass {measure.corner.nearest:.1f} m, at {measure.corner.time:.1f} s")
@@ -158,22 +161,22 @@ def _measured(measure: TurnMeasure | None) -> list[Fact]:
     return [Fact(what, value, unit) for what, value, unit in numbers if value is not None]
 
 
-def _shown(demands: RouteDemands, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
+def _shown(requirements: RouteRequirements, i: int, measure: TurnMeasure, limit: float) -> list[Message]:
     """What the turn as flown shows of a limit: more angle or bank than allowed, a tighter arc, a turn gone wide."""
     faults = []
     if measure.angle is not None and measure.tolerance is not None and measure.angle > limit + measure.tolerance:
         flown, most = math.degrees(measure.angle), math.degrees(limit)
         faults.append(message(f"flown course change {flown:.1f}° beyond {most:.1f}°"))
-    most_bank = demands.limits.max_bank + BANK_TOLERANCE
+    most_bank = requirements.limits.max_bank + BANK_TOLERANCE
     # The roll of a gust, or into a turn, is not the turn's: the mean over a second counts.
     if measure.held_bank is not None and measure.held_bank > most_bank:
         held, most = math.degrees(measure.held_bank), math.degrees(most_bank)
         faults.append(message(f"bank {held:.1f}° beyond {most:.1f}°"))
-    faults += _too_tight(demands, i, measure)
+    faults += _too_tight(requirements, i, measure)
     if measure.overshoot is not None and measure.overshoot > OVERSHOOT:
         past = "its arc" if measure.corner is None else "its next leg"
         faults.append(message(f"overshoots {past} by {measure.overshoot:.0f} m", f" (at most {OVERSHOOT:.0f} m)"))
-    most = SETTLED + GUST_OFFSET[demands.setup.scenario.wind.turbulence]
+    most = SETTLED + GUST_OFFSET[requirements.setup.scenario.wind.turbulence]
     if measure.settled is not None and measure.over and measure.settled > most:
         off = f"still {measure.settled:.1f} m off the next leg at its end"
         faults.append(message(off, f" (at most {most:.1f} m)"))
@@ -182,14 +185,14 @@ def _shown(demands: RouteDemands, i: int, measure: TurnMeasure, limit: float) ->
     return faults
 
 
-def _too_tight(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[Message]:
+def _too_tight(requirements: RouteRequirements, i: int, measure: TurnMeasure) -> list[Message]:
     """What is wrong with a turn flown tighter than the bank limit's arc, by how closely it passed its waypoint.
 
     Legs too short for their turn are joined by a tighter arc, and a flight that follows it has used bank that it does
     not have, or slowed down.
     """
-    turn, setup = abs(float(demands.turns[i])), demands.setup
-    tightest = float(demands.tightest[i])
+    turn, setup = abs(float(requirements.turns[i])), requirements.setup
+    tightest = float(requirements.tightest[i])
     # Guidance's own limit: a corner sharper than it has no arc to be held to where its legs are short.
     least = fly_by_offset(turn, tightest) if turn < SHARPEST else math.inf
     # Another's autopilot does not follow the arc, and passes the waypoint as closely as it likes.
@@ -204,7 +207,7 @@ def _too_tight(demands: RouteDemands, i: int, measure: TurnMeasure) -> list[Mess
     return [
         message(
             f"flown with a radius of {radius:.0f} m, {measure.passed:.1f} m from its waypoint",
-            f"; at {math.degrees(demands.limits.max_bank):.0f}° bank in this wind it is {tightest:.0f} m, and"
+            f"; at {math.degrees(requirements.limits.max_bank):.0f}° bank in this wind it is {tightest:.0f} m, and"
             f" {least:.1f} m from it",
         )
     ]

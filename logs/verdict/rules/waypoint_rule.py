@@ -12,31 +12,33 @@ from numpy.typing import NDArray
 
 from logs.verdict.findings import Fact, Finding, make_finding, message, reason_of
 from logs.verdict.measures.acceptance import Reach, reach
-from logs.verdict.measures.route_requirements import RouteDemands
+from logs.verdict.measures.route_requirements import RouteRequirements
 from logs.verdict.measures.track_alignment import AlignedTrack, along_across, approaches
 from logs.verdict.tolerances import EQUALLY_CLOSE, ROUNDING
 
 Floats = NDArray[np.float64]
 
 
-def waypoint_findings(demands: RouteDemands, aligned: AlignedTrack | None, *, geometric: bool = False) -> list[Finding]:
+def waypoint_findings(
+    requirements: RouteRequirements, aligned: AlignedTrack | None, *, geometric: bool = False
+) -> list[Finding]:
     """Judge how close the track came to each waypoint; ``geometric``: how close the planned path passes."""
     if geometric:
-        return [_planned(demands, i) for i in range(len(demands.points))]
-    apexes = demands.apexes()
-    return [_flown(demands, aligned, i, apexes) for i in range(len(demands.points))]
+        return [_planned(requirements, i) for i in range(len(requirements.points))]
+    apexes = requirements.apexes()
+    return [_flown(requirements, aligned, i, apexes) for i in range(len(requirements.points))]
 
 
-def _planned(demands: RouteDemands, i: int) -> Finding:
+def _planned(requirements: RouteRequirements, i: int) -> Finding:
     """Whether the fly-by arc at a waypoint passes it within what counts as reached."""
-    near, offset = reach(demands, i), float(demands.fly_by_offset[i])
+    near, offset = reach(requirements, i), float(requirements.fly_by_offset[i])
     faults, fact = [], f"the fly-by path passes at {offset:.0f} m"
-    if demands.setup.route.fly_over[i]:
+    if requirements.setup.route.fly_over[i]:
         fact = "flown over"
-    elif demands.setup.parameters is not None:
+    elif requirements.setup.parameters is not None:
         fact = f"ArduPlane turns to the next leg {near.radius:.0f} m before it, or where it is past it"
     elif offset > near.radius + ROUNDING:
-        turn, radius = math.degrees(abs(float(demands.turns[i]))), float(demands.radius[i])
+        turn, radius = math.degrees(abs(float(requirements.turns[i]))), float(requirements.radius[i])
         faults.append(
             message(
                 f"the arc of its {turn:.0f}° corner passes it at {offset:.0f} m",
@@ -45,7 +47,7 @@ def _planned(demands: RouteDemands, i: int) -> Finding:
         )
     return make_finding(
         "waypoint",
-        demands.waypoint(i),
+        requirements.waypoint(i),
         ok=not faults,
         reason=reason_of(faults) if faults else fact,
         faults=faults,
@@ -53,22 +55,22 @@ def _planned(demands: RouteDemands, i: int) -> Finding:
         limit=near.radius,
         source=near.source,
         tolerance=ROUNDING,
-        margin=near.radius - offset if demands.setup.parameters is None else None,
+        margin=near.radius - offset if requirements.setup.parameters is None else None,
         unit="m",
         method="the fly-by arc",
     )
 
 
-def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
-    near, setup = reach(demands, i), demands.setup
-    offset, most = float(demands.fly_by_offset[i]), near.radius + near.tolerance
+def _flown(requirements: RouteRequirements, aligned: AlignedTrack | None, i: int, apexes: Floats) -> Finding:
+    near, setup = reach(requirements, i), requirements.setup
+    offset, most = float(requirements.fly_by_offset[i]), near.radius + near.tolerance
     away, ok, reason = math.nan, False, "missed: nothing was flown"
     facts: tuple[Fact, ...] = ()
     if aligned is not None:
-        away, off = _closest(demands, aligned, i, float(apexes[i, 2]))
+        away, off = _closest(requirements, aligned, i, float(apexes[i, 2]))
         facts = (Fact("height error", off, "m"),)
         ok = away <= most
-        beside = math.inf if ok or setup.parameters is None else _beside(demands, aligned, i)
+        beside = math.inf if ok or setup.parameters is None else _beside(requirements, aligned, i)
         if beside <= setup.corridor:
             ok = True
         reason = f"passed at {away:.1f} m, {abs(off):.1f} m {'above' if off >= 0.0 else 'below'}"
@@ -82,7 +84,7 @@ def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: 
             reason = f"missed: {reason}; {_counts(near)}"
     return make_finding(
         "waypoint",
-        demands.waypoint(i),
+        requirements.waypoint(i),
         ok=ok,
         reason=reason,
         planned=offset,
@@ -98,13 +100,13 @@ def _flown(demands: RouteDemands, aligned: AlignedTrack | None, i: int, apexes: 
     )
 
 
-def _beside(demands: RouteDemands, aligned: AlignedTrack, i: int) -> float:
+def _beside(requirements: RouteRequirements, aligned: AlignedTrack, i: int) -> float:
     """How far (m) beside a waypoint the track crossed the line across the leg before it; inf where it did not."""
     if i == 0:
         return math.inf
-    last = int(aligned.rows[i + 1]) if i + 1 < len(demands.points) else len(aligned.track) - 1
-    along, across = along_across(demands, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1])
-    past = np.flatnonzero(along >= demands.runs[i - 1])
+    last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
+    along, across = along_across(requirements, i - 1, aligned.track.position[int(aligned.rows[i - 1]) : last + 1])
+    past = np.flatnonzero(along >= requirements.runs[i - 1])
     return abs(float(across[past[0]])) if past.size else math.inf
 
 
@@ -115,14 +117,14 @@ def _counts(near: Reach) -> str:
     return f"{near.radius:.0f} m{error} count as reached ({whose})"
 
 
-def _closest(demands: RouteDemands, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:
+def _closest(requirements: RouteRequirements, aligned: AlignedTrack, i: int, level: float) -> tuple[float, float]:
     """Closest horizontal approach between the neighbouring waypoints, m, and the height above ``level`` there."""
     first = int(aligned.rows[i - 1]) if i else 0
-    last = int(aligned.rows[i + 1]) if i + 1 < len(demands.points) else len(aligned.track) - 1
+    last = int(aligned.rows[i + 1]) if i + 1 < len(requirements.points) else len(aligned.track) - 1
     position = aligned.track.position[first : max(last, first + 1) + 1]
-    distance, fraction = approaches(position, demands.points[i])
+    distance, fraction = approaches(position, requirements.points[i])
     if not distance.size:
-        off = aligned.track.position[-1] - demands.points[i]
+        off = aligned.track.position[-1] - requirements.points[i]
         return math.hypot(off[0], off[1]), float(off[2])
     # Of equally close rows the one nearest in height.
     near = np.flatnonzero(distance <= distance.min() + EQUALLY_CLOSE)

@@ -12,7 +12,16 @@ from flight.simulation.setup import AutopilotProgram, FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.verdict.findings import RULES, SCHEMA, Finding, Verdict, beside_json, make_finding, parse_beside, verdict_json
+from logs.verdict.findings import (
+    RULES,
+    SCHEMA,
+    Finding,
+    Verdict,
+    make_finding,
+    parse_reference_flights,
+    reference_flights_json,
+    verdict_json,
+)
 from logs.verdict.judge_flight import judge_flight, judge_geometry, judge_plan_only
 from logs.verdict.places import (
     FLIGHT,
@@ -21,8 +30,8 @@ from logs.verdict.places import (
     Change,
     DecidingParameter,
     Disagreement,
-    FlownBeside,
     Place,
+    ReferenceFlights,
 )
 from logs.verdict.wording import place_text, suggestions_text
 from tests.logs.verdict.judging import ROUTE, bad_plan, judge, leg, of, suggested, waypoint
@@ -167,31 +176,31 @@ def test_a_verdict_without_lines_has_an_empty_headline() -> None:
 
 FAILED = (("clearance", Place("leg", 4)), ("threat", Place("missile", 0, name="Alfa")))
 DECIDING = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", Place("leg", 4), -8.25)
-BESIDE = [
-    FlownBeside(),
-    FlownBeside(AirframeAnswer(True, "flyable")),
-    FlownBeside(AirframeAnswer(False, "not flyable: …", FAILED)),
-    FlownBeside(AirframeAnswer(True, "flyable"), DECIDING),
+REFERENCES = [
+    ReferenceFlights(),
+    ReferenceFlights(AirframeAnswer(True, "flyable")),
+    ReferenceFlights(AirframeAnswer(False, "not flyable: …", FAILED)),
+    ReferenceFlights(AirframeAnswer(True, "flyable"), DECIDING),
 ]
 
 
-@pytest.mark.parametrize("beside", BESIDE)
-def test_it_reads_back(beside: FlownBeside) -> None:
-    assert parse_beside(beside_json(beside), "a.mcap") == beside
+@pytest.mark.parametrize("reference", REFERENCES)
+def test_it_reads_back(reference: ReferenceFlights) -> None:
+    assert parse_reference_flights(reference_flights_json(reference), "a.mcap") == reference
 
 
-@pytest.mark.parametrize("beside", [None, *BESIDE])
-def test_a_log_carries_it(tmp_path: Path, setup: FlightSetup, track: Track, beside: FlownBeside | None) -> None:
+@pytest.mark.parametrize("reference", [None, *REFERENCES])
+def test_a_log_carries_it(tmp_path: Path, setup: FlightSetup, track: Track, reference: ReferenceFlights | None) -> None:
     path = tmp_path / "flight.mcap"
     with Recorder(path, setup) as recorder:
         recorder.write(track)
-        recorder.finish("completed", beside=beside)
+        recorder.finish("completed", reference=reference)
     log = read_log(path)
-    assert (log.beside, log.complete) == (beside, True)
+    assert (log.reference, log.complete) == (reference, True)
 
 
 def changed(**fields: Any) -> bytes:
-    return json.dumps(json.loads(beside_json(BESIDE[3])) | fields).encode()
+    return json.dumps(json.loads(reference_flights_json(REFERENCES[3])) | fields).encode()
 
 
 @pytest.mark.parametrize(
@@ -199,7 +208,7 @@ def changed(**fields: Any) -> bytes:
     [
         (b"", "a.mcap: "),
         (b"{}", "a.mcap: airframe"),
-        (changed(schema="planfly.beside/9"), "a.mcap: schema"),
+        (changed(schema="planfly.reference/9"), "a.mcap: schema"),
         (changed(more=1), "a.mcap: more"),
         (changed(airframe={"flyable": True, "headline": "", "failed": [["juggling", {}]]}), "a.mcap: airframe"),
         (changed(airframe=7), "a.mcap: airframe"),
@@ -207,7 +216,7 @@ def changed(**fields: Any) -> bytes:
 )
 def test_what_does_not_fit_is_refused_in_a_line(data: bytes, said: str) -> None:
     with pytest.raises(LogError) as refused:
-        parse_beside(data, "a.mcap")
+        parse_reference_flights(data, "a.mcap")
     assert str(refused.value).startswith(said)
     assert "\n" not in str(refused.value)
 
@@ -216,4 +225,4 @@ def test_a_rule_that_there_is_not_is_refused() -> None:
     place = {"kind": "leg", "index": 1, "item": None, "name": ""}
     airframe = {"flyable": False, "headline": "", "failed": [["juggling", place]]}
     with pytest.raises(LogError, match="'juggling' is no rule"):
-        parse_beside(changed(airframe=airframe), "a.mcap")
+        parse_reference_flights(changed(airframe=airframe), "a.mcap")

@@ -13,7 +13,7 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.findings import RULES, verdict_json
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT, Place
 from tests.logs.verdict.judging import ROUTE, failing, judge, leg, of, waypoint
 from tests.synthetic import (
@@ -50,8 +50,8 @@ def test_flown_angles_and_slopes_are_the_planned_ones(setup: FlightSetup, track:
 def test_wind_does_not_bend_what_is_measured() -> None:
     setup = make_setup(ROUTE, wind={"speed_mps": 10.0, "from_deg": 220.0})
     # The turn's radius is of the ground speed downwind.
-    demands = route_demands(setup)
-    track = fly_path(setup, radius=[float(r) for r in demands.radius[1:-1]])
+    requirements = route_requirements(setup)
+    track = fly_path(setup, radius=[float(r) for r in requirements.radius[1:-1]])
     verdict = judge(setup, track)
     assert verdict.flyable, verdict.summary
     for item in verdict.findings:

@@ -5,8 +5,8 @@ from logs.recording.example_log import example_log
 from logs.verdict.findings import RULES, verdict_json
 from logs.verdict.judge_flight import judge_plan_only
 from logs.verdict.judge_geometry import flown_findings
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.places import PLAN
 from tests.logs.verdict.judging import bad_plan, failing
 
@@ -27,14 +27,14 @@ def test_a_plan_that_is_not_feasible(setup: FlightSetup) -> None:
 
 def test_rules_come_in_the_verdicts_order() -> None:
     log = example_log()
-    demands = route_demands(log.setup)
-    findings = flown_findings(demands, lay_track(demands, log.track), "completed", True, True)
+    requirements = route_requirements(log.setup)
+    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True, True)
     order = list(RULES)
     assert [order.index(item.rule) for item in findings] == sorted(order.index(item.rule) for item in findings)
 
 
 def test_without_the_envelope_nothing_is_said_of_the_stall() -> None:
     log = example_log()
-    demands = route_demands(log.setup, envelope=False)
-    findings = flown_findings(demands, lay_track(demands, log.track), "completed", True, False)
+    requirements = route_requirements(log.setup, envelope=False)
+    findings = flown_findings(requirements, align_track(requirements, log.track), "completed", True, False)
     assert not [item for item in findings if item.rule == "stall"]

@@ -18,8 +18,8 @@ from logs.verdict.places import (
     Change,
     DecidingParameter,
     Disagreement,
-    FlownBeside,
     Place,
+    ReferenceFlights,
 )
 from logs.verdict.wording import deciding_text
 from tests.logs.verdict.judging import leg
@@ -64,9 +64,9 @@ def autopilot() -> FlightSetup:
     return replace(make_setup(STRAIGHT, limits={"corridor_m": 60.0}), parameters=default_parameters())
 
 
-def aside(setup: FlightSetup, metres: float, beside: FlownBeside | None) -> Verdict:
+def aside(setup: FlightSetup, metres: float, reference: ReferenceFlights | None) -> Verdict:
     """The verdict on a flight that is so far beside its second leg."""
-    return judge_flight(setup, fly_path(setup, across=bump(4500.0, metres, 150.0)), "completed", beside=beside)
+    return judge_flight(setup, fly_path(setup, across=bump(4500.0, metres, 150.0)), "completed", reference=reference)
 
 
 def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> None:
@@ -75,7 +75,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
         ("geometry",): judge_geometry(ideal),
         ("geometry", "airframe"): aside(ideal, 0.0, None),
         ("geometry", "autopilot"): aside(autopilot, 0.0, None),
-        ("geometry", "airframe", "autopilot"): aside(autopilot, 0.0, FlownBeside(PASSED)),
+        ("geometry", "airframe", "autopilot"): aside(autopilot, 0.0, ReferenceFlights(PASSED)),
     }
     for names, verdict in asked.items():
         assert tuple(level.name for level in verdict.levels) == names
@@ -90,7 +90,7 @@ def test_a_verdict_has_the_levels_that_were_asked(autopilot: FlightSetup) -> Non
 
 
 def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: FlightSetup) -> None:
-    verdict = aside(autopilot, 70.0, FlownBeside(PASSED, DECIDING))
+    verdict = aside(autopilot, 70.0, ReferenceFlights(PASSED, DECIDING))
     assert verdict.lines[:2] == (
         "not flyable: corridor on leg 1, to item 2 (70.0 m > 60.0 m)",
         "The aircraft can, ArduPlane with these parameters cannot: NAVL1_PERIOD 17 takes it 70 m off leg 1; 14 would"
@@ -107,21 +107,21 @@ def test_where_only_the_autopilot_fails_the_second_line_says_so(autopilot: Fligh
     assert [level["name"] for level in written["levels"]] == ["geometry", "airframe", "autopilot"]
     assert written["deciding_parameter"]["name"] == "NAVL1_PERIOD"
     assert written["deciding_parameter"]["text"] == deciding_text(DECIDING)
-    undecided = aside(autopilot, 70.0, FlownBeside(PASSED))
+    undecided = aside(autopilot, 70.0, ReferenceFlights(PASSED))
     assert undecided.lines[1].endswith("cannot: no single parameter that was tried would pass")
 
 
 def test_what_decides_a_real_autopilots_flight_is_what_its_law_shows(autopilot: FlightSetup) -> None:
     program = AutopilotProgram("ArduPlane V4.6.0-dev (7fbc1660)", "0" * 64, {}, {})
     real = replace(autopilot, program=program)
-    said = aside(real, 70.0, FlownBeside(PASSED, DECIDING)).lines[1]
+    said = aside(real, 70.0, ReferenceFlights(PASSED, DECIDING)).lines[1]
     assert said.endswith(f"cannot: {deciding_text(DECIDING)}, by the flight of its law")
-    assert aside(real, 70.0, FlownBeside(PASSED)).lines[1].endswith("with these parameters cannot")
+    assert aside(real, 70.0, ReferenceFlights(PASSED)).lines[1].endswith("with these parameters cannot")
 
 
 def test_where_the_aircraft_fails_too_no_parameter_is_blamed(autopilot: FlightSetup) -> None:
     failed = AirframeAnswer(False, "not flyable: corridor on leg 1 (65.0 m > 60.0 m)", (("corridor", leg(1)),))
-    verdict = aside(autopilot, 70.0, FlownBeside(failed))
+    verdict = aside(autopilot, 70.0, ReferenceFlights(failed))
     assert "The aircraft can" not in verdict.summary
     assert verdict.levels[1].disagreements == ()
     assert verdict.lines[-1].endswith("(65.0 m > 60.0 m); both flights agree")
@@ -129,7 +129,7 @@ def test_where_the_aircraft_fails_too_no_parameter_is_blamed(autopilot: FlightSe
 
 def test_where_only_the_aircraft_fails_the_verdict_is_the_autopilots(autopilot: FlightSetup) -> None:
     failed = AirframeAnswer(False, "not flyable: corridor on leg 1 (65.0 m > 60.0 m)", (("corridor", leg(1)),))
-    verdict = aside(autopilot, 0.0, FlownBeside(failed, DECIDING))
+    verdict = aside(autopilot, 0.0, ReferenceFlights(failed, DECIDING))
     assert (verdict.flyable, verdict.deciding) == (True, None)
     assert verdict.levels[1].disagreements == (Disagreement("corridor", leg(1), "airframe", there=False, here=True),)
 

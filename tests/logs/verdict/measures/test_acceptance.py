@@ -11,12 +11,12 @@ from logs.verdict.measures.acceptance import (
     corner_depths,
     corridor_limit,
     farthest_from_legs,
-    jog,
+    negligible_kink,
     position_error,
     reach,
     step,
 )
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from tests.synthetic import bank_radius, make_setup
 
 RIGHT_ANGLE = [[0, 0, 300], [0, 3000, 300], [3000, 3000, 300], [6000, 3000, 300]]
@@ -25,11 +25,11 @@ RIGHT_ANGLE = [[0, 0, 300], [0, 3000, 300], [3000, 3000, 300], [6000, 3000, 300]
 def test_a_stated_radius_comes_before_the_paths_own() -> None:
     setup = make_setup(RIGHT_ANGLE, fly_over=(2,))
     own = bank_radius() * (math.sqrt(2.0) - 1.0)
-    found = [reach(route_demands(setup), i) for i in range(4)]
+    found = [reach(route_requirements(setup), i) for i in range(4)]
     assert [item.radius for item in found] == pytest.approx([10.0, own + 10.0, 10.0, 10.0])
     assert [item.source for item in found] == ["fly-by path", "fly-by path", "fly-over", "fly-by path"]
     stated = replace(setup, route=replace(setup.route, acceptance=np.array([0.0, 25.0, 7.0, 0.0])))
-    found = [reach(route_demands(stated), i) for i in range(4)]
+    found = [reach(route_requirements(stated), i) for i in range(4)]
     assert [(item.radius, item.source) for item in found[1:3]] == [(25.0, "mission"), (7.0, "mission")]
 
 
@@ -44,9 +44,9 @@ def test_a_turn_leads_off_its_legs_by_its_own_arc() -> None:
     """R (1 - cos 45) inside a right angle; R beyond the next leg where the waypoint is flown over; 0 straight on."""
     by, over = make_setup(RIGHT_ANGLE), make_setup(RIGHT_ANGLE, fly_over=(1,))
     inside = bank_radius() * (1.0 - math.sqrt(0.5))
-    assert corner_depths(route_demands(by)).tolist() == pytest.approx([0.0, inside, 0.0, 0.0], abs=1e-9)
-    assert corner_depths(route_demands(over)).tolist() == pytest.approx([0.0, bank_radius(), 0.0, 0.0], abs=1e-9)
-    assert [corridor_limit(route_demands(by), leg) for leg in (0, 2)] == [
+    assert corner_depths(route_requirements(by)).tolist() == pytest.approx([0.0, inside, 0.0, 0.0], abs=1e-9)
+    assert corner_depths(route_requirements(over)).tolist() == pytest.approx([0.0, bank_radius(), 0.0, 0.0], abs=1e-9)
+    assert [corridor_limit(route_requirements(by), leg) for leg in (0, 2)] == [
         (pytest.approx(inside + 10.0), "fly-by path"),
         (30.0, "default"),
     ]
@@ -64,57 +64,59 @@ def test_distance_is_to_the_nearest_point_of_the_nearest_leg() -> None:
 # Corners that the way without them passes closely, and steps.
 
 
-def demands_of(points: list[list[float]], **how: Any) -> RouteDemands:
-    return route_demands(make_setup(points, **how))
+def demands_of(points: list[list[float]], **how: Any) -> RouteRequirements:
+    return route_requirements(make_setup(points, **how))
 
 
 def test_a_sidestep_is_passed_at_half_its_width() -> None:
-    demands = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
+    requirements = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
     # Without the first corner alone the way passes it at 6 m, and hardly turns at the second.
-    assert jog(demands, 1) == pytest.approx(6.0, abs=0.01)
+    assert negligible_kink(requirements, 1) == pytest.approx(6.0, abs=0.01)
     wide = demands_of([[0, 0, 300], [0, 1000, 300], [12, 1000, 300], [12, 2000, 300]])
-    assert jog(wide, 1) == pytest.approx(6.0, abs=0.01)
-    assert jog(demands_of([[0, 0, 300], [0, 1000, 300], [16, 1000, 300], [16, 2000, 300]]), 1) is None
+    assert negligible_kink(wide, 1) == pytest.approx(6.0, abs=0.01)
+    assert negligible_kink(demands_of([[0, 0, 300], [0, 1000, 300], [16, 1000, 300], [16, 2000, 300]]), 1) is None
 
 
 def test_the_way_without_a_corner_has_to_have_room_for_its_own_turns() -> None:
     # A right angle with a bevel of 7 m: without it, the right angle itself, which has room with 1000 m and not with 50.
     for run, room in ((1000.0, True), (50.0, False)):
-        demands = demands_of([[0, 0, 300], [0, 1000, 300], [5, 1005, 300], [5 + run, 1005, 300], [5 + run, 3000, 300]])
-        assert (jog(demands, 1) is not None) is room
+        requirements = demands_of(
+            [[0, 0, 300], [0, 1000, 300], [5, 1005, 300], [5 + run, 1005, 300], [5 + run, 3000, 300]]
+        )
+        assert (negligible_kink(requirements, 1) is not None) is room
 
 
 def test_the_corners_of_a_circle_are_no_jog() -> None:
-    demands = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
-    arcs = demands.setup.route.arcs.copy()
+    requirements = demands_of([[0, 0, 300], [0, 1000, 300], [6, 1000, 300], [6, 2000, 300]])
+    arcs = requirements.setup.route.arcs.copy()
     arcs[1:3] = 3.0
-    object.__setattr__(demands.setup.route, "arcs", arcs)
-    assert jog(demands, 1) is None
+    object.__setattr__(requirements.setup.route, "arcs", arcs)
+    assert negligible_kink(requirements, 1) is None
 
 
 @pytest.mark.parametrize(("rise", "height"), [(9.9, 9.9), (-9.9, 9.9), (10.1, None), (-10.1, None)])
 def test_a_step_is_as_high_as_its_leg(rise: float, height: float | None) -> None:
-    demands = demands_of([[0, 0, 300], [0, 1000, 300], [0, 1010, 300 + rise], [0, 2000, 300 + rise]])
-    assert step(demands, 1) == (None if height is None else pytest.approx(height))
+    requirements = demands_of([[0, 0, 300], [0, 1000, 300], [0, 1010, 300 + rise], [0, 2000, 300 + rise]])
+    assert step(requirements, 1) == (None if height is None else pytest.approx(height))
 
 
 def test_all_that_is_too_steep_in_a_row_is_one_step() -> None:
     points = [[0.0, 0.0, 300.0], [0.0, 1000.0, 300.0]]
     for _ in range(3):
         points.append([0.0, points[-1][1] + 10.0, points[-1][2] + 3.0])
-    demands = demands_of([*points, [0.0, 3000.0, 309.0]])
-    assert [step(demands, leg) for leg in (1, 2, 3)] == pytest.approx([9.0, 9.0, 9.0])
+    requirements = demands_of([*points, [0.0, 3000.0, 309.0]])
+    assert [step(requirements, leg) for leg in (1, 2, 3)] == pytest.approx([9.0, 9.0, 9.0])
     points.append([0.0, points[-1][1] + 10.0, points[-1][2] + 3.0])
-    demands = demands_of([*points, [0.0, 3000.0, 312.0]])
-    assert [step(demands, leg) for leg in (1, 2, 3, 4)] == [None] * 4
-    assert math.degrees(demands.slopes[1]) == pytest.approx(math.degrees(math.atan2(3, 10)))
+    requirements = demands_of([*points, [0.0, 3000.0, 312.0]])
+    assert [step(requirements, leg) for leg in (1, 2, 3, 4)] == [None] * 4
+    assert math.degrees(requirements.slopes[1]) == pytest.approx(math.degrees(math.atan2(3, 10)))
 
 
 @pytest.mark.parametrize("circle", [1, 2])
 def test_a_way_past_one_corner_of_a_circle_is_no_jog(circle: int) -> None:
     """12 m aside, so that both corners have to be left out."""
-    demands = demands_of([[0, 0, 300], [0, 1000, 300], [12, 1000, 300], [12, 2000, 300]])
-    arcs = demands.setup.route.arcs.copy()
+    requirements = demands_of([[0, 0, 300], [0, 1000, 300], [12, 1000, 300], [12, 2000, 300]])
+    arcs = requirements.setup.route.arcs.copy()
     arcs[circle] = 3.0
-    object.__setattr__(demands.setup.route, "arcs", arcs)
-    assert jog(demands, 1) is None
+    object.__setattr__(requirements.setup.route, "arcs", arcs)
+    assert negligible_kink(requirements, 1) is None

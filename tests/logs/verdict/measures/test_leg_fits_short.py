@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.slopes import LegFit, leg_course, leg_slope
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.track_alignment import align_track
 from tests.synthetic import Profile, bank_radius, fly_path, make_setup
 
 
@@ -17,10 +17,10 @@ def straight(run: float) -> list[list[float]]:
 
 def slope(run: float, airspeed: Profile | None = None, up: Profile | None = None) -> LegFit | None:
     setup = make_setup(straight(run))
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup, airspeed=airspeed, up=up))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, airspeed=airspeed, up=up))
     assert aligned is not None
-    return leg_slope(demands, aligned, 1)
+    return leg_slope(requirements, aligned, 1)
 
 
 @pytest.mark.parametrize("off", [0.0, 10.0, -10.0])
@@ -70,10 +70,10 @@ def test_a_short_legs_course_is_that_between_its_turns(turn: float) -> None:
     """40 m longer than what the turns take of it."""
     tangents = 2.0 * bank_radius() * math.tan(0.5 * math.radians(abs(turn)))
     setup = make_setup(zigzag(turn, tangents + 40.0))
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup))
     assert aligned is not None
-    found = leg_course(demands, aligned, 1)
+    found = leg_course(requirements, aligned, 1)
     assert found is not None
     assert not found.fitted
     assert math.degrees(found.value) == pytest.approx(turn, abs=0.2)
@@ -83,11 +83,11 @@ def test_where_the_turns_leave_nothing_it_is_that_where_they_meet() -> None:
     """Arcs of half the radius meet in the middle of a leg that has room for no more."""
     turn = math.radians(60.0)
     setup = make_setup(zigzag(60.0, bank_radius() * math.tan(0.5 * turn) + 1.0))
-    demands = route_demands(setup)
-    assert demands.after[1] + demands.before[2] > demands.runs[1]
-    aligned = lay_track(demands, fly_path(setup, radius=0.5 * bank_radius()))
+    requirements = route_requirements(setup)
+    assert requirements.after[1] + requirements.before[2] > requirements.runs[1]
+    aligned = align_track(requirements, fly_path(setup, radius=0.5 * bank_radius()))
     assert aligned is not None
-    found = leg_course(demands, aligned, 1)
+    found = leg_course(requirements, aligned, 1)
     assert found is not None
     # A second's mean about the middle, half of it turning on either side by v / R: a quarter second of it in the mean.
     turned = math.degrees(0.25 * 25.0 / (0.5 * bank_radius()))

@@ -9,8 +9,8 @@ import pytest
 
 from flight.guidance.path import profile
 from logs.verdict.measures.path_moves import BLOCK_MOVES, MOVE, flown_moves, move_blocks, move_point, planned_moves
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from tests.logs.verdict.measures.test_zone_visits import move
 from tests.synthetic import bank_radius, fly_path, make_setup
 from world.kernels import Records
@@ -21,8 +21,8 @@ CORNER = [[0.0, 0.0, 300.0], [0.0, 2000.0, 400.0], [2000.0, 2000.0, 400.0]]
 
 
 def test_a_paths_moves_join() -> None:
-    demands = route_demands(make_setup(CORNER))
-    moves = planned_moves(demands)
+    requirements = route_requirements(make_setup(CORNER))
+    moves = planned_moves(requirements)
     for before, after in pairwise(moves):
         np.testing.assert_allclose(move_point(before, 1.0), (after.east, after.north, after.up), atol=1e-6)
         assert before.time + before.lasts == pytest.approx(after.time, abs=1e-9)
@@ -31,12 +31,12 @@ def test_a_paths_moves_join() -> None:
     assert set(moves["leg"]) == {0, 1}
     # In still air at 25 m/s.
     np.testing.assert_allclose(moves["length"], 25.0 * moves["lasts"], rtol=1e-9)
-    assert float(moves["length"].sum()) == pytest.approx(demands.setup.path.length)
+    assert float(moves["length"].sum()) == pytest.approx(requirements.setup.path.length)
 
 
 def test_a_corners_moves_lie_on_its_arc() -> None:
     setup = make_setup(CORNER)
-    moves = planned_moves(route_demands(setup))
+    moves = planned_moves(route_requirements(setup))
     radius = 1.0 / float(moves["curvature"].max())
     # The arc is a little wider than at the first waypoint's height: the air is thinner there, or not at all.
     assert radius == pytest.approx(bank_radius(), rel=0.02)
@@ -56,7 +56,7 @@ def test_a_corners_moves_lie_on_its_arc() -> None:
 def test_heights_are_the_profiles() -> None:
     setup = make_setup([[0.0, 0.0, 300.0], [0.0, 1500.0, 400.0], [0.0, 3000.0, 330.0], [900.0, 4500.0, 330.0]])
     at = 0.0
-    for piece in planned_moves(route_demands(setup)):
+    for piece in planned_moves(route_requirements(setup)):
         for share in (0.01, 0.4, 0.99):
             assert move_point(piece, share)[2] == pytest.approx(profile(setup.path.nodes, at + share * piece.length)[0])
         at += float(piece.length)
@@ -64,8 +64,8 @@ def test_heights_are_the_profiles() -> None:
 
 def test_a_flights_moves_lead_from_row_to_row() -> None:
     setup = make_setup(CORNER)
-    track, demands = fly_path(setup, rate=10.0), route_demands(setup)
-    aligned = lay_track(demands, track)
+    track, requirements = fly_path(setup, rate=10.0), route_requirements(setup)
+    aligned = align_track(requirements, track)
     assert aligned is not None
     moves = flown_moves(aligned)
     assert len(moves) == len(track) - 1
@@ -84,7 +84,7 @@ def test_what_came_after_the_last_waypoint_belongs_to_the_last_leg() -> None:
     count = 30
     beyond = track.position[-1] + np.arange(1, count + 1)[:, None] * np.array([2.5, 0.0, 0.0])
     later = track.time[-1] + 0.1 * np.arange(1, count + 1)
-    aligned = lay_track(route_demands(setup), track)
+    aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     longer = replace(
         aligned,
@@ -114,10 +114,10 @@ def test_what_came_after_the_last_waypoint_belongs_to_the_last_leg() -> None:
 
 def test_the_moves_of_some_legs_are_those_of_all_that_are_on_them() -> None:
     setup = make_setup([[0.0, 0.0, 300.0], [0.0, 2000.0, 400.0], [2000.0, 2000.0, 400.0], [2000.0, 4000.0, 400.0]])
-    demands = route_demands(setup)
-    every = planned_moves(demands)
+    requirements = route_requirements(setup)
+    every = planned_moves(requirements)
     for first, last in ((0, 0), (1, 1), (1, 2), (2, 2)):
-        some = planned_moves(demands, first, last)
+        some = planned_moves(requirements, first, last)
         wanted = every[(every["leg"] >= first) & (every["leg"] <= last)]
         for name in ("east", "north", "up", "length", "curvature", "climb", "bend", "lasts", "leg"):
             np.testing.assert_array_equal(some[name], wanted[name])

@@ -14,7 +14,7 @@ from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures.route_requirements import (
     airspace_of,
     available_lengths,
-    route_demands,
+    route_requirements,
     slope_limit,
     steep_arc,
     turn_lengths,
@@ -83,7 +83,7 @@ def zigzag(turn_deg: float, run: float, *, same_way: bool, course_deg: float = 2
 
 
 def test_calm_the_roll_takes_the_bank_limit_over_the_rate() -> None:
-    s_turn, same = (route_demands(make_setup(zigzag(60.0, 300.0, same_way=way))) for way in (False, True))
+    s_turn, same = (route_requirements(make_setup(zigzag(60.0, 300.0, same_way=way))) for way in (False, True))
     # 30 degrees into 30 degrees, less the 30 that any turn rolls in.
     assert s_turn.reversal[1] == pytest.approx(25.0 * ROLL_TIME * math.radians(30.0), rel=1e-6)
     assert same.reversal.tolist() == [0.0, 0.0, 0.0]
@@ -97,10 +97,10 @@ def test_planner_and_check_need_the_same(turn: float, wind: float, same_way: boo
         points = zigzag(turn, 900.0, same_way=same_way)
         scenario = make_scenario(points, wind={"speed_mps": wind, "from_deg": from_deg})
         setup = make_setup(points, scenario=scenario)
-        demands = route_demands(setup)
+        requirements = route_requirements(setup)
         needs, rolls = turn_and_roll_lengths(make_problem(scenario, setup.limits).certified, points)
-        np.testing.assert_allclose(needs, demands.after[:-1] + demands.before[1:], atol=1e-6)
-        np.testing.assert_allclose(rolls, demands.reversal, atol=1e-6)
+        np.testing.assert_allclose(needs, requirements.after[:-1] + requirements.before[1:], atol=1e-6)
+        np.testing.assert_allclose(rolls, requirements.reversal, atol=1e-6)
         assert (rolls.max() == 0.0) or not same_way
 
 
@@ -119,11 +119,11 @@ def test_the_roll_is_measured_at_the_lower_end_of_its_leg(climb: float) -> None:
     points = zigzag(60.0, 900.0, same_way=False, course_deg=-60.0)
     points[2:, 2] += climb
     wind = {"speed_mps": 4.0, "from_deg": 180.0, "gradient": 0.02}
-    demands = route_demands(make_setup(points, wind=wind))
+    requirements = route_requirements(make_setup(points, wind=wind))
     lower = 500.0 + min(0.0, climb)
     speed = 25.0 + 4.0 + 0.02 * (lower - 500.0)
-    bank = [math.atan(speed**2 / (9.80665 * float(radius))) for radius in demands.radius[1:3]]
-    assert demands.reversal[1] == pytest.approx(speed * ROLL_TIME * (sum(bank) - math.radians(30.0)), rel=1e-6)
+    bank = [math.atan(speed**2 / (9.80665 * float(radius))) for radius in requirements.radius[1:3]]
+    assert requirements.reversal[1] == pytest.approx(speed * ROLL_TIME * (sum(bank) - math.radians(30.0)), rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -148,28 +148,28 @@ def test_a_turn_may_use_what_its_neighbours_leave_of_its_legs(
 @pytest.mark.parametrize(("first", "second"), [(90.0, 300.0), (300.0, 90.0)])
 def test_the_sharpest_turn_fits_the_shorter_of_its_legs(first: float, second: float) -> None:
     """R tan(turn / 2) of 90 m."""
-    demands = route_demands(make_setup([[0, 0, 300], [0, first, 300], [second, first, 300]]))
-    assert demands.turn_limit[1] == pytest.approx(2.0 * math.atan(90.0 / bank_radius()))
+    requirements = route_requirements(make_setup([[0, 0, 300], [0, first, 300], [second, first, 300]]))
+    assert requirements.turn_limit[1] == pytest.approx(2.0 * math.atan(90.0 / bank_radius()))
 
 
 @pytest.mark.parametrize("run", [60.0, 150.0, 250.0])
 def test_the_sharpest_turn_over_a_waypoint_takes_the_leg_after_it(run: float) -> None:
     """As long as the leg, and within a thousandth of it a little sharper does not fit."""
-    demands = route_demands(make_setup([[0, 0, 300], [0, 50, 300], [run, 50, 300]], fly_over=(1,)))
-    sharpest = float(demands.turn_limit[1])
+    requirements = route_requirements(make_setup([[0, 0, 300], [0, 50, 300], [run, 50, 300]], fly_over=(1,)))
+    sharpest = float(requirements.turn_limit[1])
     assert turn_lengths(sharpest, bank_radius(), fly_over=True)[1] == pytest.approx(run, rel=1e-6)
     assert turn_lengths(1.001 * sharpest, bank_radius(), fly_over=True)[1] > run
 
 
 def test_any_turn_over_a_waypoint_fits_a_long_leg() -> None:
-    demands = route_demands(make_setup([[0, 0, 300], [0, 50, 300], [5000, 50, 300]], fly_over=(1,)))
-    assert demands.turn_limit[1] == math.pi
+    requirements = route_requirements(make_setup([[0, 0, 300], [0, 50, 300], [5000, 50, 300]], fly_over=(1,)))
+    assert requirements.turn_limit[1] == math.pi
 
 
 @pytest.mark.parametrize(("speeds", "fastest"), [([20.0, 30.0], 30.0), ([30.0, 20.0], 30.0)])
 def test_a_turns_arc_is_that_of_its_faster_leg(speeds: list[float], fastest: float) -> None:
-    demands = route_demands(make_setup([[0, 0, 300], [0, 1000, 300], [1000, 1000, 300]], speeds=speeds))
-    assert demands.radius[1] == pytest.approx(bank_radius(fastest))
+    requirements = route_requirements(make_setup([[0, 0, 300], [0, 1000, 300], [1000, 1000, 300]], speeds=speeds))
+    assert requirements.radius[1] == pytest.approx(bank_radius(fastest))
 
 
 # ----------------------------------------------------------------------
@@ -179,46 +179,46 @@ RIGHT_ANGLE = [[0, 0, 300], [0, 2000, 300], [2000, 2000, 300]]
 
 
 def test_a_right_angle_in_calm_air_has_the_bank_limits_arc() -> None:
-    demands = route_demands(make_setup(RIGHT_ANGLE))
+    requirements = route_requirements(make_setup(RIGHT_ANGLE))
     radius = bank_radius()
-    assert demands.turns[1] == pytest.approx(math.pi / 2)
-    assert demands.radius[1] == demands.tightest[1] == pytest.approx(radius)
-    assert demands.before[1] == demands.after[1] == pytest.approx(radius)
-    assert demands.fly_by_offset[1] == pytest.approx((math.sqrt(2.0) - 1.0) * radius)
-    apex = demands.apexes()[1]
-    assert math.hypot(apex[0] - 0.0, apex[1] - 2000.0) == pytest.approx(float(demands.fly_by_offset[1]))
+    assert requirements.turns[1] == pytest.approx(math.pi / 2)
+    assert requirements.radius[1] == requirements.tightest[1] == pytest.approx(radius)
+    assert requirements.before[1] == requirements.after[1] == pytest.approx(radius)
+    assert requirements.fly_by_offset[1] == pytest.approx((math.sqrt(2.0) - 1.0) * radius)
+    apex = requirements.apexes()[1]
+    assert math.hypot(apex[0] - 0.0, apex[1] - 2000.0) == pytest.approx(float(requirements.fly_by_offset[1]))
 
 
 def test_the_planned_path_passes_the_apexes_in_time() -> None:
-    demands = route_demands(make_setup(RIGHT_ANGLE))
-    path = demands.path
+    requirements = route_requirements(make_setup(RIGHT_ANGLE))
+    path = requirements.path
     assert len(path.points) == len(path.times) == len(path.legs) + 1
     assert (np.diff(path.times) > 0.0).all()
     assert sorted(set(path.legs.tolist())) == [0, 1]
     # The arc is shorter than its two tangents.
     saved = (2.0 - math.pi / 2) * bank_radius()
     assert path.times[-1] == pytest.approx((4000.0 - saved) / 25.0, rel=1e-4)
-    nearest = np.sqrt(((path.points - demands.apexes()[1]) ** 2).sum(axis=1)).min()
+    nearest = np.sqrt(((path.points - requirements.apexes()[1]) ** 2).sum(axis=1)).min()
     assert nearest < 10.0
 
 
 def test_without_the_envelope_the_aircraft_limits_nothing() -> None:
-    demands = route_demands(make_setup(RIGHT_ANGLE), envelope=False)
-    for limits in (demands.climb, demands.dive, demands.turn_limit):
+    requirements = route_requirements(make_setup(RIGHT_ANGLE), envelope=False)
+    for limits in (requirements.climb, requirements.dive, requirements.turn_limit):
         assert np.isinf(limits).all()
 
 
 def test_a_leg_that_the_wind_leaves_no_way_along_has_no_ground_speed() -> None:
-    demands = route_demands(make_setup(RIGHT_ANGLE, wind={"speed_mps": 30.0, "from_deg": 0.0}))
-    assert np.isnan(demands.ground_speed[0])
-    assert np.isfinite(demands.path.times).all()
+    requirements = route_requirements(make_setup(RIGHT_ANGLE, wind={"speed_mps": 30.0, "from_deg": 0.0}))
+    assert np.isnan(requirements.ground_speed[0])
+    assert np.isfinite(requirements.path.times).all()
 
 
 def test_waypoints_are_places_with_their_items(setup: FlightSetup) -> None:
     items = setup.route.items.copy()
     items[1] = -1
-    demands = route_demands(replace(setup, route=replace(setup.route, items=items)))
-    assert [demands.waypoint(k) for k in (1, 2)] == [Place("waypoint", 1), Place("waypoint", 2, item=2)]
+    requirements = route_requirements(replace(setup, route=replace(setup.route, items=items)))
+    assert [requirements.waypoint(k) for k in (1, 2)] == [Place("waypoint", 1), Place("waypoint", 2, item=2)]
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -230,7 +230,7 @@ def test_an_apex_lies_inside_its_corner_halfway_between_the_heights_at_its_arcs_
     inside = bank_radius() * (1.0 / math.cos(0.5 * turn) - 1.0)
     # The bisector of the corner's inside points 120 degrees to the right, or left, of north.
     toward = math.radians(120.0)
-    apex = route_demands(setup).apexes()[1]
+    apex = route_requirements(setup).apexes()[1]
     assert apex[:2] == pytest.approx([side * inside * math.sin(toward), 2000.0 + inside * math.cos(toward)], abs=1e-6)
     # The second leg falls by 0.06: 120 m in 2 km.
     ends = 500.0 - 0.10 * tangent, 500.0 - 0.06 * tangent
@@ -239,7 +239,7 @@ def test_an_apex_lies_inside_its_corner_halfway_between_the_heights_at_its_arcs_
 
 def test_an_apex_of_a_corner_without_room_has_the_slopes_of_its_shorter_leg() -> None:
     points = [[0, 0, 300], [0, 2000, 300], [40, 2000, 304], [40, 4000, 304]]
-    apex = route_demands(make_setup(points)).apexes()[1]
+    apex = route_requirements(make_setup(points)).apexes()[1]
     assert apex[2] == pytest.approx(300.0 + 0.5 * 40.0 * 0.1, abs=1e-6)
 
 
@@ -248,29 +248,29 @@ def test_a_slopes_blend_is_a_parabola_about_the_waypoint_or_about_each_end_of_it
     parabola = 30.0**2 / (2.0 * BLEND_ACCELERATION)
     wind = {"speed_mps": 5.0, "from_deg": 180.0}
     straight = make_setup([[0, 0, 300], [0, 2000, 380], [0, 4000, 340]], wind=wind)
-    assert route_demands(straight).blend.tolist() == pytest.approx([0.0, 0.06 * parabola, 0.0])
+    assert route_requirements(straight).blend.tolist() == pytest.approx([0.0, 0.06 * parabola, 0.0])
     # Both tangents, of 0.04 and -0.01, are joined by an arc that is shorter than they are.
     turning = make_setup([[0, 0, 300], [0, 2000, 380], [2000, 2000, 360]], wind=wind)
-    demands = route_demands(turning)
-    radius = float(demands.radius[1])
+    requirements = route_requirements(turning)
+    radius = float(requirements.radius[1])
     on_arc = (0.04 - 0.01) * radius / (radius * 0.5 * math.pi)
-    assert demands.blend[1] == pytest.approx(max(abs(on_arc - 0.04), abs(on_arc + 0.01)) * parabola)
+    assert requirements.blend[1] == pytest.approx(max(abs(on_arc - 0.04), abs(on_arc + 0.01)) * parabola)
 
 
 def test_a_leg_names_the_item_that_it_leads_to_and_none_of_ours() -> None:
     setup = make_setup(RIGHT_ANGLE)
     # As after a jump back to item 4, and along a lead-out that no item asks for.
     items = np.array([4, 4, -1])
-    demands = route_demands(replace(setup, route=replace(setup.route, items=items)))
-    assert [(demands.leg(k).index, demands.leg(k).to_item) for k in range(2)] == [(0, 4), (1, None)]
-    assert [demands.waypoint(k).item for k in range(3)] == [4, 4, None]
+    requirements = route_requirements(replace(setup, route=replace(setup.route, items=items)))
+    assert [(requirements.leg(k).index, requirements.leg(k).to_item) for k in range(2)] == [(0, 4), (1, None)]
+    assert [requirements.waypoint(k).item for k in range(3)] == [4, 4, None]
 
 
 def test_limits_of_a_mission_without_a_scenario_are_not_the_scenarios() -> None:
     setup = make_setup(RIGHT_ANGLE)
-    assert route_demands(setup).limits_source == "scenario"
+    assert route_requirements(setup).limits_source == "scenario"
     alone = replace(setup, scenario=replace(setup.scenario, external=True))
-    assert route_demands(alone).limits_source == "default"
+    assert route_requirements(alone).limits_source == "default"
 
 
 # ----------------------------------------------------------------------
@@ -305,7 +305,7 @@ def test_the_other_legs_limit_counts_too(from_deg: float) -> None:
     printed = re.search(r"the aircraft can ([\d.]+)° there", item.reason)
     assert printed is not None, item.reason
     assert abs(math.tan(math.radians(float(printed[1]))) - sum(limits) / 2.0) < 2e-3
-    found = steep_arc(route_demands(setup), 0)
+    found = steep_arc(route_requirements(setup), 0)
     assert found is not None
     assert abs(found.limit - sum(limits) / 2.0) < 1e-4
 
@@ -313,18 +313,18 @@ def test_the_other_legs_limit_counts_too(from_deg: float) -> None:
 @pytest.mark.parametrize(("speeds", "steep"), [([25.0, 25.0], True), ([25.0, 34.0], False), ([34.0, 25.0], False)])
 def test_an_arc_beside_a_leg_that_cannot_climb_at_all_is_not_judged(speeds: list[float], steep: bool) -> None:
     """At 34 m/s the aircraft sinks at full throttle: the leg fails by its speed."""
-    demands = route_demands(make_setup(corner(100.0, (11.0, 11.0)), speeds=speeds))
-    assert (demands.climb > 0.0).all() == (34.0 not in speeds)
-    assert (steep_arc(demands, 0) is not None) is steep
+    requirements = route_requirements(make_setup(corner(100.0, (11.0, 11.0)), speeds=speeds))
+    assert (requirements.climb > 0.0).all() == (34.0 not in speeds)
+    assert (steep_arc(requirements, 0) is not None) is steep
 
 
 @pytest.mark.parametrize(("climb", "dive"), [(9.0, 6.0), (15.0, 9.0)])
 def test_the_tighter_of_scenario_and_aircraft(climb: float, dive: float) -> None:
     """The aircraft has 13.7 degrees up and 7.8 down."""
     setup = make_setup(corner(20.0, (4.0, -4.0)), limits={"max_climb_deg": climb, "max_dive_deg": dive})
-    demands = route_demands(setup)
+    requirements = route_requirements(setup)
     for number, (fixed, own) in enumerate(((climb, CALM_CLIMB), (dive, CALM_DESCENT))):
-        limit, source = slope_limit(demands, number)
+        limit, source = slope_limit(requirements, number)
         assert math.degrees(limit) == pytest.approx(min(fixed, own))
         assert source == ("scenario" if fixed < own else "aircraft")
 
@@ -333,7 +333,7 @@ def test_the_tighter_of_scenario_and_aircraft(climb: float, dive: float) -> None
 def test_the_tighter_turn(fixed: float, source: str) -> None:
     """Legs of 400 m hold an arc of R tan(turn / 2) = 400 m."""
     points = [[0, 0, 300], [0, 400, 300], [400, 400, 300]]
-    demands = route_demands(make_setup(points, limits={"max_turn_deg": fixed}))
+    requirements = route_requirements(make_setup(points, limits={"max_turn_deg": fixed}))
     own = 2.0 * math.degrees(math.atan(400.0 / bank_radius()))
-    assert turn_limit(demands, 1) == (pytest.approx(math.radians(min(fixed, own))), source)
-    assert turn_limit(route_demands(make_setup(points), envelope=False), 1) == (math.inf, "none")
+    assert turn_limit(requirements, 1) == (pytest.approx(math.radians(min(fixed, own))), source)
+    assert turn_limit(route_requirements(make_setup(points), envelope=False), 1) == (math.inf, "none")

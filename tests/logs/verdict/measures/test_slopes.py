@@ -8,7 +8,7 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.measures import slopes
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.slopes import (
     Ability,
     SlopeMeasure,
@@ -19,13 +19,13 @@ from logs.verdict.measures.slopes import (
     measure_slope,
     straight_span,
 )
-from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from logs.verdict.tolerances import ROUGH_COURSE, SLOPE_FLOOR
 from tests.synthetic import Profile, edited, fly_path, make_setup
 
 
 def aligned_with(setup: FlightSetup, track: Track) -> AlignedTrack:
-    aligned = lay_track(route_demands(setup), track)
+    aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     return aligned
 
@@ -38,37 +38,37 @@ def test_a_line_is_fitted_with_the_rms_of_what_it_leaves() -> None:
 
 
 def test_long_legs_have_the_planned_course_and_slope(setup: FlightSetup, track: Track) -> None:
-    demands, aligned = route_demands(setup), aligned_with(setup, track)
-    for leg in range(demands.legs):
-        course, slope = leg_course(demands, aligned, leg), leg_slope(demands, aligned, leg)
+    requirements, aligned = route_requirements(setup), aligned_with(setup, track)
+    for leg in range(requirements.legs):
+        course, slope = leg_course(requirements, aligned, leg), leg_slope(requirements, aligned, leg)
         assert course is not None
         assert slope is not None
         assert course.fitted
         assert slope.fitted
-        assert np.cos(course.value - demands.courses[leg]) == pytest.approx(1.0, abs=1e-8)
-        assert slope.value == pytest.approx(demands.slopes[leg], abs=1e-3)
+        assert np.cos(course.value - requirements.courses[leg]) == pytest.approx(1.0, abs=1e-8)
+        assert slope.value == pytest.approx(requirements.slopes[leg], abs=1e-3)
         assert slope.tolerance >= SLOPE_FLOOR
 
 
 def test_a_short_leg_is_rough() -> None:
     setup = make_setup([[0, 0, 300], [0, 1000, 300], [100, 1150, 300], [100, 2500, 300]])
-    course = leg_course(route_demands(setup), aligned_with(setup, fly_path(setup)), 1)
+    course = leg_course(route_requirements(setup), aligned_with(setup, fly_path(setup)), 1)
     assert course is not None
     assert not course.fitted
     assert course.tolerance == ROUGH_COURSE
 
 
 def test_a_leg_that_was_not_flown_has_neither(setup: FlightSetup) -> None:
-    demands, aligned = route_demands(setup), aligned_with(setup, fly_path(setup, stop=2500.0))
-    assert leg_course(demands, aligned, 3) is None
-    assert leg_slope(demands, aligned, 3) is None
+    requirements, aligned = route_requirements(setup), aligned_with(setup, fly_path(setup, stop=2500.0))
+    assert leg_course(requirements, aligned, 3) is None
+    assert leg_slope(requirements, aligned, 3) is None
 
 
 def test_the_straight_span_lies_between_the_turns(setup: FlightSetup) -> None:
-    demands = route_demands(setup)
-    low, high = straight_span(demands, 1, 0.0)
-    assert (low, high) == (demands.after[1], demands.runs[1] - demands.before[2])
-    inner = straight_span(demands, 1, 100.0, level=True)
+    requirements = route_requirements(setup)
+    low, high = straight_span(requirements, 1, 0.0)
+    assert (low, high) == (requirements.after[1], requirements.runs[1] - requirements.before[2])
+    inner = straight_span(requirements, 1, 100.0, level=True)
     assert inner[0] >= low + 100.0
     assert inner[1] <= high - 100.0
 
@@ -83,10 +83,10 @@ def measured(
     throttle: Profile | None = None, airspeed: Profile | None = None, up: Profile | None = None
 ) -> SlopeMeasure:
     setup = make_setup(CLIMB)
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup, throttle=throttle, airspeed=airspeed, up=up))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, throttle=throttle, airspeed=airspeed, up=up))
     assert aligned is not None
-    return measure_slope(demands, aligned, 1)
+    return measure_slope(requirements, aligned, 1)
 
 
 def test_a_clean_climb_has_its_slope_and_no_time_at_a_limit() -> None:
@@ -128,10 +128,10 @@ def test_rising_air_lends_speed_that_fades() -> None:
 def test_a_leg_within_a_hundred_metres_of_both_its_turns_is_short(run: float, short: bool) -> None:
     """And a level leg's height is measured between its turns all the same."""
     setup = make_setup([[0, 0, 300], [0, 1000, 300], [0, 1000 + run, 300], [0, 2500, 300]])
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup, up=lambda s: 0.0 * s + 4.0))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, up=lambda s: 0.0 * s + 4.0))
     assert aligned is not None
-    measure = measure_slope(demands, aligned, 1)
+    measure = measure_slope(requirements, aligned, 1)
     assert measure.short is short
     assert measure.height_error == pytest.approx(4.0, abs=0.01)
 
@@ -140,13 +140,13 @@ def test_a_leg_within_a_hundred_metres_of_both_its_turns_is_short(run: float, sh
 def test_speed_that_a_gust_along_the_track_took_is_not_lost(throttle: float, off: float) -> None:
     """The airspeed is 3 m/s off and the speed over the ground 1 m/s: the lesser counts."""
     setup = make_setup(CLIMB)
-    demands = route_demands(setup)
+    requirements = route_requirements(setup)
 
     def measure(airspeed: float, ground: float) -> SlopeMeasure:
         track = fly_path(setup, throttle=lambda s: 0.0 * s + throttle, airspeed=lambda s: 0.0 * s + ground)
-        aligned = lay_track(demands, edited(track, airspeed=np.full_like(track.airspeed, 25.0 + airspeed)))
+        aligned = align_track(requirements, edited(track, airspeed=np.full_like(track.airspeed, 25.0 + airspeed)))
         assert aligned is not None
-        return measure_slope(demands, aligned, 1)
+        return measure_slope(requirements, aligned, 1)
 
     for airspeed, ground, lost in ((off, off / 3.0, 1.0), (off / 3.0, off, 1.0), (off, 0.0, 0.0), (off, off, 3.0)):
         found = measure(airspeed, ground)

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from tests.logs.verdict.judging import judge
 from tests.synthetic import (
     fly_path,
@@ -18,7 +18,7 @@ def test_routes_that_come_back_are_laid_leg_by_leg() -> None:
     setup = make_setup(points)
     track = fly_path(setup, rate=20.0)
     assert judge(setup, track).flyable
-    flown = lay_track(route_demands(setup), track)
+    flown = align_track(route_requirements(setup), track)
     assert flown is not None
     assert (np.diff(flown.rows) > 800).all()
     assert flown.distance.max() < 3.0

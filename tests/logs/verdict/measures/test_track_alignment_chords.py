@@ -9,8 +9,8 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.measures import track_alignment
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import along_across, approaches, lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track, along_across, approaches
 from tests.synthetic import fly_path, make_setup, waypoint_stations
 
 CAPTURE = 500.0
@@ -60,7 +60,7 @@ LONG = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
 @pytest.mark.parametrize(("rate", "rows"), [(50.0, 12), (10.0, 2), (2.0, 1)])
 def test_a_chord_lasts_as_long_at_any_rate(steps: list[int], rate: float, rows: int) -> None:
     setup = make_setup(LONG)
-    assert lay_track(route_demands(setup), fly_path(setup, rate=rate)) is not None
+    assert align_track(route_requirements(setup), fly_path(setup, rate=rate)) is not None
     # As many whole rows as a quarter of a second has, or one.
     assert steps == [rows]
 
@@ -69,7 +69,7 @@ def test_a_long_tracks_table_is_thinned_to_its_size(steps: list[int], monkeypatc
     setup = make_setup(LONG)
     track = fly_path(setup)
     monkeypatch.setattr(track_alignment, "_CELLS", 600)
-    aligned = lay_track(route_demands(setup), track)
+    aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     # 14,400 rows and three waypoints in 600 cells.
     assert steps == [math.ceil(len(track) * 3 / 600)]
@@ -81,7 +81,7 @@ def test_a_waypoint_that_was_missed_lies_between_its_neighbours() -> None:
     points = [[0, 0, 300], [0, 4000, 300], [2000, 5000, 300], [0, 6000, 300], [0, 9000, 300], [1500, 9000, 300]]
     setup = make_setup([*points, [1500, 4000, 300]])
     flown = make_setup([*points[:2], *points[3:], [1500, 4000, 300]])
-    aligned = lay_track(route_demands(setup), fly_path(flown))
+    aligned = align_track(route_requirements(setup), fly_path(flown))
     assert aligned is not None
     assert aligned.track.time[aligned.rows[1:4]] == pytest.approx([160.0, 200.0, 240.0], abs=0.5)
     assert aligned.distance[2] == pytest.approx(2000.0, rel=0.1)
@@ -91,7 +91,7 @@ def test_a_waypoint_that_was_missed_lies_between_its_neighbours() -> None:
 def test_the_first_rows_end_of_a_flight_that_met_nothing() -> None:
     far = make_setup([[9000, 0, 300], [9000, 3000, 300]])
     track = fly_path(make_setup([[0, 0, 300], [0, 3000, 300]]))
-    aligned = lay_track(route_demands(far), track)
+    aligned = align_track(route_requirements(far), track)
     assert aligned is not None
     assert aligned.rows.tolist() == [0, len(track) - 1]
     assert aligned.passed.tolist() == [True, False]
@@ -105,7 +105,7 @@ def test_along_and_to_the_right_of_a_leg(course_deg: float) -> None:
     setup = make_setup([[*start, 300], [*(start + 900.0 * ahead), 300], [*(start + 1800.0 * ahead), 300]])
     wanted = np.array([[0.0, 0.0], [500.0, 30.0], [-20.0, -70.0]])
     position = np.column_stack([start + wanted[:, :1] * ahead + wanted[:, 1:] * right, np.full(3, 300.0)])
-    along, across = along_across(route_demands(setup), 0, position)
+    along, across = along_across(route_requirements(setup), 0, position)
     np.testing.assert_allclose(np.column_stack([along, across]), wanted, atol=1e-9)
 
 
@@ -119,7 +119,7 @@ def test_the_approach_of_each_segment() -> None:
 def test_the_course_and_run_of_a_track_are_its_steps() -> None:
     setup: FlightSetup = make_setup([[0, 0, 300], [2000, 0, 300], [2000, -3000, 300]])
     track = fly_path(setup, radius=100.0, rate=10.0)
-    aligned = lay_track(route_demands(setup), track)
+    aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     at = int(waypoint_stations(setup, 100.0)[1] / 2.5)
     assert np.degrees(aligned.course[[0, at - 70, at + 70, -1]]) == pytest.approx([90.0, 90.0, 180.0, 180.0], abs=0.01)

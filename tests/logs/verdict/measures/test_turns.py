@@ -8,8 +8,8 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track, join_tracks
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.turns import OF_NEXT_LEG, CornerPass, TurnMeasure, corner_passes, measure_turn
 from tests.synthetic import bank_radius, bump, copied, edited, fly_path, make_setup, waypoint_stations
 
@@ -27,10 +27,10 @@ def corner(course_deg: float, side: float = 1.0) -> FlightSetup:
 
 
 def measured(setup: FlightSetup, track: Track, i: int = 1) -> TurnMeasure:
-    demands = route_demands(setup)
-    aligned = lay_track(demands, track)
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, track)
     assert aligned is not None
-    return measure_turn(demands, aligned, i)
+    return measure_turn(requirements, aligned, i)
 
 
 @pytest.mark.parametrize("course", [0.0, 50.0, 200.0, 290.0])
@@ -125,25 +125,25 @@ def test_a_turn_is_settled_over_the_last_second_before_the_next(early: float, se
 
 
 def test_a_clean_turn_is_measured_as_it_was_flown(setup: FlightSetup, track: Track) -> None:
-    demands = route_demands(setup)
-    aligned = lay_track(demands, track)
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, track)
     assert aligned is not None
     for i in (1, 2, 3):
-        measure = measure_turn(demands, aligned, i)
+        measure = measure_turn(requirements, aligned, i)
         assert measure.fitted
         assert measure.over
         assert measure.full_circles == 0
-        assert measure.angle == pytest.approx(abs(demands.turns[i]), abs=1e-4)
+        assert measure.angle == pytest.approx(abs(requirements.turns[i]), abs=1e-4)
         assert measure.radius == pytest.approx(bank_radius(), rel=0.02)
         assert measure.held_bank == pytest.approx(math.radians(30.0), abs=0.01)
-        assert measure.passed == pytest.approx(demands.fly_by_offset[i], abs=0.1)
+        assert measure.passed == pytest.approx(requirements.fly_by_offset[i], abs=0.1)
 
 
 def test_a_turn_that_was_not_reached_has_no_numbers(setup: FlightSetup) -> None:
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup, stop=2500.0))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, stop=2500.0))
     assert aligned is not None
-    assert measure_turn(demands, aligned, 3) == TurnMeasure()
+    assert measure_turn(requirements, aligned, 3) == TurnMeasure()
 
 
 # ----------------------------------------------------------------------
@@ -163,10 +163,10 @@ def passes(flown: Sequence[Place], route: Sequence[Place] = ROUTE) -> tuple[Corn
     along = np.linspace(0.0, marks[-1], len(track))
     level = np.full(len(track), 300.0)
     position = np.column_stack([np.interp(along, marks, way[:, 0]), np.interp(along, marks, way[:, 1]), level])
-    demands = route_demands(setup)
-    aligned = lay_track(demands, edited(track, position=position))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, edited(track, position=position))
     assert aligned is not None
-    return corner_passes(demands, aligned)
+    return corner_passes(requirements, aligned)
 
 
 def test_a_flight_over_the_corners_overshoots_none() -> None:

@@ -14,7 +14,7 @@ from flight.dynamics.trim import straight
 from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.rules.energy_rule import air_angle, predicted_energy
 from tests.logs.verdict.judging import failing, judge, of
@@ -43,7 +43,7 @@ def test_the_parabola_through_three_trims_is_the_trims_between_them(airspeed: fl
 
 def test_prediction_and_flight_agree() -> None:
     setup = real_setup()
-    predicted, peak = predicted_energy(route_demands(setup))
+    predicted, peak = predicted_energy(route_requirements(setup))
     flown = simulate(setup, AEROSONDE)
     item = of(judge_flight(setup, flown.track, flown.ended), "energy")
     assert item.planned == pytest.approx(predicted, abs=1e-5)
@@ -54,7 +54,7 @@ def test_prediction_and_flight_agree() -> None:
 
 
 def test_a_battery_that_is_too_small_fails_before_the_flight_too() -> None:
-    predicted, _ = predicted_energy(route_demands(real_setup()))
+    predicted, _ = predicted_energy(route_requirements(real_setup()))
     for battery, ok in ((predicted / 0.8 * 1.01, True), (predicted / 0.8 * 0.99, False)):
         item = of(judge_geometry(replace(real_setup(), battery=battery)), "energy")
         assert item.ok is ok
@@ -71,12 +71,12 @@ def test_a_battery_with_less_than_its_reserve_left_fails(setup: FlightSetup) -> 
 
 
 def test_a_headwind_takes_longer_and_a_slope_over_the_ground_is_steeper_in_it() -> None:
-    calm, _ = predicted_energy(route_demands(real_setup()))
+    calm, _ = predicted_energy(route_requirements(real_setup()))
     scenario = make_scenario(ROUTE, wind={"speed_mps": 8.0, "from_deg": 20.0})
-    against, _ = predicted_energy(route_demands(real_setup(scenario=scenario)))
+    against, _ = predicted_energy(route_requirements(real_setup(scenario=scenario)))
     assert against > 1.2 * calm
-    demands = route_demands(real_setup())
-    assert air_angle(demands, 1, 25.0, 650.0) == pytest.approx(float(demands.slopes[1]), abs=1e-3)
+    requirements = route_requirements(real_setup())
+    assert air_angle(requirements, 1, 25.0, 650.0) == pytest.approx(float(requirements.slopes[1]), abs=1e-3)
 
 
 def test_what_is_not_known_is_not_judged() -> None:

@@ -8,8 +8,8 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding, make_finding
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
-from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from logs.verdict.places import Place
 from logs.verdict.rules.loiter_rule import Circle, circles, fold_loiters
 from tests.logs.verdict.judging import judge, of
@@ -28,27 +28,27 @@ def loiter(radius: float = 200.0, turns: int = 2) -> FlightSetup:
 
 def laid(
     setup: FlightSetup, wider: float = 0.0, stop: float | None = None
-) -> tuple[RouteDemands, AlignedTrack, Circle]:
+) -> tuple[RouteRequirements, AlignedTrack, Circle]:
     """The setup's route and its flight, this much to the outside (m) from the first turn around it on."""
-    demands = route_demands(setup)
-    side = math.copysign(1.0, demands.turns[1])
+    requirements = route_requirements(setup)
+    side = math.copysign(1.0, requirements.turns[1])
     track = fly_path(
         setup,
-        radius=[float(radius) for radius in demands.radius[1:-1]],
+        radius=[float(radius) for radius in requirements.radius[1:-1]],
         across=lambda s: -side * wider * (s > WIDER_FROM),
         stop=stop,
         rate=20.0,
     )
-    aligned = lay_track(demands, track)
+    aligned = align_track(requirements, track)
     assert aligned is not None
-    (circle,) = circles(demands)
-    return demands, aligned, circle
+    (circle,) = circles(requirements)
+    return requirements, aligned, circle
 
 
 @pytest.mark.parametrize("radius", [200.0, -200.0, 120.0])
 def test_a_circle_is_joined_and_left_on_tangents(radius: float) -> None:
     """Whole turns, and what the tangents from 2 km before and to 2.5 km beside it are apart."""
-    (circle,) = circles(route_demands(loiter(radius)))
+    (circle,) = circles(route_requirements(loiter(radius)))
     joined, left = math.asin(abs(radius) / 2000.0), math.asin(abs(radius) / 2500.0)
     # Clockwise it is left towards the east after a quarter of a turn more, the other way round after three.
     quarter = 0.25 if radius > 0.0 else 0.75
@@ -59,8 +59,8 @@ def test_a_circle_is_joined_and_left_on_tangents(radius: float) -> None:
 
 def test_two_circles_are_two() -> None:
     lines = (wp(0, 500), wp(0, 2500, command=18, p="1 0 200 0"), wp(1500, 2500, command=18, p="1 0 -150 0"))
-    demands = route_demands(setup_of(*lines, wp(2500, 4500)))
-    first, second = circles(demands)
+    requirements = route_requirements(setup_of(*lines, wp(2500, 4500)))
+    first, second = circles(requirements)
     assert (first.radius, second.radius, second.first) == (200.0, 150.0, first.last + 1)
     assert first.middle == pytest.approx(MIDDLE, abs=0.02)
     assert second.middle == pytest.approx([1500.0, 2500.0], abs=0.02)
@@ -70,7 +70,7 @@ def test_two_circles_are_two() -> None:
 def test_the_radius_as_flown_is_told(wider: float) -> None:
     """Some way around it the flight goes wider; it joins the circle on a tangent of 1,990 m."""
     setup = loiter()
-    demands, aligned, circle = laid(setup, wider)
+    requirements, aligned, circle = laid(setup, wider)
     item = of(judge(setup, aligned.track), "loiter")
     way = 2.0 * math.pi * 200.0 * circle.turns
     share = (math.sqrt(2000.0**2 - 200.0**2) + way - WIDER_FROM) / way
@@ -80,7 +80,7 @@ def test_the_radius_as_flown_is_told(wider: float) -> None:
     assert low == pytest.approx(200.0 + min(wider, 0.0), abs=0.06)
     assert high == pytest.approx(200.0 + max(wider, 0.0), abs=0.06)
     assert f"{circle.turns:.2f} turns with 200 m" in item.reason
-    assert item.margin == pytest.approx(200.0 - float(demands.tightest[circle.first : circle.last + 1].max()))
+    assert item.margin == pytest.approx(200.0 - float(requirements.tightest[circle.first : circle.last + 1].max()))
 
 
 def finding(rule: str, place: Place, ok: bool | None, margin: float | None) -> Finding:
@@ -102,17 +102,17 @@ def test_the_worst_of_a_circles_legs_is_told(
     rule: str, outcomes: list[tuple[bool | None, float | None]], told: int
 ) -> None:
     """A failed one before one that was not judged before a passed one; of these the least margin."""
-    demands = route_demands(loiter())
-    (circle,) = circles(demands)
+    requirements = route_requirements(loiter())
+    (circle,) = circles(requirements)
     legs = [Place("leg", circle.first + k) for k in (0, 2, circle.last - circle.first - 1)]
     mine = [finding(rule, place, *outcome) for place, outcome in zip(legs, outcomes, strict=True)]
     beside = [finding(rule, Place("leg", k), True, 0.0) for k in (circle.first - 1, circle.last)]
     other = finding("energy", Place("leg", circle.first), True, 0.0)
-    folded = fold_loiters(demands, None, [*mine, *beside, other])
+    folded = fold_loiters(requirements, None, [*mine, *beside, other])
     reason = f"{mine[told].reason}; the worst of the circle's 3 legs"
     assert folded == (replace(mine[told], reason=reason), *beside, other)
     # One alone is as it was.
-    assert fold_loiters(demands, None, [mine[0], *beside]) == (mine[0], *beside)
+    assert fold_loiters(requirements, None, [mine[0], *beside]) == (mine[0], *beside)
 
 
 @pytest.mark.parametrize(
@@ -120,34 +120,34 @@ def test_the_worst_of_a_circles_legs_is_told(
 )
 def test_a_loiters_corners_are_one_finding(outcomes: tuple[bool | None, bool | None], ok: bool | None) -> None:
     setup = loiter()
-    demands, aligned, circle = laid(setup)
-    corners = [demands.waypoint(circle.first), demands.waypoint(circle.last)]
+    requirements, aligned, circle = laid(setup)
+    corners = [requirements.waypoint(circle.first), requirements.waypoint(circle.last)]
     at = [finding("turn", corners[0], outcomes[0], 1.0), finding("waypoint", corners[1], outcomes[1], 1.0)]
-    outside = finding("waypoint", demands.waypoint(circle.last + 1), True, 1.0)
-    (one, rest) = fold_loiters(demands, aligned, [at[0], outside, at[1]])
+    outside = finding("waypoint", requirements.waypoint(circle.last + 1), True, 1.0)
+    (one, rest) = fold_loiters(requirements, aligned, [at[0], outside, at[1]])
     assert rest is outside
     assert (one.rule, one.place, one.ok) == ("loiter", corners[0], ok)
     assert ("did not get to its end" in one.reason) is (ok is None)
 
 
 def test_corners_that_were_not_held_are_counted_and_the_worst_is_named() -> None:
-    demands, aligned, circle = laid(loiter())
-    corners = [demands.waypoint(k) for k in (circle.first, circle.first + 1, circle.last)]
+    requirements, aligned, circle = laid(loiter())
+    corners = [requirements.waypoint(k) for k in (circle.first, circle.first + 1, circle.last)]
     at = [finding("turn", corners[0], False, -1.0), finding("turn", corners[1], False, -3.0)]
     at += [finding("waypoint", corners[1], False, -2.0), finding("turn", corners[2], True, 5.0)]
-    (one,) = fold_loiters(demands, aligned, at)
+    (one,) = fold_loiters(requirements, aligned, at)
     count = circle.last - circle.first + 1
     assert one.ok is False
     assert one.reason.startswith(f"2 of {count} corners not held, as waypoint {circle.first + 1} (item 2): turn -3.0")
     # Of the route alone the first is told.
-    (planned,) = fold_loiters(demands, None, at)
+    (planned,) = fold_loiters(requirements, None, at)
     assert planned.reason.startswith(f"waypoint {circle.first} (item 2): turn -1.0")
 
 
 def test_a_circle_that_was_left_early_has_no_radius() -> None:
-    demands, aligned, circle = laid(loiter(), stop=3000.0)
-    corner = demands.waypoint(circle.first)
-    (one,) = fold_loiters(demands, aligned, [finding("turn", corner, None, None)])
+    requirements, aligned, circle = laid(loiter(), stop=3000.0)
+    corner = requirements.waypoint(circle.first)
+    (one,) = fold_loiters(requirements, aligned, [finding("turn", corner, None, None)])
     assert one.flown is None
     assert "flown with" not in one.reason
 
@@ -155,8 +155,10 @@ def test_a_circle_that_was_left_early_has_no_radius() -> None:
 def test_a_circle_where_the_wind_leaves_no_way_around_says_so() -> None:
     setup = loiter()
     scenario = replace(setup.scenario, wind=replace(setup.scenario.wind, speed=30.0))
-    demands = route_demands(replace(setup, scenario=scenario, limits=replace(setup.limits, wind=scenario.wind)))
-    (circle,) = circles(demands)
-    (one,) = fold_loiters(demands, None, [finding("turn", demands.waypoint(circle.first), True, 1.0)])
+    requirements = route_requirements(
+        replace(setup, scenario=scenario, limits=replace(setup.limits, wind=scenario.wind))
+    )
+    (circle,) = circles(requirements)
+    (one,) = fold_loiters(requirements, None, [finding("turn", requirements.waypoint(circle.first), True, 1.0)])
     assert one.ok is False
     assert "at 25 m/s the wind leaves no way around it" in one.reason

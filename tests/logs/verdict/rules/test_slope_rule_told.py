@@ -6,9 +6,9 @@ import pytest
 
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.measures.slopes import Ability, LegFit, SlopeMeasure
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules import slope_rule
 from logs.verdict.rules.slope_rule import slope_findings
 from tests.logs.verdict.judging import leg, of
@@ -30,9 +30,9 @@ def judged(
 ) -> Finding:
     """The finding of a leg of this slope (degrees) that is measured so."""
     setup = make_setup(hill(slope), **world)
-    demands = route_demands(setup, envelope=envelope)
+    requirements = route_requirements(setup, envelope=envelope)
     monkeypatch.setattr(slope_rule, "measure_slope", lambda *_: measure)
-    return slope_findings(demands, lay_track(demands, fly_path(setup, rate=5.0)))[1]
+    return slope_findings(requirements, align_track(requirements, fly_path(setup, rate=5.0)))[1]
 
 
 @pytest.mark.parametrize(("seconds", "told"), [(0.9, False), (1.1, True)])

@@ -11,7 +11,7 @@ from flight.autopilots.arduplane.parameters import default_parameters
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.verdict.judge_flight import judge_flight, judge_geometry
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.places import FLIGHT
 from logs.verdict.rules.stall_rule import level_stall, planned_bank, stall_findings
 from logs.verdict.tolerances import STALL_TOLERANCE
@@ -49,7 +49,7 @@ def test_a_stall_speed_at_height_is_a_true_airspeed() -> None:
     for amsl, least in ((0.0, 16.0), (1500.0, 17.5), (3000.0, 19.0)):
         way = [[east, north, amsl] for east, north, _ in CORNER]
         setup = make_setup(way, airspeed=25.0, table=table, terrain={"kind": "none"})
-        assert level_stall(route_demands(setup), amsl) == pytest.approx(least)
+        assert level_stall(route_requirements(setup), amsl) == pytest.approx(least)
         assert of(judge_geometry(setup), "stall").limit == pytest.approx(least * math.sqrt(1.0 / math.cos(math.pi / 6)))
 
 
@@ -69,23 +69,23 @@ def test_an_equivalent_airspeed_that_is_commanded_is_a_higher_true_one() -> None
 
 
 def test_the_bank_of_a_turn_is_that_of_its_radius_and_of_what_there_is_time_for() -> None:
-    demands = route_demands(corner(25.0))
-    assert planned_bank(demands, 1, 25.0) == pytest.approx(math.radians(30.0))
+    requirements = route_requirements(corner(25.0))
+    assert planned_bank(requirements, 1, 25.0) == pytest.approx(math.radians(30.0))
     # The slower of two legs on the arc of the faster: tan b = v^2 / (g R), R = 25^2 / (g tan 30).
     slower = math.atan(math.tan(math.radians(30.0)) * (20.0 / 25.0) ** 2)
-    mixed = route_demands(make_setup(CORNER, speeds=[20.0, 25.0]))
+    mixed = route_requirements(make_setup(CORNER, speeds=[20.0, 25.0]))
     assert planned_bank(mixed, 1, 20.0) == pytest.approx(slower)
     assert planned_bank(mixed, 1, 25.0) == pytest.approx(math.radians(30.0))
     # 2 degrees are over before 30 of bank are reached: (v / g) turn / 0.8 s is the square of what is.
-    slight = route_demands(corner(25.0, 2.0))
+    slight = route_requirements(corner(25.0, 2.0))
     assert planned_bank(slight, 1, 25.0) == pytest.approx(math.sqrt(math.radians(2.0) * 25.0 / (9.80665 * 0.8)))
-    assert planned_bank(route_demands(corner(25.0, 0.0)), 1, 25.0) == 0.0
+    assert planned_bank(route_requirements(corner(25.0, 0.0)), 1, 25.0) == 0.0
 
 
 def test_a_circle_wider_than_the_bank_limits_takes_less_bank() -> None:
     setup = corner(25.0)
     wide = replace(setup, route=replace(setup.route, arcs=np.array([0.0, 300.0, 0.0])))
-    assert planned_bank(route_demands(wide), 1, 25.0) == pytest.approx(math.atan(25.0**2 / (9.80665 * 300.0)))
+    assert planned_bank(route_requirements(wide), 1, 25.0) == pytest.approx(math.atan(25.0**2 / (9.80665 * 300.0)))
 
 
 def slowed(setup: FlightSetup, speed: float, *, bank_deg: float = 0.0, load: float = 1.0) -> Track:
@@ -134,10 +134,10 @@ def test_a_gust_of_a_moment_is_no_stall_and_turbulence_has_its_own() -> None:
 def test_what_is_not_known_is_not_said() -> None:
     unknown: Envelope = replace(envelope(), level_speed_min=np.full(3, math.nan))
     setup = corner(25.0, table=unknown)
-    assert stall_findings(route_demands(setup), None, geometric=True) == []
-    assert stall_findings(route_demands(setup), None) == []
+    assert stall_findings(route_requirements(setup), None, geometric=True) == []
+    assert stall_findings(route_requirements(setup), None) == []
     straight = make_setup([[0, 0, 300], [0, 2000, 300]])
-    assert stall_findings(route_demands(straight), None, geometric=True) == []
+    assert stall_findings(route_requirements(straight), None, geometric=True) == []
     # By flown evidence alone the aircraft's envelope says nothing.
     judged = judge_flight(straight, slowed(straight, 15.2), "completed", envelope=False)
     assert "stall" not in {item.rule for item in judged.findings}
@@ -145,8 +145,8 @@ def test_what_is_not_known_is_not_said() -> None:
 
 def test_in_wind_the_bank_limit_holds_on_the_way_downwind() -> None:
     scenario = make_scenario(CORNER, wind={"speed_mps": 8.0, "from_deg": 180.0})
-    demands = route_demands(make_setup(CORNER, scenario=scenario))
-    assert planned_bank(demands, 1, 25.0) == pytest.approx(math.radians(30.0))
+    requirements = route_requirements(make_setup(CORNER, scenario=scenario))
+    assert planned_bank(requirements, 1, 25.0) == pytest.approx(math.radians(30.0))
 
 
 @pytest.mark.parametrize(("speeds", "at"), [([18.0, 20.0, 25.0, 25.0], 1), ([25.0, 25.0, 20.0, 18.0], 3)])

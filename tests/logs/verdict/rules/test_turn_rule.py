@@ -8,8 +8,8 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.turns import measure_turn
 from tests.logs.verdict.judging import ROUTE, failing, judge, of, waypoint
 from tests.synthetic import (
@@ -91,10 +91,10 @@ def test_overshoot(setup: FlightSetup, height: float, ok: bool) -> None:
     assert fact(item, "overshoot") == pytest.approx(max(0.0, -height), abs=0.1)
     assert f"overshoot {max(0.0, -height):.1f} m" in item.reason
     assert of(judge(setup, track, envelope=False), "turn", waypoint(1)).ok is ok
-    demands = route_demands(setup)
-    flown = lay_track(demands, track)
+    requirements = route_requirements(setup)
+    flown = align_track(requirements, track)
     assert flown is not None
-    assert measure_turn(demands, flown, 1).overshoot == pytest.approx(max(0.0, -height), abs=0.1)
+    assert measure_turn(requirements, flown, 1).overshoot == pytest.approx(max(0.0, -height), abs=0.1)
 
 
 def test_an_overshoot_within_the_arc_is_seen(setup: FlightSetup) -> None:
@@ -135,7 +135,7 @@ def test_a_jog_that_the_corridor_has_room_for(aside: float, corridor: float, ok:
     verdict = judge_geometry(setup)
     assert [of(verdict, "turn", waypoint(k)).ok for k in (1, 2)] == [ok, ok]
     if ok:
-        assert "a jog: the way without it passes it at" in of(verdict, "turn", waypoint(1)).reason
+        assert "a negligible kink: the way without it passes it at" in of(verdict, "turn", waypoint(1)).reason
 
 
 def test_a_corner_between_short_legs_is_no_jog_where_the_way_without_it_turns_as_sharply() -> None:

@@ -1,11 +1,11 @@
-"""How many waypoints in a row, and how far aside, count as one jog; how high a step is one."""
+"""How many waypoints in a row, and how far aside, count as one negligible kink; how high a step is one."""
 
 import math
 
 import pytest
 
-from logs.verdict.measures.acceptance import jog, step
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.acceptance import negligible_kink, step
+from logs.verdict.measures.route_requirements import route_requirements
 from tests.synthetic import make_setup
 
 
@@ -18,7 +18,7 @@ def zigzag(count: int, aside: float = 3.0) -> list[list[float]]:
 @pytest.mark.parametrize(("count", "found"), [(8, True), (9, True), (10, False)])
 def test_eight_waypoints_in_a_row_are_left_out_at_most(count: int, found: bool) -> None:
     """One of nine that stays turns by less than a degree; two of ten that stay turn by 17 between 20 m of leg."""
-    assert (jog(route_demands(make_setup(zigzag(count))), 1) is not None) is found
+    assert (negligible_kink(route_requirements(make_setup(zigzag(count))), 1) is not None) is found
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.24, True), (0.26, False)])
@@ -26,13 +26,13 @@ def test_a_jog_is_within_a_quarter_of_the_corridor(share: float, found: bool) ->
     """A sidestep by twice that has the straight way past both its corners at that distance."""
     aside = 2.0 * share * 30.0
     setup = make_setup([[0, 0, 300], [0, 1000, 300], [aside, 1000, 300], [aside, 2000, 300]])
-    assert (jog(route_demands(setup), 1) is not None) is found
+    assert (negligible_kink(route_requirements(setup), 1) is not None) is found
 
 
 @pytest.mark.parametrize(("rise", "found"), [(9.9, True), (-9.9, True), (10.1, False), (-10.1, False)])
 def test_a_step_is_ten_metres_high(rise: float, found: bool) -> None:
     setup = make_setup([[0, 0, 300], [0, 1500, 300], [0, 1512, 300 + rise], [0, 3000, 300 + rise]])
-    height = step(route_demands(setup), 1)
+    height = step(route_requirements(setup), 1)
     assert (height is not None) is found
     if found:
         assert height == pytest.approx(abs(rise))

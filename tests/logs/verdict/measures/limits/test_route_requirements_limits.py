@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from logs.verdict.measures.route_requirements import route_demands, turn_lengths
+from logs.verdict.measures.route_requirements import route_requirements, turn_lengths
 from tests.synthetic import bank_radius, make_setup
 
 
@@ -28,4 +28,4 @@ def test_a_fly_by_passes_its_waypoint_at_thirty_radii_at_most(turn: float, radii
     angle = math.radians(turn)
     points = [[0, 0, 300], [0, 9000, 300], [9000 * math.sin(angle), 9000 + 9000 * math.cos(angle), 300]]
     expected = radii or 1.0 / math.cos(0.5 * angle) - 1.0
-    assert route_demands(make_setup(points)).fly_by_offset[1] == pytest.approx(expected * bank_radius(), rel=1e-6)
+    assert route_requirements(make_setup(points)).fly_by_offset[1] == pytest.approx(expected * bank_radius(), rel=1e-6)

@@ -8,7 +8,7 @@ import pytest
 from aircraft.path_limits import BLEND_ACCELERATION
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.verdict.measures.route_requirements import RouteDemands, route_demands
+from logs.verdict.measures.route_requirements import RouteRequirements, route_requirements
 from logs.verdict.measures.slopes import (
     Ability,
     LegFit,
@@ -20,7 +20,7 @@ from logs.verdict.measures.slopes import (
     measure_slope,
     steady_rows,
 )
-from logs.verdict.measures.track_alignment import AlignedTrack, lay_track
+from logs.verdict.measures.track_alignment import AlignedTrack, align_track
 from tests.synthetic import Profile, edited, fly_path, make_setup
 
 # Metres between two rows at 25 m/s.
@@ -32,12 +32,14 @@ def straight(*runs: float) -> list[list[float]]:
     return [[0.0, sum(runs[:k]), 300.0] for k in range(len(runs) + 1)]
 
 
-def flown(points: list[list[float]], across: Profile | None = None, **how: float) -> tuple[RouteDemands, AlignedTrack]:
+def flown(
+    points: list[list[float]], across: Profile | None = None, **how: float
+) -> tuple[RouteRequirements, AlignedTrack]:
     setup = make_setup(points, **how)
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup, across=across))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, across=across))
     assert aligned is not None
-    return demands, aligned
+    return requirements, aligned
 
 
 def course_of(points: list[list[float]], leg: int, across: Profile | None = None) -> LegFit:
@@ -117,11 +119,11 @@ THERE = 1500.0
 GRAVITY = 9.80665
 
 
-def laid(setup: FlightSetup, track: Track) -> tuple[RouteDemands, AlignedTrack]:
-    demands = route_demands(setup)
-    aligned = lay_track(demands, track)
+def laid(setup: FlightSetup, track: Track) -> tuple[RouteRequirements, AlignedTrack]:
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, track)
     assert aligned is not None
-    return demands, aligned
+    return requirements, aligned
 
 
 def held(points: list[list[float]], throttle: float, power: float = 300.0) -> SlopeMeasure:
@@ -219,8 +221,8 @@ def test_an_ability_covers_a_slope_beyond_three_standard_errors(asked: float, co
 def test_a_leg_has_time_to_take_up_its_speed() -> None:
     """5 m/s at half a metre per second squared: ten seconds."""
     setup = make_setup(LEVEL, speeds=[20.0, 25.0, 25.0])
-    demands, aligned = laid(setup, fly_path(setup))
-    rows = steady_rows(demands, aligned, 1)
+    requirements, aligned = laid(setup, fly_path(setup))
+    rows = steady_rows(requirements, aligned, 1)
     begun = aligned.track.time[aligned.leg_rows(1).start]
     assert aligned.track.time[rows.start] - begun == pytest.approx(10.0, abs=0.02)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flight.simulation.setup import FlightSetup
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from tests.synthetic import edited, fly_path, make_setup, waypoint_stations
 
 STRAIGHT = [[0, 0, 300], [0, 3000, 300], [0, 6000, 300]]
@@ -40,7 +40,7 @@ def test_a_row_with_a_number_that_no_flight_has_is_bad(setup: FlightSetup, colum
     track = fly_path(setup)
     values = np.asarray(getattr(track, column), dtype=np.float64).copy()
     values[1000] = value
-    aligned = lay_track(route_demands(setup), edited(track, **{column: values}))
+    aligned = align_track(route_requirements(setup), edited(track, **{column: values}))
     assert aligned is not None
     assert aligned.bad_rows == bad
 
@@ -61,7 +61,7 @@ def test_a_flight_that_ends_ten_metres_short_has_arrived(
     setup: FlightSetup, acceptance: float, short: float, arrived: bool
 ) -> None:
     stated = replace(setup, route=replace(setup.route, acceptance=np.full(3, acceptance)))
-    aligned = lay_track(route_demands(stated), fly_path(setup, stop=6000.0 - short))
+    aligned = align_track(route_requirements(stated), fly_path(setup, stop=6000.0 - short))
     assert aligned is not None
     assert aligned.passed.tolist() == [True, True, arrived]
 
@@ -73,7 +73,7 @@ def test_a_waypoint_further_than_half_a_kilometre_aside_is_none_of_the_flights(
     """Past the last waypoint and 3 km on, at this distance beside it."""
     longer = make_setup([*STRAIGHT[:2], [0, 9000, 300]])
     track = fly_path(longer, across=lambda s: aside * np.clip((s - 3200.0) / 2000.0, 0.0, 1.0))
-    aligned = lay_track(route_demands(setup), track)
+    aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     assert aligned.passed.tolist() == [True, True, passed]
 
@@ -85,6 +85,6 @@ def test_a_place_passed_twice_has_each_time_the_rows_of_its_own_passage() -> Non
     stations = waypoint_stations(setup)
     between = 0.5 * float(stations[3] + stations[4])
     track = fly_path(setup, rate=20.0, across=lambda s: 3.0 * (s < between))
-    aligned = lay_track(route_demands(setup), track)
+    aligned = align_track(route_requirements(setup), track)
     assert aligned is not None
     assert aligned.track.time[aligned.rows] == pytest.approx(stations / 25.0, abs=1.0)

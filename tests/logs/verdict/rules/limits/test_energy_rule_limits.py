@@ -7,7 +7,7 @@ import pytest
 from aircraft.catalog import load_aircraft
 from flight.dynamics.envelope_tables import load_envelope
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_requirements import route_demands
+from logs.verdict.measures.route_requirements import route_requirements
 from logs.verdict.rules.energy_rule import predicted_energy
 from tests.logs.verdict.judging import judge, of
 from tests.synthetic import fly_path, make_scenario, make_setup
@@ -28,7 +28,7 @@ def test_a_fifth_of_the_battery_is_left_after_the_flight(share: float, ok: bool)
 @pytest.mark.parametrize(("share", "ok"), [(0.79, True), (0.81, False)])
 def test_or_by_prediction(share: float, ok: bool) -> None:
     table = load_envelope(load_aircraft("aerosonde"))
-    used, _ = predicted_energy(route_demands(make_setup(STRAIGHT, table=table)))
+    used, _ = predicted_energy(route_requirements(make_setup(STRAIGHT, table=table)))
     # Level at 25 m/s for 120 s.
     assert used == pytest.approx(table.power(25.0, 300.0, 0.0) * 120.0 / 3600.0, rel=1e-3)
     scenario = make_scenario(STRAIGHT, battery_wh=used / share)

@@ -7,9 +7,9 @@ import pytest
 from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
-from logs.verdict.measures.route_requirements import route_demands, steep_arc
+from logs.verdict.measures.route_requirements import route_requirements, steep_arc
 from logs.verdict.measures.slopes import Ability, LegFit, SlopeMeasure
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.rules import slope_rule
 from logs.verdict.rules.slope_rule import slope_findings
 from tests.logs.verdict.judging import leg, of
@@ -46,10 +46,10 @@ def test_half_a_metre_a_second_is_calm_air(wind: float, calm: bool) -> None:
 def judged(measure: SlopeMeasure, monkeypatch: pytest.MonkeyPatch, slope: float = 6.0, **world: object) -> Finding:
     """The finding of a climb, however it was flown, by flown evidence alone."""
     setup: FlightSetup = make_setup(hill(slope), **world)
-    demands = route_demands(setup, envelope=False)
-    aligned = lay_track(demands, fly_path(setup))
+    requirements = route_requirements(setup, envelope=False)
+    aligned = align_track(requirements, fly_path(setup))
     monkeypatch.setattr(slope_rule, "measure_slope", lambda *_: measure)
-    return slope_findings(demands, aligned)[1]
+    return slope_findings(requirements, aligned)[1]
 
 
 @pytest.mark.parametrize(
@@ -123,4 +123,4 @@ def test_an_arc_may_take_a_metre_a_second_of_speed(lost: float, steep: bool) -> 
         [0.0, 2000.0, 1500.0 - drop],
         [2000.0 * math.sin(turn), 2000.0 + 2000.0 * math.cos(turn), 1500.0 - 2.0 * drop],
     ]
-    assert (steep_arc(route_demands(make_setup(points)), 0) is not None) is steep
+    assert (steep_arc(route_requirements(make_setup(points)), 0) is not None) is steep

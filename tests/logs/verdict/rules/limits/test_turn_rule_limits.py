@@ -10,8 +10,8 @@ from flight.simulation.setup import FlightSetup
 from logs.verdict.findings import Finding
 from logs.verdict.judge_flight import judge_geometry
 from logs.verdict.measures import turns
-from logs.verdict.measures.route_requirements import route_demands
-from logs.verdict.measures.track_alignment import lay_track
+from logs.verdict.measures.route_requirements import route_requirements
+from logs.verdict.measures.track_alignment import align_track
 from logs.verdict.measures.turns import TurnMeasure, measure_turn
 from logs.verdict.rules.turn_rule import turn_findings
 from tests.logs.verdict.judging import ROUTE, judge, of, waypoint
@@ -65,10 +65,10 @@ def test_gusts_may_keep_a_turn_from_settling(turbulence: str, sigma: float, offs
 
 def judged(setup: FlightSetup, measure: TurnMeasure, monkeypatch: pytest.MonkeyPatch) -> Finding:
     """The finding of waypoint 1, however it was flown, by flown evidence alone."""
-    demands = route_demands(setup, envelope=False)
-    aligned = lay_track(demands, fly_path(setup))
+    requirements = route_requirements(setup, envelope=False)
+    aligned = align_track(requirements, fly_path(setup))
     monkeypatch.setattr(turns, "measure_turn", lambda *_: measure)
-    return turn_findings(demands, aligned)[0]
+    return turn_findings(requirements, aligned)[0]
 
 
 @pytest.mark.parametrize(
@@ -120,8 +120,8 @@ def test_a_turn_is_watched_for_ten_seconds_after_its_arc(seconds: float, seen: b
     """A right turn, and a metre to the left of the next leg that long after it."""
     setup = make_setup(corner(60.0))
     arc_ends = float(waypoint_stations(setup)[1]) + 0.5 * bank_radius() * math.radians(60.0)
-    demands = route_demands(setup)
-    aligned = lay_track(demands, fly_path(setup, across=bump(arc_ends + 25.0 * seconds, -1.0, 4.0)))
+    requirements = route_requirements(setup)
+    aligned = align_track(requirements, fly_path(setup, across=bump(arc_ends + 25.0 * seconds, -1.0, 4.0)))
     assert aligned is not None
-    overshoot = measure_turn(demands, aligned, 1).overshoot
+    overshoot = measure_turn(requirements, aligned, 1).overshoot
     assert overshoot == pytest.approx(1.0 if seen else 0.0, abs=0.1)
