@@ -1,7 +1,9 @@
-"""What the airspace adds to the scores: depths in zones, and above the greatest height over the ground; or counts.
+"""Zones and the maximum height above ground: violations for the search, margins for the certificate.
 
-A leg is looked at with the widest that a flight may be beside it, its corners' included; only where that is not enough,
-in parts.
+A search adds to a path's scores how deep its legs penetrate zones (bounds) and how far they exceed the maximum height
+above ground (terrain), both in m x km; the paper's scores count pieces of legs instead. Each leg is first tested as a
+whole with the largest lateral deviation of the flight, corners included, and cut into parts only where that test fails.
+A certificate measures every piece of the path: its distance from each zone and its greatest height above ground.
 """
 
 import math
@@ -22,12 +24,11 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-# ----------------------------------------------------------------------
-# What a whole path keeps from zones and from the greatest height above ground: the compiled part of a certificate.
+# --- Margins for the certificate ---
 
 
-# What a piece of a leg, or of the way about a corner, by its number, keeps: its room to zones; its greatest height
-# above ground (m, NaN off the terrain, -inf where it does not matter), and the buffer wanted below what is allowed (m).
+# Margins of one piece of a leg or of a corner, with its number: its margin to zones; its greatest height above ground
+# (m, NaN off the terrain, -inf where no maximum applies); and the buffer required below that maximum (m).
 AIRSPACE_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),
@@ -38,15 +39,15 @@ AIRSPACE_PIECE = np.dtype(
     ],
     align=True,
 )
-# Of an arc's radius, how far it is from its chords.
+# Sagitta of an arc over its chord, as a share of the radius.
 _SAGITTA = 1.0 - math.cos(0.5 * ARC_STEP)
-# Pieces of one arc, at most.
+# Maximum number of pieces of one arc.
 _MOST_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 
 @compiled
 def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`AIRSPACE_PIECE` records of the legs of a path (w, 3), and then of its corners."""
+    """`AIRSPACE_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
     pieces = strayed_pieces(data, waypoints) if data.tracking.strays else _held_pieces(data, waypoints)
     out = np.zeros(pieces.size, dtype=AIRSPACE_PIECE)
     space, beside = data.airspace, np.zeros(2)
@@ -75,7 +76,7 @@ def airspace_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragm
 
 @compiled
 def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`STRAYED_PIECE` records of a path that is held: of its legs, and of the chords of its arcs."""
+    """`STRAYED_PIECE` records of a path flown without tracking error: its legs, then the chords of its arcs."""
     last, radii = waypoints.shape[0] - 1, fly_by_radii(data, waypoints)
     out = np.zeros(last + last * _MOST_PIECES, dtype=STRAYED_PIECE)
     for i in range(last):
@@ -87,7 +88,7 @@ def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: 
     for i in range(1, last):
         blend = half_blend_length(data.aircraft, waypoints[i, 2])
         low = blended_vertices(blend, waypoints[i - 1], waypoints[i], waypoints[i + 1], radii[i])
-        # The same from below: nowhere lower than this is as high as the flight.
+        # The same for the mirrored path: an upper bound on the flown height.
         high = blended_vertices(blend, mirrored[i - 1], mirrored[i], mirrored[i + 1], radii[i])
         for k in range(max(1, low.shape[0] - 1)):
             after, piece = min(k + 1, low.shape[0] - 1), out[made]
@@ -101,7 +102,7 @@ def _held_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: 
 
 @compiled
 def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no cover - compiled
-    """Greatest height above ground along a piece and beside it, m; NaN off the terrain."""
+    """Greatest height above ground along a piece and on both sides of it, m; NaN off the terrain."""
     dx, dy = piece.end[0] - piece.begin[0], piece.end[1] - piece.begin[1]
     run, most = max(1e-9, math.hypot(dx, dy)), -math.inf
     a, b = np.empty(3), np.empty(3)
@@ -115,9 +116,11 @@ def _greatest_height(data: ProblemArrays, piece: Record) -> float:  # pragma: no
     return most
 
 
-# Where a leg is cut for the lag of its height, in lengths of the lag.
+# --- Violations for the search ---
+
+# Where a leg is cut because its height lags, in lag lengths.
 _LAG_CUTS = (0.0, 1.0, 2.5)
-# A line further beside a leg than this (m) is looked at by itself.
+# Lines offset from a leg by more than this (m) are tested separately.
 _BESIDE = 0.5
 
 
@@ -131,9 +134,9 @@ def add_airspace_violations(
     lags: Records,
     violations: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Add to a `VIOLATIONS` record how deep a path (w, 3) is in zones (bounds), and how far too high (terrain), m x km.
+    """Add zone penetration (bounds) and excess height (terrain) of a path (w, 3) to a `VIOLATIONS` record, m x km.
 
-    legs, corners, flown, lags: of the path, as measured.
+    legs, corners, flown, lags: measurements of the path.
     """
     zoned, topped = data.airspace.zones.kept.shape[0] > 0, data.airspace.max_height < math.inf
     required = required_below(data)
@@ -171,9 +174,9 @@ def add_airspace_violations(
 def airspace_excess(
     data: ProblemArrays, a: Floats, b: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled
-    """How deep a leg by itself is in zones, and how far too high over the ground, summed along it: m x km.
+    """Zone penetration and excess height above ground of a single leg, integrated along it: m x km.
 
-    below, above: how far from the leg a flight may be, m.
+    below, above: vertical tracking error, m.
     """
     total, across = 0.0, float(data.tracking.across)
     if data.airspace.zones.kept.shape[0] > 0:
@@ -195,7 +198,7 @@ def _zone_excess(
 def _too_high(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, leg: Record, lag: Record, across: float
 ) -> float:  # pragma: no cover - compiled
-    """How far a leg is too high over the ground, summed along it: m x km."""
+    """Excess over the maximum height above ground along a leg, with its height lag: m x km."""
     if not data.tracking.strays:
         return _beside_too_high(data, required, a, b, 0.0, 0.0)
     total, one, two = 0.0, np.empty(3), np.empty(3)
@@ -213,7 +216,7 @@ def _too_high(
 def _beside_too_high(
     data: ProblemArrays, required: RequiredClearance, a: Floats, b: Floats, beside: float, above: float
 ) -> float:  # pragma: no cover - compiled
-    """The most that a line and those beside it are too high over the ground, summed along them: m x km."""
+    """Largest excess over the maximum height above ground of a line and the lines offset to both sides: m x km."""
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     east, north = beside * (b[1] - a[1]) / run, -beside * (b[0] - a[0]) / run
     most = 0.0
@@ -229,17 +232,17 @@ def _beside_too_high(
 
 @inlined
 def _cut(a: Floats, b: Floats, share: float, until: float, one: Floats, two: Floats) -> None:  # pragma: no cover
-    """Fill in the ends of the part of a-b between two shares of it."""
+    """Fill the ends of the part of a-b between two fractions of it."""
     for axis in range(3):
         one[axis] = a[axis] + share * (b[axis] - a[axis])
         two[axis] = a[axis] + until * (b[axis] - a[axis])
 
 
 def airspace_counts(data: ProblemArrays, paths: Floats) -> Ints:
-    """How many pieces of the legs of paths (n, w, 3), six a leg, are in a zone or too high over the ground; (n,).
+    """Number of leg pieces, six per leg, of paths (n, w, 3) that violate a zone or the maximum height; (n,).
 
-    The paper counts places, six a leg, and has no zones; between two places a path could pass through one.  Pieces
-    are looked at all along.
+    The paper counts points, six per leg, and has no zones; a path could pass through a zone between two points, so
+    pieces are tested along their full length.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem

@@ -1,4 +1,10 @@
-"""The continuous check of a finished path: every leg and every fly-by arc, not six points a leg."""
+"""Certificate of a finished path: every constraint checked continuously along legs and turns.
+
+The scores of a search sample the path. A certificate measures it exactly: turns, lengths of legs against the turns they
+hold, slopes of legs and arcs, clearance above the bilinear terrain, map bounds, missile spheres, zones and the maximum
+height above ground. With an autopilot's tracking error, distances are those of the flight, not of the legs. Compiled
+measurements are in `planner.evaluation.certify_kernels`.
+"""
 
 import math
 
@@ -23,16 +29,15 @@ from world.geometry import leg_runs, leg_slopes, turning_angles
 
 Floats = NDArray[np.float64]
 
-# Rounding of a waypoint on a limit, rad and m.
+# Tolerance for rounding of a waypoint on a limit, rad and m.
 _EPSILON = 1e-9
 
 
 def certify(problem: Problem, waypoints: Floats) -> Certificate:
-    """Check a path (w, 3) exactly: turns, available length for turns, slopes, clearance, map and missiles.
+    """Certificate of a path (w, 3) against the margins of `Problem.certified`.
 
-    Clearance is exact for the bilinear terrain on the legs, and on the chords of the arcs that a fly-by turn
-    cuts at each corner; the distance to missiles is that of the same pieces to the spheres, and so are those to zones,
-    exact on the map and in height, and the height left below the greatest above ground.
+    Clearance is exact for the bilinear terrain, along the legs and along the chords of the fly-by arcs. Distances to
+    missile spheres and zones, and the headroom below the maximum height above ground, are those of the same pieces.
     """
     data = problem.certified
     problems: list[str] = []
@@ -52,7 +57,7 @@ def kill_distance(data: ProblemArrays, waypoints: Floats) -> float:
 
 
 def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Least margin of a turn to its limit, rad."""
+    """Smallest margin of a turn to its limit, rad."""
     allowed = data.max_turn if data.legs_hold_turns else data.max_turn + ANGLE_MARGIN
     wanted = 0.0 if data.legs_hold_turns else ANGLE_MARGIN
     margins = allowed - turning_angles(with_courses(data, waypoints))
@@ -64,7 +69,7 @@ def _turns(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float
 
 
 def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Least length of a leg that is left between its turns, m; inf where legs need not hold them."""
+    """Smallest length of a leg that remains between its turns, m; inf where legs need not hold their turns."""
     for i, run in enumerate(leg_runs(waypoints)):
         if run < CERTIFIED_LEG:
             problems.append(f"leg {i}: {run:.1f} m long, at least {CERTIFIED_LEG:g} m are wanted")
@@ -83,7 +88,7 @@ def _turn_lengths(data: ProblemArrays, waypoints: Floats, problems: list[str]) -
 
 
 def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Least margin of the slopes along the arcs, which are shorter than the legs that they replace, rad."""
+    """Smallest slope margin along the arcs, which are shorter and hence steeper than the legs they replace, rad."""
     least = math.inf
     by_numbers = not (math.isnan(data.max_climb) or math.isnan(data.max_dive))
     if not data.legs_hold_turns or data.fly_over or by_numbers:
@@ -107,7 +112,7 @@ def _arc_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> 
 
 
 def _leg_slopes(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Least margin of the legs' slopes, rad."""
+    """Smallest slope margin of the legs, rad."""
     least = math.inf
     limits = leg_slope_limits(data, waypoints)
     for i, (slope, climb, dive) in enumerate(zip(leg_slopes(waypoints), *limits, strict=True)):
@@ -124,7 +129,7 @@ def _too_steep(slope: float, climb: float, dive: float, where: str = "") -> str:
 
 
 def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Least height above the required clearance, m; NaN where the path leaves the terrain."""
+    """Smallest height above the required clearance, m; NaN where the path leaves the terrain."""
     least = math.inf
     low: dict[str, float] = {}
     for piece in heights_above_ground(data, waypoints):
@@ -145,7 +150,7 @@ def _clearance(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> f
 
 
 def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> float:
-    """Least distance of a waypoint to the edge of the map, the floor or the ceiling, m."""
+    """Smallest distance of a waypoint from the edge of the map, the floor or the ceiling, m."""
     low = np.array([data.west, data.south, data.floor])
     high = np.array([data.east, data.north, data.ceiling])
     margins = np.minimum(waypoints - low, high - waypoints).min(axis=1)
@@ -157,7 +162,7 @@ def _bounds(data: ProblemArrays, waypoints: Floats, problems: list[str]) -> floa
 
 
 def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple[float, float]:
-    """Least distance from zones, and least height left below the greatest above ground, m; inf where there are none."""
+    """Smallest distance from zones and smallest headroom below the maximum height, m; inf without zones or maximum."""
     data, space = problem.certified, problem.certified.airspace
     if not is_limited(space):
         return math.inf, math.inf
@@ -170,7 +175,7 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
         room, left = piece["zones"], float(space.max_height - piece["height"])
         if not room["kept"]:
             near[name] = min(near.get(name, (math.inf, 0)), (float(room["nearest"]), int(room["zone"])))
-        # Off the terrain the clearance is not known either, and that is said there.
+        # NaN off the terrain is reported by the clearance.
         if left < float(piece["buffer"]) - _EPSILON:
             high[name] = min(high.get(name, math.inf), left)
     for name, (distance, z) in near.items():
@@ -182,7 +187,7 @@ def _airspace(problem: Problem, waypoints: Floats, problems: list[str]) -> tuple
 
 
 def _too_near(problem: Problem, distance: float, z: int) -> str:
-    """What is said of a piece this far (m) from zone z, as kernels number it."""
+    """Message for a piece at this distance (m) from zone z, in the kernels' numbering."""
     kept = problem.certified.airspace.zones.kept[z]
     zone = problem.scenario.zones[int(kept["number"])]
     if distance < 0.0:

@@ -1,4 +1,9 @@
-"""What the certificate measures along the whole path: the compiled part of `planner.evaluation.certify`."""
+"""Compiled measurements of the certificate: pieces of the path, their clearance and their distance to missiles.
+
+A path is cut into straight pieces. Without tracking error these are its legs and the chords of its fly-by arcs. With it
+they are parts of legs and corners, each with bounds on how far the flight deviates from it sideways, below and above;
+distances are then measured from the worst positions within those bounds.
+"""
 
 import math
 
@@ -27,12 +32,11 @@ from world.terrain import segment_clearance
 Floats = NDArray[np.float64]
 
 
-# ----------------------------------------------------------------------
-# Straight pieces of a path with how far its autopilot may be from each: what the certificate looks at.
+# --- Pieces with tracking error ---
 
 
-# A piece of a leg, or of a leg near the corner at a waypoint, by its number: its ends; how far a flight may be beside
-# both of them, beside the piece at most, below it and above it, m.
+# A piece of a leg, or of a leg near the corner at a waypoint, with its number: its ends; the lateral deviation of the
+# flight at both ends and its maximum; and the largest deviation below and above, m.
 STRAYED_PIECE = np.dtype(
     [
         ("of_corner", np.bool_),
@@ -47,15 +51,15 @@ STRAYED_PIECE = np.dtype(
     ],
     align=True,
 )
-# Where legs are cut, in lengths of the height's lag: it has all but decayed after four.
+# Cuts of a leg, in lengths of the height lag, which has all but decayed after four.
 _CUTS = (0.5, 1.0, 2.0, 4.0)
-# From a fixed end, where the flight is where the plan is, this far (m) until it strays in full.
+# The tracking error grows from 0 at a fixed end to its full value at this distance, m.
 ENDS = 100.0
 
 
 @compiled
 def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`STRAYED_PIECE` records of the legs of a path (w, 3), and then of its corners."""
+    """`STRAYED_PIECE` records of the legs of a path (w, 3), followed by those of its corners."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     lags, wind, across = np.zeros(count - 1, dtype=HEIGHT_LAG), downwind(data.aircraft), data.tracking.across
@@ -98,7 +102,7 @@ def strayed_pieces(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma
 
 @compiled
 def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
-    """Shares of a leg at which its pieces end, increasing; the last is 1."""
+    """Fractions of a leg at which its pieces end, increasing; the last is 1."""
     cuts = np.ones(len(_CUTS) + 3)
     for k in range(len(_CUTS)):
         cuts[k] = min(1.0, _CUTS[k] / max(1e-9, decay))
@@ -109,7 +113,7 @@ def _cuts(decay: float, run: float) -> Floats:  # pragma: no cover - compiled
 
 @compiled
 def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
-    """Fill in the ends of the part of a-b between two shares of it."""
+    """Fill the ends of the part of a-b between two fractions of it."""
     for axis in range(3):
         piece.begin[axis] = a[axis] + share * (b[axis] - a[axis])
         piece.end[axis] = a[axis] + after * (b[axis] - a[axis])
@@ -117,14 +121,14 @@ def _cut(a: Floats, b: Floats, share: float, after: float, piece: Record) -> Non
 
 @compiled
 def _set_below(lag: Record, share: float, after: float, piece: Record) -> None:  # pragma: no cover - compiled
-    """Fill in how far below and above the piece between two shares of a leg a flight may be."""
+    """Fill the deviations below and above of the piece between two fractions of a leg."""
     one, two = below_at(lag, share), below_at(lag, after)
     piece.below, piece.above = max(0.0, one, two), max(0.0, -one, -two)
 
 
 @compiled
 def _beside(data: ProblemArrays, place: Floats, across: float) -> float:  # pragma: no cover - compiled
-    """How far beside a place of the path a flight may be, m: less near the fixed ends."""
+    """Lateral deviation of the flight at a point of the path, m: reduced near the fixed ends."""
     away = min(
         math.hypot(place[0] - data.start[0], place[1] - data.start[1]),
         math.hypot(place[0] - data.destination[0], place[1] - data.destination[1]),
@@ -132,20 +136,22 @@ def _beside(data: ProblemArrays, place: Floats, across: float) -> float:  # prag
     return across * min(1.0, away / ENDS)
 
 
-# A straight piece of a leg, or of the arc at a waypoint, by its number; its least height above ground (m, NaN off the
-# terrain) and the buffer wanted there (m).
+# --- Certified quantities ---
+
+# A straight piece of a leg, or of the arc at a waypoint, with its number: its smallest height above ground (m, NaN off
+# the terrain) and the buffer required there (m).
 CERTIFIED_PIECE = np.dtype(
     [("of_arc", np.bool_), ("number", np.int64), ("height", np.float64), ("buffer", np.float64)], align=True
 )
-# Pieces of one arc, at most: its chords, and one on either leg.
+# Maximum number of pieces of one arc: its chords and one on either leg.
 _MOST_PIECES = math.ceil(math.pi / ARC_STEP) + 2
 
 
 @compiled
 def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma: no cover - compiled
-    """Distance from where a flight of a path (w, 3) may be to the nearest missile sphere's surface, m; inf without any.
+    """Distance from the flight of a path (w, 3) to the surface of the nearest missile sphere, m; inf without missiles.
 
-    A flight is on its legs and arcs, or about them as far as its autopilot strays.
+    The flight is on the legs and arcs, or within the tracking error of them.
     """
     nearest = math.inf
     if data.tracking.strays:
@@ -168,7 +174,7 @@ def missile_distance(data: ProblemArrays, waypoints: Floats) -> float:  # pragma
 
 @compiled
 def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) -> float:  # pragma: no cover - compiled
-    """Distance from a-b to the nearest missile sphere's surface, or `nearest` if that is less."""
+    """Distance from a-b to the surface of the nearest missile sphere, or `nearest` if that is smaller."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length2 = dx * dx + dy * dy + dz * dz
     for k in range(threats.shape[0]):
@@ -178,7 +184,7 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
         x, y, z = a[0] - threat.east, a[1] - threat.north, a[2] - threat.up
         along = dx * x + dy * y + dz * z
         f = min(1.0, max(0.0, -along / length2)) if length2 > 0.0 else 0.0
-        # From the point itself: differences of squares lose digits.
+        # From the closest point itself: a difference of squares loses digits.
         x, y, z = x + f * dx, y + f * dy, z + f * dz
         nearest = min(nearest, math.sqrt(x * x + y * y + z * z) - threat.kill_radius)
     return nearest
@@ -186,9 +192,9 @@ def _segment_distance(threats: Records, a: Floats, b: Floats, nearest: float) ->
 
 @compiled
 def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
-    """Path with a far point before the start and after the destination, on the courses asked for there.
+    """Path extended by a distant point before the start and after the destination, on the courses prescribed there.
 
-    Without such a course the point lies on the leg's own line, and the turn at the end is none.
+    Without a prescribed course the point is on the extension of the leg, so that there is no turn.
     """
     count = path.shape[0]
     out = np.empty((count + 2, 3))
@@ -208,7 +214,7 @@ def with_courses(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cov
 
 @compiled
 def turn_and_roll_lengths(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Floats]:  # pragma: no cover
-    """Length of each leg (w - 1,) that its turns use, and that the roll from one to the other uses, m."""
+    """Lengths of each leg (w - 1,) taken by its turns, and by the roll from one turn into the other, m."""
     count = waypoints.shape[0]
     legs, corners = np.zeros(count - 1, dtype=LEG), np.zeros(count, dtype=CORNER)
     turns, rolls = np.zeros(count - 1), np.zeros(count - 1)
@@ -235,7 +241,7 @@ def leg_slope_limits(data: ProblemArrays, waypoints: Floats) -> tuple[Floats, Fl
 
 @compiled
 def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # pragma: no cover - compiled
-    """`CERTIFIED_PIECE` records of the legs of a path (w, 3), and then of its fly-by arcs or of its corners."""
+    """`CERTIFIED_PIECE` records of the legs of a path (w, 3), followed by those of its fly-by arcs or corners."""
     if data.tracking.strays:
         return _strayed_heights(data, strayed_pieces(data, waypoints))
     last = waypoints.shape[0] - 1
@@ -254,7 +260,7 @@ def heights_above_ground(data: ProblemArrays, waypoints: Floats) -> Records:  # 
 
 @compiled
 def _strayed_heights(data: ProblemArrays, pieces: Records) -> Records:  # pragma: no cover - compiled
-    """`CERTIFIED_PIECE` records of `STRAYED_PIECE` records: least heights along them and beside them."""
+    """`CERTIFIED_PIECE` records of `STRAYED_PIECE` records: smallest heights along them and to both sides."""
     out = np.zeros(pieces.size, dtype=CERTIFIED_PIECE)
     for k in range(pieces.size):
         piece = pieces[k]
@@ -288,10 +294,10 @@ def _measure_piece(
 def buffer_on(
     data: ProblemArrays, buffer: float, end_buffers: tuple[float, float], a: Floats, b: Floats
 ) -> float:  # pragma: no cover - compiled
-    """Buffer wanted on a piece: fixed ends may have less, and it grows from where the piece is nearest to them.
+    """Buffer required on a piece, m: smaller near a fixed end, growing with the distance from it.
 
-    buffer, end_buffers: everywhere, and at the start and the destination, m.  It grows half as fast as a search asks,
-    for what lies between the search's samples.
+    buffer: m, away from the ends. end_buffers: at the start and the destination, m. The buffer grows half as fast as in
+    a search, which allows for the ground between the search's samples.
     """
     for end, end_buffer in ((data.start, end_buffers[0]), (data.destination, end_buffers[1])):
         if end_buffer < buffer:

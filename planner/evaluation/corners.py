@@ -1,4 +1,9 @@
-"""Legs and corners of a path: measured once, and flown as fly-by arcs with parabolas that blend slopes."""
+"""Legs and corners of a path: lengths, turn geometry, and the flown shape of a corner.
+
+Legs and corners are measured once per path and shared by all scores. A turn takes a length of the legs before and after
+it: the tangent of its fly-by arc, or more where the autopilot needs it. As flown, a corner is an arc with parabolas
+that blend the slopes of the two legs; `blended_vertices` encloses it from below by straight lines.
+"""
 
 import math
 
@@ -23,19 +28,18 @@ from world.kernels import Record, Records, compiled, inlined
 Floats = NDArray[np.float64]
 
 
-# ----------------------------------------------------------------------
-# Legs and corners of a path as they are measured once, and the length of leg that turns take.
+# --- Measurements of legs and corners ---
 
-# East and north of the unit vector that the wind blows towards.
+# East and north components of the downwind unit vector.
 Wind = tuple[float, float]
 
-# A leg: its unit course (0, 0 for none), its horizontal length and its length, m.
+# A leg: its unit course (0, 0 for none), horizontal length and length in three dimensions, m.
 LEG = np.dtype([("east", np.float64), ("north", np.float64), ("run", np.float64), ("length", np.float64)])
-# A corner: length of leg that its fly-by arc takes on either side, and the arc's radius; lengths of the legs before and
-# after it that turning there takes, the autopilot's settling included; and how far it then strays from the legs, m.
+# A corner, m: tangent length and radius of its fly-by arc; lengths of the legs before and after it that the turn takes,
+# the autopilot's settling included; and the largest distance of the flight from the legs.
 CORNER = np.dtype([(name, np.float64) for name in ("tangent", "radius", "before", "after", "excursion")])
 
-# Leg left over between its two turns: this share of the leg, and this length (m) or what small turns use of it.
+# Straight part of a leg between its two turns: this share of the leg, plus this length (m) or what small turns use.
 SETTLING_SHARE = 0.05
 SETTLING_LENGTH = 20.0
 
@@ -83,14 +87,14 @@ def measure_corner(
     amsl: float,
     corner: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Fill the `CORNER` record of a turn between the unit courses u and v; of none where there is no such turn."""
+    """Fill the `CORNER` record of a turn between the unit courses u and v; zeros if `some` is false (no turn)."""
     tangent, radius, excursion = 0.0, 0.0, 0.0
     if some:
         tangent, radius = corner_tangent(aircraft, ux, uy, vx, vy, amsl, wind[0], wind[1])
     before, after = tangent, tangent
     if tracking.strays and 0.0 < tangent < math.inf:
         turn = math.atan2(abs(ux * vy - uy * vx), ux * vx + uy * vy)
-        # The highest ground speed on the way, which the arc's radius is of.
+        # The highest ground speed in the turn, for which the radius of the arc was computed.
         speed = math.sqrt(radius * GRAVITY * aircraft.tan_max_bank) + faster_by(tracking, amsl)
         excursion, room_before, room_after = corner_room(tracking, turn, speed)
         before, after = max(tangent, room_before), max(tangent, room_after)
@@ -102,7 +106,7 @@ def measure_corner(
 def courses_at(
     data: ProblemArrays, legs: Records, i: int
 ) -> tuple[float, float, float, float]:  # pragma: no cover - compiled
-    """Unit courses before and after waypoint i; at the ends those asked for, else the leg's own."""
+    """Unit courses before and after waypoint i; at the ends the prescribed course, otherwise the leg's own."""
     last = legs.shape[0]
     after, before = min(i, last - 1), max(i - 1, 0)
     ux, uy, vx, vy = legs[before].east, legs[before].north, legs[after].east, legs[after].north
@@ -115,13 +119,13 @@ def courses_at(
 
 @inlined
 def settling_length(need: float, run: float) -> float:  # pragma: no cover - compiled
-    """Length of a leg (m) that stays straight between its turns, so that the first has settled; need: what they use."""
+    """Length of a leg (m) kept straight between its turns so that the first settles; need: length of both turns."""
     return SETTLING_SHARE * run + min(SETTLING_LENGTH, need)
 
 
 @inlined
 def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: no cover - compiled
-    """Length of leg i that its two turns use, m: of a fly-over only the one at its beginning, on the way back to it."""
+    """Length of leg i taken by its two turns, m; of fly-over turns only the first, whose track returns to the leg."""
     if not fly_over:
         need: float = corners[i].after + corners[i + 1].before
         return need
@@ -137,7 +141,7 @@ def turn_length(fly_over: bool, corners: Records, i: int) -> float:  # pragma: n
 def roll_length(
     aircraft: PerformanceTable, legs: Records, corners: Records, i: int, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
-    """Length of leg i that the roll from its first fly-by turn into its second uses, m; 0 for turns of one side."""
+    """Length of leg i taken by rolling from its first turn into its second, m; 0 if both turn the same way."""
     if i == 0 or i == legs.shape[0] - 1 or corners[i].tangent <= 0.0 or corners[i + 1].tangent <= 0.0:
         return 0.0
     ux, uy = legs[i].east, legs[i].north
@@ -150,16 +154,15 @@ def roll_length(
     return length
 
 
-# ----------------------------------------------------------------------
-# Corners as a flight takes them: fly-by arcs, and the parabolas that blend slopes.
+# --- Flown shape of a corner ---
 
-# Chords of a corner's arc: at most this angle each; on a 160 m radius the arc leaves its chord by 1.4 m.
+# Maximum angle of a chord of an arc; at a radius of 160 m the arc deviates from such a chord by 1.4 m.
 ARC_STEP = math.radians(15.0)
 
 
 @inlined
 def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # pragma: no cover - compiled
-    """Half the length of the parabola that blends two slopes, m per unit of their difference, with the wind behind."""
+    """Half the length of the parabola that blends two slopes, m per unit of slope difference, with a full tailwind."""
     speed = aircraft.airspeed + wind_speed_at(aircraft, amsl)
     length: float = speed * speed / (2.0 * BLEND_ACCELERATION)
     return length
@@ -169,7 +172,7 @@ def half_blend_length(aircraft: PerformanceTable, amsl: float) -> float:  # prag
 def fly_by_vertices(
     aircraft: PerformanceTable, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Vertices (k, 3) of the way that a flight takes past the waypoint `at`; see `blended_vertices`."""
+    """Vertices (k, 3) of the flown path past the waypoint `at`; see `blended_vertices`."""
     return blended_vertices(half_blend_length(aircraft, at[2]), before, at, after, radius)
 
 
@@ -177,14 +180,14 @@ def fly_by_vertices(
 def blended_vertices(
     blend: float, before: Floats, at: Floats, after: Floats, radius: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Vertices (k, 3) of the way that a flight takes past the waypoint `at`, at least as low as the flight.
+    """Vertices (k, 3) of the flown path past the waypoint `at`, nowhere higher than the flight.
 
-    They are: a point on the leg where the blend of heights begins, the fly-by arc of this radius from tangent point to
-    tangent point, and a point on the next leg where the blend ends.  Height is even along the arc; where the slope
-    breaks downwards a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
+    They are: a point on the leg where the blend of slopes begins, the fly-by arc of this radius from tangent point to
+    tangent point, and a point on the next leg where the blend ends. Height is linear along the arc; where the slope
+    decreases, a parabola cuts the crest by change x half-length / 4, and the vertices are lowered by that.
     Without a radius, or where a leg is shorter than the tangent, the arc is the waypoint itself.
 
-    blend: of `half_blend_length`.
+    blend: from `half_blend_length`.
     """
     run_before = math.hypot(at[0] - before[0], at[1] - before[1])
     run_after = math.hypot(after[0] - at[0], after[1] - at[1])
@@ -226,7 +229,7 @@ def blended_vertices(
 def legs_about(
     before: Floats, at: Floats, after: Floats, length_before: float, length_after: float
 ) -> Floats:  # pragma: no cover - compiled
-    """The legs before and after the waypoint `at`, as far as these lengths (m), as vertices (3, 3)."""
+    """Parts of the legs before and after the waypoint `at` of these lengths (m), as vertices (3, 3)."""
     out = np.empty((3, 3))
     for row, other, length in ((0, before, length_before), (2, after, length_after)):
         run = math.hypot(at[0] - other[0], at[1] - other[1])
@@ -248,9 +251,9 @@ def _set(out: Floats, row: int, east: float, north: float, up: float) -> None:  
 def fly_by_radii(data: ProblemArrays, path: Floats) -> Floats:  # pragma: no cover - compiled
     """Radius (m) of the fly-by arc at each waypoint (w,); 0 at the ends and where the path goes straight on.
 
-    Where a number alone limits turns, a leg may be shorter than its two turns.  Nothing flies those arcs, so there
-    are none: the corners are evaluated as drawn, and the flight shows what the aircraft makes of them.  A fly-over
-    passes outside its corner, and has none either.
+    Where a number alone limits turns, a leg may be shorter than its two turns. Such arcs cannot be flown and have
+    radius 0: the corners are evaluated as drawn, and the simulated flight shows what the aircraft makes of them. A
+    fly-over turn passes outside its corner and has radius 0 too.
     """
     if data.fly_over:
         return np.zeros(path.shape[0])
