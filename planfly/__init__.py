@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from flight.simulation.track import Track as Track
     from logs.recording.reader import FlightLog as FlightLog
     from logs.recording.reader import read_log as read_log
-    from logs.report.compare import Comparison as Comparison
     from logs.verdict.findings import Verdict as Verdict
+    from logs.views.report.compare import Comparison as Comparison
     from planfly.api.flying import ExportedFiles as ExportedFiles
     from planfly.api.flying import FlownMission as FlownMission
     from planfly.api.flying import WrittenReport as WrittenReport
@@ -74,7 +74,7 @@ _HOMES = {
     for module, names in {
         "flight.simulation.track": ("Track",),
         "logs.recording.reader": ("FlightLog", "read_log"),
-        "logs.report.compare": ("Comparison",),
+        "logs.views.report.compare": ("Comparison",),
         "logs.verdict.findings": ("Verdict",),
         "planfly.api.flying": ("ExportedFiles", "FlownMission", "WrittenReport", "check", "fly"),
         "planfly.api.optimising": ("BestFound", "Optimiser", "optimise"),

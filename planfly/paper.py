@@ -332,8 +332,8 @@ def _csv(columns: Sequence[str], rows: Any) -> str:
 
 def write_figures(folder: Path, plans: Sequence[SeededPlan]) -> None:
     """Figures as the paper's 5-8 (paths), 9-12 (encodings) and the convergence over generations."""
-    from logs.figures.draw_all import write_png
-    from logs.figures.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
+    from logs.views.figures import write_png
+    from logs.views.paper import PaperPath, draw_convergence, draw_encodings, draw_paths
 
     by_problem: dict[int, dict[str, list[SeededPlan]]] = {}
     for item in plans:

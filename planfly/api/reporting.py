@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
 from logs.recording.reader import FlightLog, LogEvent, read_log
-from logs.report.compare import Comparison, compare_logs
 from logs.verdict.findings import Verdict
 from logs.verdict.judge_geometry import judge_geometry
+from logs.views.report.compare import Comparison, compare_logs
 from planfly.api.flying import ExportedFiles, FlownMission, WrittenReport
 from planfly.open_mission import open_planned
 from planfly.terminal.results import (
@@ -58,7 +58,7 @@ def figures(source: Source) -> "dict[str, Figure]":
     <class 'matplotlib.figure.Figure'>
     """
     # matplotlib loads for pictures alone.
-    from logs.figures.draw_all import draw_figures
+    from logs.views.figures import draw_figures
 
     shown = _shown(source)
     return draw_figures(shown.setup, shown.track, shown.verdict)
@@ -78,7 +78,7 @@ def report(source: Source, out: str | Path, *, svg: bool = False, overwrite: boo
     ('report.html', 6)
     """
     from logs.recording.setup_attachments import package_versions
-    from logs.report.page import write_report
+    from logs.views.report.page import write_report
 
     shown = _shown(source)
     folder = _prepared(out, LOG_FIGURES, overwrite)
@@ -107,7 +107,7 @@ def compare(first: FlightLog | str | Path, second: FlightLog | str | Path, out: 
     logs = [log if isinstance(log, FlightLog) else read_log(log) for log in (first, second)]
     found = compare_logs(*logs, names=(Path(logs[0].source).name, Path(logs[1].source).name))
     if out is not None:
-        from logs.report.compare import write_comparison
+        from logs.views.report.compare import write_comparison
 
         write_comparison(_prepared(out, COMPARE_FILES, overwrite), found, svg=svg)
     return found

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
-from logs.figures.style import BLUE, FAIL, INK, LIMIT, PLANNED, QUIET, clean_style, new_figure, shorten
+from logs.views.drawing import BLUE, FAIL, INK, LIMIT, PLANNED, QUIET, clean_style, new_figure, shorten
 from planfly.campaigns.statistics.decision import Interval, wilson
 
 Floats = NDArray[np.float64]

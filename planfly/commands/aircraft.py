@@ -137,8 +137,8 @@ def _work_out(chosen: "Aircraft", *, motor_braking: bool) -> "AircraftNumbers":
 
 def _print_and_draw(chosen: "Aircraft", identity: str, numbers: "AircraftNumbers") -> dict[str, bytes]:
     from flight.dynamics.characteristics import TRIM_AMSL
-    from logs.figures.aircraft import draw_envelope, draw_steps, draw_trims
-    from logs.figures.style import png_bytes
+    from logs.views.aircraft import draw_envelope, draw_steps, draw_trims
+    from logs.views.drawing import png_bytes
 
     envelope, trims, modes, cruise, steps = numbers
     print(f"{chosen.name}: {chosen.title}")

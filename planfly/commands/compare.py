@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 
 from logs.recording.reader import read_log
-from logs.report.compare import Comparison, compare_logs, difference_lines
+from logs.views.report.compare import Comparison, compare_logs, difference_lines
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
 from planfly.terminal.output import progress
@@ -50,7 +50,7 @@ def _answer(comparison: Comparison, files: list[Path], code: int) -> object:
 
 def _draw(comparison: Comparison, folder: Path, args: argparse.Namespace) -> list[Path]:
     # matplotlib loads for pictures alone.
-    from logs.report.compare import write_comparison
+    from logs.views.report.compare import write_comparison
 
     refuse_folder(folder, args.overwrite)
     prepare_folder(folder, COMPARE_FILES)

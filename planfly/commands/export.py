@@ -7,8 +7,8 @@ from pathlib import Path
 from flight.mission.fences import numbered, zone_fences
 from flight.mission.items import Mission
 from flight.mission_files.formats import KINDS, mission_kind, mission_text, read_mission
-from logs.exports.map_files import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
 from logs.recording.reader import FlightLog, read_log
+from logs.views.exports.map_files import MapLine, MapZone, gpx_text, kml_text, map_zones, plan_line, track_line
 from planfly.open_mission import NamedFences, fence_of_plan, is_log, open_mission, read_named_fences
 from planfly.terminal.answers.giving import give_answer
 from planfly.terminal.exit_codes import FLYABLE, LOSS
@@ -106,14 +106,14 @@ def _flown(log: FlightLog, suffix: str) -> tuple[str | bytes, str]:
     """A flight's rows in another program's form, and what that holds; each form loads what it alone needs."""
     content = f"{len(log.track):,} rows, {log.end_time:.0f} s"
     if suffix == ".tlog":
-        from logs.exports.log_files import telemetry_bytes
+        from logs.views.exports.log_files import telemetry_bytes
 
         return telemetry_bytes(log), content
     if suffix == ".ulg":
-        from logs.exports.log_files import px4_log_bytes
+        from logs.views.exports.log_files import px4_log_bytes
 
         return px4_log_bytes(log), content
-    from logs.exports.log_files import csv_text, parquet_bytes
+    from logs.views.exports.log_files import csv_text, parquet_bytes
 
     return (csv_text(log) if suffix == ".csv" else parquet_bytes(log)), content
 

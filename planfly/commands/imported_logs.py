@@ -7,9 +7,9 @@ from pathlib import Path
 
 from logs.recording.reader import FlightLog, read_log
 from logs.recording.recorder import Recorder
-from logs.report.text import left_lines, refly_lines
 from logs.verdict.imported.model_comparison import Reflight
 from logs.verdict.judge_flight import judge_flight
+from logs.views.report.text import left_lines, refly_lines
 from planfly.imported_flights import FieldOptions, ImportedFlight, fly_again, import_flight
 from planfly.open_mission import read_named_fences
 from planfly.terminal.answers.giving import give_answer
@@ -140,7 +140,7 @@ def _refly_answer(lines: list[str], files: list[Path], code: int) -> object:
 
 def _draw(folder: Path, again: Reflight, ending: str) -> list[Path]:
     # matplotlib loads for pictures alone.
-    from logs.figures.comparison import refly_pictures
+    from logs.views.compare_charts import refly_pictures
 
     files = []
     for name, data in refly_pictures(again).items():

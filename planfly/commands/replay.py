@@ -56,7 +56,7 @@ def replay(args: argparse.Namespace) -> int:
 
 def _answer(args: argparse.Namespace, log: FlightLog, code: int) -> object:
     """The timeline of the part that is replayed, all of it where it goes to ground stations."""
-    from logs.replay.timeline import timeline
+    from logs.views.replay.timeline import timeline
     from planfly.terminal.answers.answer_data import ReplayAnswer, TimelineEvent
 
     start, end = (-math.inf, math.inf) if isinstance(args.to, str) else _part(log, args)
@@ -84,7 +84,7 @@ def _part(log: FlightLog, args: argparse.Namespace) -> tuple[float, float]:
 def _print_timeline(log: FlightLog, start: float, end: float, speed: float | None) -> None:
     """Print the timeline, at ``speed`` times real time or at once."""
     from flight.live.link import RunningClock
-    from logs.replay.timeline import entry_lines, timeline
+    from logs.views.replay.timeline import entry_lines, timeline
 
     played = RunningClock()
     for entry in timeline(log):
@@ -97,7 +97,7 @@ def _print_timeline(log: FlightLog, start: float, end: float, speed: float | Non
 def _show_instruments(log: FlightLog, start: float, end: float, speed: float) -> None:
     """Show frames until the end or an interruption; the last one stays on the terminal."""
     from flight.live.link import RunningClock
-    from logs.replay.instruments import make_instruments
+    from logs.views.replay.instruments import make_instruments
 
     instruments = make_instruments(log)
     played = RunningClock()

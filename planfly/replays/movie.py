@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageColor
 
-from logs.figures.movie_frames import RATE, MovieFrames
-from logs.figures.style import DRAWN
 from logs.recording.reader import FlightLog
+from logs.views.drawing import DRAWN
+from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.terminal.output import progress
 from planfly.terminal.results import refuse_existing, refuse_folder
 from world.errors import PlanflyError

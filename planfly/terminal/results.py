@@ -189,7 +189,7 @@ def write_pictures(
 ) -> list[Path]:
     """The figures and report.html; svg: the figures as SVG, too."""
     from logs.recording.setup_attachments import package_versions
-    from logs.report.page import write_report
+    from logs.views.report.page import write_report
 
     flown_with = package_versions() if versions is None else versions
     return write_report(

@@ -95,7 +95,7 @@ TESTS = (
     "planner/evaluation/test_airspace_scores.py::test_pieces_that_touch_a_zone_are_counted",
     "logs/importers/test_dataflash_frames.py",
     "logs/verdict/measures/limits/test_path_sweeps_limits.py::test_stays_a_microsecond_apart_are_one",
-    "logs/report/test_compare.py::test_a_flight_does_not_differ_from_itself",
+    "logs/views/report/test_compare.py::test_a_flight_does_not_differ_from_itself",
 )
 TESTS_FOLDER = Path(__file__).parents[1]
 PYTEST = (sys.executable, "-m", "pytest", "-q")

@@ -2,8 +2,8 @@
 
 import pytest
 
-from logs.figures import draw_all
-from logs.figures.style import new_figure, png_bytes
+from logs.views import figures
+from logs.views.drawing import new_figure, png_bytes
 
 NAMES = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy")
 
@@ -11,4 +11,4 @@ NAMES = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "co
 def draw_nothing(patch: pytest.MonkeyPatch) -> None:
     """Have a report of a flight all its pictures, each of them blank."""
     blank = png_bytes(new_figure(1.0))
-    patch.setattr(draw_all, "draw_pictures", lambda *_, **__: {f"{name}.png": blank for name in NAMES})
+    patch.setattr(figures, "draw_pictures", lambda *_, **__: {f"{name}.png": blank for name in NAMES})

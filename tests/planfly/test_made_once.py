@@ -23,7 +23,7 @@ from flight.live.flight_process import (
     read_event,
     serve_flights,
 )
-from logs.figures import draw_all
+from logs.views import figures
 from planfly.cli import main
 from planfly.commands.registry import COMMAND_NAMES, find_command
 from planfly.served_flights import ServedFlights, ServeOptions
@@ -78,10 +78,10 @@ def entered(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     # What a command imports by itself would keep the counting function after the test.
     for name in COMMAND_NAMES:
         find_command(name)
-    for room in ("logs.report.page", "logs.replay.timeline"):
+    for room in ("logs.views.report.page", "logs.views.replay.timeline"):
         import_module(room)
     # What is drawn enters stages as ever; to render it takes longer than all of them.
-    monkeypatch.setattr(draw_all, "png_bytes", lambda figure: b"")
+    monkeypatch.setattr(figures, "png_bytes", lambda figure: b"")
     entered: Counter[str] = Counter()
     for stage in STAGES:
         home, _, name = stage.partition(":")

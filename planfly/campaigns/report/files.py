@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from logs.figures.style import png_bytes
+from logs.views.drawing import png_bytes
 from planfly.campaigns.engine.workers import in_own_process
 from planfly.campaigns.find_winds import ACCURACY, FEWEST, WindsFound
 from planfly.campaigns.flights.campaign_base import CampaignBase

@@ -8,9 +8,9 @@ import numpy as np
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from matplotlib.figure import Figure
 
-from logs.figures.style import png_bytes
 from logs.verdict.findings import RULES
 from logs.verdict.wording import place_text
+from logs.views.drawing import png_bytes
 from planfly.campaigns.flights.campaign_base import CampaignBase
 from planfly.campaigns.flights.flight_row import STATIONS
 from planfly.campaigns.pictures import (

@@ -18,8 +18,8 @@ from flight.simulation.setup import FlightSetup
 from flight.simulation.simulate import simulate
 from logs.recording.reader import read_log
 from logs.recording.recorder import Recorder
-from logs.replay.timeline import timeline
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.views.replay.timeline import timeline
 from tests.mission_lines import ORIGIN, ground, refusal, route, setup_of, wp
 from tests.sampled_paths import sample_path
 from world.frames import to_map

@@ -11,12 +11,12 @@ import pytest
 
 from flight.simulation.setup import FlightSetup
 from flight.simulation.track import Track
-from logs.figures.failures import failures
-from logs.figures.turns import place_values
-from logs.report.text import badge_of, rule_rows
 from logs.verdict import findings, wording
 from logs.verdict.findings import RULES, Finding, Verdict
 from logs.verdict.judge_flight import judge_flight, judge_geometry
+from logs.views.failures import failures
+from logs.views.report.text import badge_of, rule_rows
+from logs.views.turns import place_values
 from planfly.refine import tighten_limits
 from tests.mission_lines import setup_of, wp
 from tests.synthetic import bump, edited, fly_path, make_setup

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 import planfly
 from flight.mission_files.formats import read_mission
-from logs.figures import draw_all
-from logs.figures.style import new_figure, png_bytes
+from logs.views import figures
+from logs.views.drawing import new_figure, png_bytes
 from planfly.cli import main
 
 FLOWN = ["map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy"]
@@ -35,7 +35,7 @@ def test_a_report_of_a_log_is_the_commands(
 ) -> None:
     names = ("map", "profile", "scene", "turns", "envelope", "time", "exposure", "controls", "energy")
     pixel = png_bytes(new_figure(1.0))
-    monkeypatch.setattr(draw_all, "draw_pictures", lambda *_, **__: {f"{name}.png": pixel for name in names})
+    monkeypatch.setattr(figures, "draw_pictures", lambda *_, **__: {f"{name}.png": pixel for name in names})
     assert flown.log is not None
     ours = planfly.report(str(flown.log), tmp_path / "ours")
     assert main(["report", str(flown.log), "--out", str(tmp_path / "theirs")]) == 0

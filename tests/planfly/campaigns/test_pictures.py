@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.text import Text
 
-from logs.figures.style import png_bytes
+from logs.views.drawing import png_bytes
 from planfly.campaigns.pictures import (
     MAX_BARS,
     Bar,

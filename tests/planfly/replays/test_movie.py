@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageColor
 
-from logs.figures.movie_frames import RATE, MovieFrames
 from logs.recording.reader import FlightLog, read_log
+from logs.views.replay.movie_frames import RATE, MovieFrames
 from planfly.cli import main
 from tests.logs.made_flight import make_setup, make_track, record
 

@@ -1,0 +1,219 @@
+"""Figures of the paper's experiment: paths of many searches, one of each encoding, convergence over generations."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter, MaxNLocator, MultipleLocator
+from numpy.typing import NDArray
+
+from logs.views import drawing
+from logs.views.failures import LabelPlacer
+from logs.views.map import draw_ground, draw_legend
+from logs.views.threats_and_zones import draw_threat_circles
+from world.scenario import Scenario
+
+Floats = NDArray[np.float64]
+
+# Inches: as the map's.
+_LEFT, _MAP_WIDTH, _TOP, _BOTTOM = 0.72, 7.72, 0.5, 0.55
+# Height of the legend, and of one with a line pair for each encoding, inches.
+_LEGEND, _TALL_LEGEND = 0.85, 1.2
+_COLUMN = 8.72
+# One look for each algorithm of a figure, distinct without colour too.
+_LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": drawing.BLUE, "linestyle": "-"},
+    {"color": drawing.FAIL, "linestyle": (0, (5, 1.5))},
+    {"color": drawing.INK, "linestyle": (0, (1.2, 1.2))},
+    {"color": drawing.LIMIT, "linestyle": (0, (4, 1.2, 1, 1.2))},
+    {"color": drawing.PLANNED, "linestyle": (0, (7, 2))},
+    {"color": drawing.QUIET, "linestyle": (0, (2.5, 1.5))},
+)
+_MARKERS = ("o", "s", "^", "D", "v", "P")
+
+
+@dataclass(frozen=True, slots=True)
+class PaperPath:
+    """One path: waypoints (w, 3) m, its length ratio, and whether it is safe at the paper's sample points."""
+
+    waypoints: Floats
+    length_ratio: float
+    safe: bool
+
+
+def draw_paths(scenario: Scenario, algorithm: str, paths: Sequence[PaperPath]) -> Figure:
+    """Paths of one algorithm over contours, missile and radar circles (Yang, Tang and Lozano 2014, Figs. 5-8).
+
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> figure = draw_paths(setup.scenario, "umda", [PaperPath(setup.route.waypoints, 1.01, safe=True)])
+    >>> figure.axes[0].get_title(loc="left")
+    'example: 1 runs of umda, 1 safe'
+    """
+    safe = sum(path.safe for path in paths)
+    title = f"{scenario.name}: {len(paths)} runs of {algorithm}, {safe} safe"
+    with drawing.clean_style():
+        figure, axes, around = _map(scenario, title, _LEGEND)
+        handles: list[Any] = []
+        for good, look, label in ((True, _LOOKS[0], "safe"), (False, _LOOKS[1], "not safe")):
+            chosen = [path for path in paths if path.safe == good]
+            for path in chosen:
+                axes.plot(*path.waypoints[:, :2].T, linewidth=1.3, alpha=0.85, zorder=5, **look)
+                axes.plot(*path.waypoints[1:-1, :2].T, ".", color=look["color"], markersize=3.0, zorder=5.1)
+            if chosen:
+                ratios = [path.length_ratio for path in chosen]
+                span = f"{min(ratios):.3f}" + (f" to {max(ratios):.3f}" if len(ratios) > 1 else "")
+                text = f"{len(chosen)} path{'s' if len(chosen) > 1 else ''} {label}\nPLR {span}"
+                handles.append(Line2D([], [], linewidth=1.6, label=text, **look))
+        handles += _ends(axes, scenario, [path.waypoints for path in paths])
+        draw_legend(figure, handles + around, _LEFT, (_LEGEND - 0.02) / figure.get_figheight())
+    return figure
+
+
+def draw_encodings(scenario: Scenario, chosen: Mapping[str, PaperPath], seed: int) -> Figure:
+    """One path of each encoding over the same map (Yang, Tang and Lozano 2014, Figs. 9-12).
+
+    chosen: paths by encoding.
+
+    >>> from logs.recording.example_log import example_log
+    >>> setup = example_log().setup
+    >>> path = PaperPath(setup.route.waypoints, 1.01, safe=True)
+    >>> figure = draw_encodings(setup.scenario, {"rotated": path, "cartesian": path}, seed=1)
+    >>> figure.axes[0].get_title(loc="left")
+    'example: one path of each encoding, seed 1'
+    """
+    with drawing.clean_style():
+        title = f"{scenario.name}: one path of each encoding, seed {seed}"
+        figure, axes, around = _map(scenario, title, _TALL_LEGEND)
+        handles = []
+        for (name, path), look, marker in zip(chosen.items(), _LOOKS, _MARKERS, strict=False):
+            axes.plot(
+                *path.waypoints[:, :2].T, linewidth=1.8, marker=marker, markersize=3.5, zorder=5, clip_on=True, **look
+            )
+            text = f"{name}\n{'safe' if path.safe else 'not safe'}, PLR {path.length_ratio:.3f}"
+            handles.append(Line2D([], [], linewidth=1.8, marker=marker, markersize=3.5, label=text, **look))
+        handles += _ends(axes, scenario, [path.waypoints for path in chosen.values()])
+        draw_legend(figure, handles + around, _LEFT, (_TALL_LEGEND - 0.02) / figure.get_figheight())
+    return figure
+
+
+def _map(scenario: Scenario, title: str, legend: float) -> tuple[Figure, Any, list[Any]]:
+    """Ground and threats; returns figure, axes and the legend's entries for them.  legend: its height, inches."""
+    low, high = scenario.bounds[:, 0], scenario.bounds[:, 1]
+    padding = 0.02 * float((high - low).max())
+    tall = _MAP_WIDTH * float((high[1] - low[1] + 2 * padding) / (high[0] - low[0] + 2 * padding))
+    total = _TOP + tall + _BOTTOM + legend
+    figure = drawing.new_figure(total)
+    base = (legend + _BOTTOM) / total
+    axes = figure.add_axes((_LEFT / drawing.WIDTH, base, _MAP_WIDTH / drawing.WIDTH, tall / total))
+    axes.set(xlim=(low[0] - padding, high[0] + padding), ylim=(low[1] - padding, high[1] + padding), aspect="equal")
+    kilometres = FuncFormatter(lambda value, _: f"{value / 1000.0:g}".replace("-", "\N{MINUS SIGN}"))
+    step = drawing.nice_step(float((high - low).max()), 12)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MultipleLocator(step))
+        axis.set_major_formatter(kilometres)
+    axes.set(xlabel="east (km)", ylabel="north (km)")
+    axes.set_title(title, fontweight="bold")
+    around = draw_ground(figure, axes, scenario.terrain, _COLUMN, _TOP)
+    drawn = draw_threat_circles(axes, scenario.threats, None)
+    # Seen from above, whatever a path's height: a path inside a circle may pass over the sphere.
+    for handle in drawn:
+        handle.set_label(
+            "missile: circle of its sphere" if isinstance(handle, Patch) else "radar: circle of its sphere"
+        )
+    return figure, axes, around + drawn
+
+
+def _ends(axes: Any, scenario: Scenario, paths: Sequence[Floats]) -> list[Any]:
+    """Start and destination, labelled clear of the paths."""
+    placer = LabelPlacer(axes)
+    for path in paths:
+        placer.avoid(path[:, 0], path[:, 1])
+    handles: list[Any] = []
+    for point, marker, size, name in (
+        (scenario.start, "^", 9.0, "start"),
+        (scenario.destination, "*", 13.0, "destination"),
+    ):
+        look: dict[str, Any] = {"markersize": size, "markerfacecolor": drawing.MARKER, "markeredgecolor": "black"}
+        handles += axes.plot(*point[:2], marker, zorder=8, linestyle="", label=name, **look)
+        placer.place(name, float(point[0]), float(point[1]), size=8.0, gap=12.0, fontweight="bold")
+    return handles
+
+
+def draw_convergence(histories: Mapping[int, Mapping[str, Sequence[Floats]]]) -> Figure:
+    """Over generations: how many searches hold a safe path, and the length ratio of the safe ones.
+
+    histories: for each number of threats and each algorithm the searches' (g, 3) length ratio, kill exposure and
+    violations of the best path yet.
+
+    >>> history = np.array([[1.4, 0.2, 1.0], [1.2, 0.0, 0.0], [1.1, 0.0, 0.0]])
+    >>> figure = draw_convergence({30: {"umda": [history]}})
+    >>> figure.axes[0].get_title(loc="left"), figure.axes[1].get_ylabel()
+    ('30 threats', 'length ratio of the safe ones')
+    """
+    count = len(histories)
+    with drawing.clean_style():
+        figure = drawing.new_figure(6.0)
+        grid = figure.add_gridspec(
+            2, count, left=0.075, right=0.985, top=0.9, bottom=0.15, wspace=0.28 if count > 1 else 0.2, hspace=0.16
+        )
+        names: list[str] = []
+        for column, (threats, groups) in enumerate(histories.items()):
+            upper = figure.add_subplot(grid[0, column])
+            lower = figure.add_subplot(grid[1, column], sharex=upper)
+            for (name, searches), look in zip(groups.items(), _LOOKS, strict=False):
+                _converge(upper, lower, searches, look)
+                names = names if name in names else [*names, name]
+            most = max(len(searches) for searches in groups.values())
+            upper.set(ylim=(-0.04 * most, 1.06 * most), title=f"{threats} threats")
+            upper.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
+            upper.tick_params(labelbottom=False)
+            lower.set(xlabel="generation")
+            for axes in (upper, lower):
+                axes.grid(linewidth=0.4, color="#dddddd")
+                axes.set_axisbelow(True)
+            if not lower.lines:
+                lower.set_yticks([])
+                lower.text(
+                    0.5, 0.5, "no run holds\na safe path", transform=lower.transAxes, ha="center", color=drawing.QUIET
+                )
+            if column == 0:
+                upper.set_ylabel("runs that hold a safe path")
+                lower.set_ylabel("length ratio of the safe ones")
+        figure.text(0.012, 0.965, "Convergence over generations", fontsize=11, fontweight="bold")
+        handles: list[Any] = [
+            Line2D([], [], linewidth=1.8, label=name, **look) for name, look in zip(names, _LOOKS, strict=False)
+        ]
+        handles.append(Patch(facecolor="#cccccc", label="below: line = median, band = shortest to longest"))
+        figure.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.065, 0.005), ncols=4)
+    return figure
+
+
+def _converge(upper: Any, lower: Any, histories: Sequence[Floats], look: Mapping[str, Any]) -> None:
+    """One algorithm on one problem; a search that ended early keeps its last value."""
+    length = max(len(history) for history in histories)
+    stacked = np.stack(
+        [np.vstack([history, np.repeat(history[-1:], length - len(history), axis=0)]) for history in histories]
+    )
+    length_ratio, kill, violations = np.moveaxis(stacked, -1, 0)
+    safe = (violations == 0.0) & (kill == 0.0)
+    generation = np.arange(length)
+    upper.plot(generation, safe.sum(axis=0), linewidth=1.6, **look)
+    ratios = np.where(safe, length_ratio, np.nan)
+    known = safe.any(axis=0)
+    if not known.any():
+        return
+    columns = ratios[:, known]
+    lower.fill_between(
+        generation[known],
+        np.nanmin(columns, axis=0),
+        np.nanmax(columns, axis=0),
+        color=look["color"],
+        alpha=0.13,
+        linewidth=0,
+    )
+    lower.plot(generation[known], np.nanmedian(columns, axis=0), linewidth=1.6, **look)

@@ -1,0 +1,181 @@
+"""The instruments of a recorded flight at one time, as lines of text for a terminal.
+
+A frame is a function of the log and the time alone: the same log and time give the same lines, whatever the clock.
+"""
+
+import bisect
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.airborne import control_limits
+from logs.recording.reader import FlightLog
+from logs.views.replay.timeline import TimelineEntry, log_with_legs, timeline_of_legs, waypoint_name
+
+Floats = NDArray[np.float64]
+
+MIN_WIDTH = 64
+# All of a frame, and the line below it, fit a terminal of 24 lines.
+_HORIZON_ROWS, _HORIZON_COLUMNS = 7, 25
+_DEGREES_A_ROW = 5.0
+_LATEST = 3  # entries of the timeline at the foot
+
+
+@dataclass(frozen=True, slots=True)
+class Instruments:
+    """A log made ready for frames: its timeline and the ground under each row, (t,) m, NaN where unknown."""
+
+    log: FlightLog
+    entries: tuple[TimelineEntry, ...]
+    ground: Floats
+    limits: tuple[tuple[str, float], ...]
+
+    def frame(self, time: float, *, width: int = 80) -> list[str]:
+        """Lines of at most ``width`` columns (at least `MIN_WIDTH`) for the newest row at or before ``time`` (s).
+
+        Before the first row, that row is shown.
+        """
+        columns = max(MIN_WIDTH, width)
+        log = self.log
+        k = max(0, int(np.searchsorted(log.track.time, time, side="right")) - 1)
+        left, right = self._horizon(k), self._numbers(k)
+        rows = max(len(left), len(right))
+        left += [" " * (_HORIZON_COLUMNS + 2)] * (rows - len(left))
+        right += [""] * (rows - len(right))
+        lines = self._head(k, columns)
+        lines += [f"{a}  {b}" for a, b in zip(left, right, strict=True)]
+        lines += ["", *self._controls(k), self._threats(k), *self._latest_entries(float(log.track.time[k]))]
+        return [line[:columns].rstrip() for line in lines]
+
+    def _head(self, k: int, columns: int) -> list[str]:
+        log, track = self.log, self.log.track
+        now, end = float(track.time[k]), log.end_time
+        title = f"{log.setup.scenario.name}: {log.setup.aircraft}"
+        clock = f"{now:8.1f} of {end:.1f} s"
+        done = round((columns - 2) * (now - float(track.time[0])) / max(end - float(track.time[0]), 1e-9))
+        bar = "[" + "=" * done + " " * (columns - 2 - done) + "]"
+        leg = int(track.leg[k])
+        route = log.setup.route
+        step = route.waypoints[leg + 1, :2] - track.position[k, :2] if leg < route.legs else np.zeros(2)
+        ahead = (
+            f"leg {leg} of {route.legs}, to {waypoint_name(route, leg + 1)}, {_metres(float(np.hypot(*step)))} to go"
+        )
+        if leg >= route.legs:
+            ahead = "behind the last waypoint"
+        free = max(1, columns - len(clock))
+        return [_printable(title)[: free - 1].ljust(free) + clock, bar, ahead]
+
+    def _horizon(self, k: int) -> list[str]:
+        """Draw the artificial horizon: sky above, ground (:) below, the aircraft's wings in the middle."""
+        roll, pitch, _ = (float(angle) for angle in self.log.track.attitude[k])
+        rows = []
+        for row in range(_HORIZON_ROWS):
+            cells = []
+            for column in range(_HORIZON_COLUMNS):
+                across = (column - _HORIZON_COLUMNS // 2) / 2.0  # a letter is twice as high as wide
+                up = _HORIZON_ROWS // 2 - row
+                # Height of this cell over the horizon, in rows, turned by the roll.
+                over = up * math.cos(roll) + across * math.sin(-roll) + math.degrees(pitch) / _DEGREES_A_ROW
+                cells.append("-" if abs(over) <= 0.5 else " " if over > 0.0 else ":")
+            rows.append(cells)
+        middle = rows[_HORIZON_ROWS // 2]
+        for offset, mark in ((-5, "="), (-4, "="), (-3, "="), (0, "o"), (3, "="), (4, "="), (5, "=")):
+            middle[_HORIZON_COLUMNS // 2 + offset] = mark
+        edge = "+" + "-" * _HORIZON_COLUMNS + "+"
+        return [edge, *("|" + "".join(cells) + "|" for cells in rows), edge]
+
+    def _numbers(self, k: int) -> list[str]:
+        track, setup = self.log.track, self.log.setup
+        east, north, up = (float(value) for value in track.velocity[k])
+        roll, pitch, yaw = (math.degrees(float(angle)) for angle in track.attitude[k])
+        _, _, amsl = track.position[k].tolist()
+        above = amsl - float(self.ground[k])
+        wind_east, wind_north, _ = (float(value) for value in track.wind[k])
+        height = _metres(above) if math.isfinite(above) else "not known"
+        airspeed, wanted, load, used, current = (
+            float(column[k])
+            for column in (track.airspeed, track.speed_command, track.load_factor, track.energy, track.current)
+        )
+        return [
+            f"airspeed     {_number(airspeed, 1)} m/s, wanted {_number(wanted, 1)}",
+            f"ground speed {_number(math.hypot(east, north), 1)} m/s, climb {_number(up, 1, '+')} m/s",
+            f"height       {_metres(amsl)} AMSL, {height} above ground",
+            f"course       {_course(math.degrees(math.atan2(east, north)))}, heading {_course(yaw)}",
+            f"roll, pitch  {_number(roll, 1, '+')}°, {_number(pitch, 1, '+')}°, {_number(load, 2)} g",
+            f"off the path {_number(float(track.cross_track[k]), 1, '+')} m right, "
+            f"{_number(float(track.height_error[k]), 1, '+')} m high",
+            f"wind         {_number(math.hypot(wind_east, wind_north), 1)} m/s from "
+            f"{_course(math.degrees(math.atan2(-wind_east, -wind_north)))}",
+            f"battery      {_number(used, 1)} of {_number(setup.battery, 0)} Wh used, {_number(current, 1)} A",
+        ]
+
+    def _controls(self, k: int) -> list[str]:
+        """Draw one bar a control: where it stands (O) between its limits, and its command (|)."""
+        lines = []
+        controls, commands = self.log.track.controls[k].tolist(), self.log.track.commands[k].tolist()
+        for (name, limit), stands, asked in zip(self.limits, controls, commands, strict=True):
+            throttle = name == "throttle"
+            full = limit if math.isfinite(limit) else math.radians(30.0)
+            cells = list("." * 31)
+            if not throttle:
+                cells[15] = "+"
+            for value, mark in ((asked, "|"), (stands, "O")):
+                if math.isfinite(value):
+                    share = value if throttle else 0.5 + 0.5 * value / full
+                    cells[round(30 * min(max(share, 0.0), 1.0))] = mark
+            state = f"{_number(100.0 * stands, 0)} %" if throttle else f"{_number(math.degrees(stands), 1, '+')}°"
+            held = "  AT ITS LIMIT" if (asked >= 1.0 if throttle else abs(asked) >= full) else ""
+            lines.append(f"{name:<9} [{''.join(cells)}] {state}{held}")
+        return lines
+
+    def _threats(self, k: int) -> str:
+        threats, position = self.log.setup.scenario.threats, self.log.track.position[k]
+        away = np.sqrt(((threats.position - position) ** 2).sum(axis=1))
+        within = [
+            f"{unit} {threats.names[m]} at {_metres(float(away[m]))}"
+            for unit, radii in (("MISSILE", threats.kill_radius), ("radar", threats.detection_radius))
+            for m in np.flatnonzero((radii > 0.0) & (away <= radii)).tolist()
+        ]
+        return _printable("within reach of: " + "; ".join(within) if within else "within no unit's reach")
+
+    def _latest_entries(self, now: float) -> list[str]:
+        newest = bisect.bisect_right([entry.time for entry in self.entries], now + 1e-9)
+        return [f"{entry.time:8.1f} s  {entry.text}" for entry in self.entries[max(0, newest - _LATEST) : newest]]
+
+
+def make_instruments(log: FlightLog) -> Instruments:
+    """Make a log ready for frames; its legs are found from the track, whatever was recorded.
+
+    >>> from logs.recording.example_log import example_log
+    >>> frame = make_instruments(example_log()).frame(10.0)
+    >>> print(frame[2])
+    leg 0 of 2, to waypoint 1 (item 2), 250 m to go
+    >>> print(frame[5])
+    |                         |  height       200 m AMSL, 100 m above ground
+    """
+    log = log_with_legs(log)
+    terrain = log.setup.scenario.terrain
+    position = log.track.position
+    ground = np.full(len(log.track), math.nan)
+    if terrain is not None:
+        ground = np.asarray(terrain.height(position[:, 0], position[:, 1]), dtype=np.float64)
+    return Instruments(log, tuple(timeline_of_legs(log)), ground, tuple(control_limits(log.setup.aircraft)))
+
+
+def _printable(text: str) -> str:
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+def _number(value: float, digits: int, sign: str = "") -> str:
+    # Nought has no sign that is not asked for: "+0.0" or "0", never "-0".
+    return f"{round(value, digits) + 0.0:{sign}.{digits}f}" if math.isfinite(value) else "?"
+
+
+def _metres(value: float) -> str:
+    return f"{_number(value, 0)} m"
+
+
+def _course(degrees: float) -> str:
+    return f"{round(degrees) % 360:03d}°" if math.isfinite(degrees) else "?"

@@ -1,0 +1,146 @@
+"""The frames of a movie of a flight: the map, the aircraft on it with its trail, and its numbers.
+
+The same log and rate give the same frames, whatever the clock.  The map is drawn once; a frame adds what moves.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.markers import MarkerStyle
+from matplotlib.transforms import Affine2D
+from numpy.typing import NDArray
+
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.measures.route_requirements import with_fence_zones
+from logs.verdict.measures.track_alignment import find_leg_ends, with_legs
+from logs.views import drawing
+from logs.views.map import draw_map
+
+Floats = NDArray[np.float64]
+Pixels = NDArray[np.uint8]
+
+RATE = 12  # frames a second
+_DPI = 100.0
+# The trail of an hour has more points than a screen.
+_TRAIL = 4000
+
+
+@dataclass(frozen=True, slots=True)
+class MovieFrames:
+    """Frames of a flight from ``start`` to ``end`` (s), ``speed`` times as fast as it was flown.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> movie = MovieFrames(log.setup, log.track, 0.0, log.end_time, speed=10.0)
+    >>> len(movie), movie.times()[:2]
+    (45, array([0. , 0.83333333]))
+    >>> next(movie.frames()).shape
+    (726, 1000, 3)
+    """
+
+    setup: FlightSetup
+    track: Track
+    start: float
+    end: float
+    speed: float
+
+    def __len__(self) -> int:
+        """How many frames there are: the first shows the start, the last the end."""
+        return max(1, math.ceil((self.end - self.start) * RATE / self.speed - 1e-9)) + 1
+
+    def times(self) -> Floats:
+        """Flight time of each frame, s."""
+        return np.minimum(self.end, self.start + np.arange(len(self)) * self.speed / RATE)
+
+    def frames(self) -> Iterator[Pixels]:
+        """Each frame as (height, width, 3); both even, as video formats want them."""
+        setup, track = self.setup, with_legs(self.track, find_leg_ends(self.setup, self.track))
+        figure = draw_map(
+            with_fence_zones(setup).scenario,
+            plan_waypoints=None,
+            route_waypoints=setup.route.waypoints,
+            track=None,
+            verdict=None,
+        )
+        axes = figure.axes[0]
+        figure.set_dpi(_DPI)
+        canvas = FigureCanvasAgg(figure)
+        with drawing.clean_style():
+            axes.set_title(f"{drawing.shorten(setup.scenario.name, 60)}: the flight", fontweight="bold")
+            canvas.draw()  # type: ignore[no-untyped-call]  # matplotlib has no types here
+            ground = canvas.copy_from_bbox(figure.bbox)  # type: ignore[no-untyped-call]  # nor here
+            moving = _MovingParts(figure, axes, setup, track)
+            for time in self.times():
+                canvas.restore_region(ground)  # type: ignore[no-untyped-call]  # nor here
+                moving.show(float(time))
+                pixels: Pixels = np.asarray(canvas.buffer_rgba())[..., :3]  # type: ignore[no-untyped-call]  # nor here
+                yield pixels[: len(pixels) // 2 * 2, : pixels.shape[1] // 2 * 2].copy()
+
+
+class _MovingParts:
+    """Trail, aircraft and numbers, which move over the map."""
+
+    def __init__(self, figure: Figure, axes: Any, setup: FlightSetup, track: Track) -> None:
+        self._axes, self._figure, self._setup, self._track = axes, figure, setup, track
+        look: dict[str, Any] = {"animated": True, "zorder": 9}
+        (self._trail,) = axes.plot([], [], color=drawing.FLOWN, linewidth=1.6, **look)
+        (self._aircraft,) = axes.plot([], [], linestyle="", markersize=17.0, color=drawing.FAIL, **look)
+        self._text = figure.text(
+            0.02, 0.018, "", family="monospace", fontsize=9.5, va="bottom", animated=True,
+            bbox={"facecolor": "white", "edgecolor": "#bbbbbb", "pad": 4.0},
+        )  # fmt: skip
+        position = track.position
+        terrain = setup.scenario.terrain
+        ground = np.full(len(position), math.nan)
+        if terrain is not None:
+            ground = np.asarray(terrain.height(position[:, 0], position[:, 1]))
+        self._above = position[:, 2] - ground
+        self._step = max(1, len(position) // _TRAIL)
+
+    def show(self, time: float) -> None:
+        """Draw the newest row at or before ``time`` (s), and what was flown up to it."""
+        track = self._track
+        k = max(0, int(np.searchsorted(track.time, time, side="right")) - 1)
+        rows = np.append(np.arange(0, k, self._step), k)
+        trail = track.position[rows]
+        self._trail.set_data(trail[:, 0], trail[:, 1])
+        _, _, yaw = track.attitude[k].tolist()
+        turned = Affine2D().rotate(-yaw if math.isfinite(yaw) else 0.0)
+        self._aircraft.set_marker(MarkerStyle(_PLANE, transform=turned))
+        self._aircraft.set_data(track.position[k : k + 1, 0], track.position[k : k + 1, 1])
+        self._text.set_text(self._line(k))
+        for artist in (self._trail, self._aircraft):
+            self._axes.draw_artist(artist)
+        self._figure.draw_artist(self._text)
+
+    def _line(self, k: int) -> str:
+        track = self._track
+        roll, _, _ = track.attitude[k].tolist()
+        parts = [
+            f"{float(track.time[k]):7.1f} s",
+            f"leg {int(track.leg[k])} of {self._setup.route.legs}",
+            f"{signed_number(float(track.airspeed[k]), 1)} m/s",
+            f"{signed_number(float(track.position[k, 2]), 0)} m AMSL",
+            f"{signed_number(float(self._above[k]), 0)} m above ground",
+            f"bank {signed_number(math.degrees(roll), 0)}°",
+        ]
+        return "   ".join(parts)
+
+
+def signed_number(value: float, digits: int) -> str:
+    """Write a number with so many digits, nought without a sign, "?" for what is no number.
+
+    >>> signed_number(-0.3, 0), signed_number(-12.34, 1)
+    ('0', '−12.3')
+    """
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "\N{MINUS SIGN}") if math.isfinite(value) else "?"
+
+
+# Nose, right wing, tail, left wing: an arrowhead that points north.
+_PLANE = [(0.0, 1.0), (0.7, -0.8), (0.0, -0.35), (-0.7, -0.8), (0.0, 1.0)]

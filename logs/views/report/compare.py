@@ -1,0 +1,309 @@
+"""Two flights measured alike, and their differences, from their logs alone."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+from numpy.typing import NDArray
+
+from flight.simulation.airborne import control_limits, held_at_limit
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.recording.reader import FlightLog
+from logs.verdict.findings import RULES, Verdict
+from logs.verdict.judge_flight import judge_flight
+from logs.verdict.measures.path_sweeps import path_spheres, segment_clearances
+from logs.views.compare_charts import NamedFlight, draw_both_on_map, draw_both_over_distance
+from logs.views.drawing import png_bytes, svg_bytes
+from logs.views.report.charts import compare_charts
+from logs.views.report.page import CHART_SCRIPTS, page_library, picture_address, script_digest, script_text, style_text
+from logs.views.report.text import NOTHING, number
+from logs.views.scene import script_json
+from world.files import write_whole
+from world.geometry import path_length
+from world.html_table import html_table
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """One quantity of both flights; NaN where a flight has none.  unit: "" for a count."""
+
+    name: str
+    unit: str
+    first: float
+    second: float
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Comparison:
+    """Two flights and what differs.
+
+    logs, names, verdicts: of the first and the second flight.
+    differences: each quantity that was measured, differing or not.
+    notes: what the flights do not share, and how far apart their tracks are, in sentences.
+    """
+
+    logs: tuple[FlightLog, FlightLog]
+    names: tuple[str, str]
+    verdicts: tuple[Verdict, Verdict]
+    differences: tuple[Difference, ...]
+    notes: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        return f"<Comparison {' and '.join(self.names)}: {len(self.differences)} quantities, {len(self.notes)} notes>"
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows it."""
+        return html_table(" and ".join(self.names), difference_rows(self), ("", "", *self.names, "difference"))
+
+
+def compare_logs(first: FlightLog, second: FlightLog, *, names: tuple[str, str]) -> Comparison:
+    """Judge and measure both flights alike.
+
+    names: of the two in tables and legends; "(first)" and "(second)" are added to names that are the same.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> comparison = compare_logs(log, log, names=("one", "other"))
+    >>> comparison.differences[0]
+    Difference(name='time in the air', unit='s', first=36.5, second=36.5)
+    >>> comparison.notes
+    ('tracks: 0.00 m apart on average, 0.00 m at most',)
+    """
+    if names[0] == names[1]:
+        names = (f"{names[0]} (first)", f"{names[1]} (second)")
+    verdicts = (_judge(first), _judge(second))
+    measures = [
+        _measure(log.setup, log.track) | _margins(verdict)
+        for log, verdict in zip((first, second), verdicts, strict=True)
+    ]
+    keys = list(dict.fromkeys([*measures[0], *measures[1]]))
+    found = [Difference(*key, *(measure.get(key, math.nan) for measure in measures)) for key in keys]
+    return Comparison((first, second), names, verdicts, tuple(found), tuple(_notes(first, second, names)))
+
+
+def _judge(log: FlightLog) -> Verdict:
+    ended = log.ended or "the log ends before the flight does"
+    return judge_flight(log.setup, log.track, ended, whole=log.complete, reference=log.reference)
+
+
+def _measure(setup: FlightSetup, track: Track) -> dict[tuple[str, str], float]:
+    """Measure a flight: (name, unit) and value."""
+    good = np.isfinite(track.position).all(axis=1)
+    position, time = np.ascontiguousarray(track.position[good]), np.ascontiguousarray(track.time[good])
+    roll, _, _ = track.attitude.T
+    found = {
+        ("time in the air", "s"): float(track.time[-1] - track.time[0]),
+        ("distance flown", "m"): float(path_length(position)) if len(position) > 1 else math.nan,
+        ("energy used", "Wh"): float(track.energy[-1]),
+        ("mean airspeed", "m/s"): _reduced(np.mean, track.airspeed),
+        ("highest", "m AMSL"): _reduced(np.max, position[:, 2]),
+        ("largest bank", "deg"): math.degrees(_reduced(np.max, np.abs(roll))),
+        ("largest load factor", "g"): _reduced(np.max, track.load_factor),
+        ("largest cross-track", "m"): _reduced(np.max, np.abs(track.cross_track)),
+        ("typical cross-track (rms)", "m"): math.sqrt(_reduced(np.mean, track.cross_track.astype(np.float64) ** 2)),
+        ("largest height error", "m"): _reduced(np.max, np.abs(track.height_error)),
+    }
+    if setup.scenario.terrain is not None and len(position) > 1:
+        found["least height above ground", "m"] = _reduced(
+            np.min, segment_clearances(setup.scenario.terrain, position)[0]
+        )
+    threats = setup.scenario.threats
+    if len(threats) and len(position) > 1:
+        for name, radii, scales in (
+            ("all missiles", threats.kill_radius, threats.kill_scale),
+            ("all radars", threats.detection_radius, threats.detection_scale),
+        ):
+            met = path_spheres(position, time, threats.position, radii, scales)
+            found[f"time within reach, sum over {name}", "s"] = float(met.inside.sum())
+            found[f"exposure, sum over {name}", "s"] = float(met.exposure.sum())
+    lasts = np.append(np.diff(track.time), 0.0)
+    for k, (name, limit) in enumerate(control_limits(setup.aircraft)):
+        if math.isfinite(limit):
+            held = held_at_limit(track, k, 0.0 if name == "throttle" else -limit, limit)
+            found[f"{name} at its limit", "s"] = float(lasts[held].sum())
+    return found
+
+
+def _reduced(reduce: Callable[[Floats], Any], values: NDArray[np.floating[Any]]) -> float:
+    """Apply a reduction to the values that are numbers; NaN where there are none."""
+    finite = values[np.isfinite(values)].astype(np.float64)
+    return float(reduce(finite)) if finite.size else math.nan
+
+
+def _margins(verdict: Verdict) -> dict[tuple[str, str], float]:
+    """How many findings fail, and each rule's tightest margin."""
+    found = {("findings that fail", ""): float(sum(item.ok is False for item in verdict.findings))}
+    for rule in RULES:
+        mine = [
+            item for item in verdict.findings if item.rule == rule and item.ok is not None and item.margin is not None
+        ]
+        if mine:
+            found[f"tightest margin: {rule}", mine[0].unit] = min(float(item.margin or 0.0) for item in mine)
+    return found
+
+
+def _notes(first: FlightLog, second: FlightLog, names: tuple[str, str]) -> list[str]:
+    """Note what the two flights do not share, and how far apart their tracks are."""
+    a, b = first.setup, second.setup
+    notes = []
+    for name, left, right in (
+        ("scenario", a.scenario.name, b.scenario.name),
+        ("aircraft", a.aircraft, b.aircraft),
+        ("seed", str(a.seed), str(b.seed)),
+        ("mission", a.mission_text, b.mission_text),
+        ("wind", _wind(a), _wind(b)),
+        ("guidance", a.guidance, b.guidance),
+        ("navigation", a.nav, b.nav),
+    ):
+        if left != right:
+            notes.append(f"{name}: differs" if name == "mission" else f"{name}: {left} and {right}")
+    for log, name in zip((first, second), names, strict=True):
+        if not np.isfinite(log.track.cross_track).any():
+            notes.append(
+                f"cross-track and height error: guidance's own, which the log of {name} does not hold;"
+                " planfly refly measures an imported flight against its legs"
+            )
+    if a.scenario.origin == b.scenario.origin:
+        there, here = (log.track.position[np.isfinite(log.track.position).all(axis=1)] for log in (first, second))
+        if len(there) and len(here):
+            # Imported here: nothing else of a report needs it.
+            from scipy.spatial import KDTree
+
+            away = KDTree(there).query(here)[0]
+            notes.append(
+                f"tracks: {number(float(away.mean()))} m apart on average, {number(float(away.max()))} m at most"
+            )
+    else:
+        notes.append("map origins differ: the tracks are not laid over each other")
+    return notes
+
+
+def _wind(setup: FlightSetup) -> str:
+    wind = setup.scenario.wind
+    source = f" from {round(math.degrees(wind.from_course)) % 360:03d}°" if wind.speed else ""
+    return f"{wind.speed:g} m/s{source}, turbulence {wind.turbulence}"
+
+
+def difference_rows(comparison: Comparison) -> list[tuple[str, ...]]:
+    """List quantity, unit, first, second, second less first, as text."""
+    first, second = (_label(verdict) for verdict in comparison.verdicts)
+    rows: list[tuple[str, ...]] = [("verdict", "", first, second, "")]
+    for item in comparison.differences:
+        digits = None if item.unit else 0
+        change = number(item.second - item.first, signed=True, digits=digits)
+        both = (number(value, digits=digits) for value in (item.first, item.second))
+        rows.append((item.name, item.unit, *both, change))
+    return rows
+
+
+def _label(verdict: Verdict) -> str:
+    return "flyable" if verdict.flyable else "not flyable" if verdict.complete else "incomplete"
+
+
+def difference_lines(comparison: Comparison) -> list[str]:
+    """Set the table of differences and the notes in lines for a terminal.
+
+    >>> from logs.recording.example_log import example_log
+    >>> log = example_log()
+    >>> lines = difference_lines(compare_logs(log, log, names=("one", "other")))
+    >>> for line in lines[:3]:
+    ...     print(line[-42:])
+             one        other  difference
+      not flyable  not flyable
+             36.5         36.5        0.00
+    """
+    head = ("", "", *(name[-24:] for name in comparison.names), "difference")
+    rows = [head, *difference_rows(comparison)]
+    rows = [(f"{name} ({unit})" if unit else name, *rest) for name, unit, *rest in rows]
+    wide = [max(len(row[k]) for row in rows) for k in range(4)]
+    lines = [
+        "  ".join(
+            [row[0].ljust(wide[0]), *(cell.rjust(size) for cell, size in zip(row[1:], wide[1:], strict=True))]
+        ).rstrip()
+        for row in rows
+    ]
+    return [*lines, *comparison.notes, *([] if NOTHING not in "".join(lines) else [f"{NOTHING}: not known"])]
+
+
+# ----------------------------------------------------------------------
+# The comparison of two flights as files: pictures, and a page that holds them.
+
+# Name of the chart that stands for each picture, and what it shows.
+_PICTURES = {
+    "compare-map.png": ("map", "Both flights from above, over the first one's map"),
+    "compare-profile.png": (
+        "along",
+        "Height, height above ground, airspeed, bank, cross-track and throttle of both flights",
+    ),
+}
+
+
+def write_comparison(out_dir: Path, comparison: Comparison, *, svg: bool = False) -> list[Path]:
+    """Write ``compare-map.png``, ``compare-profile.png`` and ``compare.html`` into a folder, made if it is missing.
+
+    svg: the pictures as SVG, too.  The map is left out where the flights' map origins differ.
+    Returns the paths written.  Raises OSError.
+
+    >>> import tempfile
+    >>> from logs.recording.example_log import example_log
+    >>> from logs.views.report.compare import compare_logs
+    >>> log = example_log()
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paths = write_comparison(Path(folder), compare_logs(log, log, names=("one", "other")))
+    >>> [path.name for path in paths]
+    ['compare-map.png', 'compare-profile.png', 'compare.html']
+    """
+    first, second = (
+        NamedFlight(name, log.setup, log.track) for name, log in zip(comparison.names, comparison.logs, strict=True)
+    )
+    figures = {"compare-profile": draw_both_over_distance((first, second))}
+    if first.setup.scenario.origin == second.setup.scenario.origin:
+        figures = {"compare-map": draw_both_on_map((first, second)), **figures}
+    files = {f"{name}.png": png_bytes(figure) for name, figure in figures.items()}
+    page = _page(comparison, (first, second), files)
+    if svg:
+        files |= {f"{name}.svg": svg_bytes(figure) for name, figure in figures.items()}
+    files["compare.html"] = page.encode("utf-8")
+    out_dir.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        write_whole(out_dir / name, data)
+    return [out_dir / name for name in files]
+
+
+def _page(comparison: Comparison, flights: tuple[NamedFlight, NamedFlight], files: dict[str, bytes]) -> str:
+    """The page, its pictures, charts and scripts inside."""
+    pictures = [(*_PICTURES[name], picture_address(data)) for name, data in files.items()]
+    data, script = compare_charts(flights), script_text(CHART_SCRIPTS)
+    verdicts = [
+        (name, verdict.flyable, verdict.headline)
+        for name, verdict in zip(comparison.names, comparison.verdicts, strict=True)
+    ]
+    environment = Environment(
+        loader=PackageLoader("logs.views.report"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    return environment.get_template("compare.html").render(
+        names=comparison.names,
+        verdicts=verdicts,
+        rows=difference_rows(comparison),
+        notes=comparison.notes,
+        pictures=pictures,
+        style=Markup(style_text("style", "compare")),
+        scene=Markup(script_json(data["scene"])),
+        flight_data=Markup(script_json(data["flight"])),
+        chart_data=Markup(script_json(data["charts"])),
+        library=page_library(),
+        script=Markup(script),
+        script_digest=script_digest(script),
+    )

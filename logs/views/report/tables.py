@@ -1,0 +1,313 @@
+"""The contents of the report's tables: legs, threats, controls, energy, and facts of scenario and flight."""
+
+import hashlib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flight.simulation.airborne import control_limits, held_at_limit
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.measures.path_sweeps import passages
+from logs.views.report.text import NOTHING, number, quantity
+from world.geometry import leg_courses, leg_runs, leg_slopes, path_length, signed_turns
+from world.scenario import geographic
+
+if TYPE_CHECKING:
+    from logs.recording.reader import LogEvent
+
+Floats = NDArray[np.float64]
+Facts = list[tuple[str, str]]
+
+# A page with more events than this would be read by nobody.
+MAX_EVENTS = 200
+
+
+@dataclass(frozen=True, slots=True)
+class LegRow:
+    """One leg as text, in the columns of `LEG_COLUMNS`; failing: a finding about it failed."""
+
+    cells: tuple[str, ...]
+    failing: bool
+
+
+LEG_COLUMNS = (
+    "leg",
+    "length (m)",
+    "course (°)",
+    "slope (°)",
+    "from (m AMSL)",
+    "to (m AMSL)",
+    "turn at its end (°)",
+    "flown (s)",
+    "mean airspeed (m/s)",
+    "peak bank (°)",
+    "peak cross-track (m)",
+    "peak height error (m)",
+    "least height above ground (m)",
+    "energy (Wh)",
+)
+
+
+def leg_rows(setup: FlightSetup, track: Track | None, failing: frozenset[int]) -> list[LegRow]:
+    """List the legs of the route: planned shape, and what was flown on each."""
+    waypoints = setup.route.waypoints
+    runs, courses, slopes = leg_runs(waypoints), np.degrees(leg_courses(waypoints)), np.degrees(leg_slopes(waypoints))
+    turns = np.degrees(signed_turns(waypoints))
+    above = ground_clearance(setup, track) if track is not None else None
+    rows = []
+    for leg in range(setup.route.legs):
+        turn = NOTHING
+        if leg < len(turns):
+            side = "right" if turns[leg] > 0.0 else "left"
+            turn = f"{number(abs(float(turns[leg])), digits=1)} {side}" if abs(turns[leg]) >= 0.05 else "0"
+        shape = (
+            f"{leg}",
+            number(float(runs[leg]), digits=0),
+            f"{courses[leg] % 360.0:05.1f}",
+            number(float(slopes[leg]), signed=True, digits=2),
+            number(float(waypoints[leg, 2]), digits=1),
+            number(float(waypoints[leg + 1, 2]), digits=1),
+            turn,
+        )
+        rows.append(LegRow(shape + _flown_cells(track, above, leg), leg in failing))
+    return rows
+
+
+def ground_clearance(setup: FlightSetup, track: Track) -> Floats | None:
+    """Height above ground of each row, (t,) m, from track and terrain; None without terrain."""
+    terrain = setup.scenario.terrain
+    if terrain is None:
+        return None
+    return np.asarray(track.position[:, 2] - terrain.height(track.position[:, 0], track.position[:, 1]))
+
+
+def _flown_cells(track: Track | None, above: Floats | None, leg: int) -> tuple[str, ...]:
+    rows = np.flatnonzero(track.leg == leg) if track is not None else np.zeros(0, dtype=np.intp)
+    if track is None or rows.size == 0:
+        return (NOTHING,) * 7
+    roll, _, _ = track.attitude[rows].T
+    # A leg ends where the next one begins.
+    last = min(int(rows[-1]) + 1, len(track) - 1)
+    return (
+        number(float(track.time[last] - track.time[rows[0]]), digits=1),
+        number(float(np.mean(track.airspeed[rows], dtype=np.float64)), digits=1),
+        number(math.degrees(_peak(roll)), digits=1),
+        number(_peak(track.cross_track[rows]), digits=2),
+        number(_peak(track.height_error[rows]), digits=2),
+        number(_least(above[rows]) if above is not None else None, digits=1),
+        number(float(track.energy[last]) - float(track.energy[rows[0]]), digits=2),
+    )
+
+
+def flight_sentence(setup: FlightSetup, track: Track | None) -> str:
+    """The flight in one line; "" where there was none."""
+    if track is None:
+        return ""
+    seconds, distance = float(track.time[-1] - track.time[0]), float(path_length(track.position)) / 1000.0
+    above = ground_clearance(setup, track)
+    low = NOTHING if above is None else number(_least(above), digits=0)
+    height = f", never less than {low} m above ground" if low != NOTHING else ""
+    energy = float(track.energy[-1])
+    # A log of the field may hold no battery.
+    used = f", {number(energy, digits=0)} of {number(setup.battery, digits=0)} Wh" if math.isfinite(energy) else ""
+    return f"Flown: {number(distance, digits=1)} km in {number(seconds, digits=0)} s{height}{used}."
+
+
+def _peak(values: NDArray[np.float32]) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else math.nan
+
+
+def _least(values: Floats) -> float:
+    finite = values[np.isfinite(values)]
+    return float(finite.min()) if finite.size else math.nan
+
+
+def scenario_facts(setup: FlightSetup) -> Facts:
+    """Facts of the scenario: area, terrain, threats, limits, wind."""
+    scenario = setup.scenario
+    terrain = scenario.terrain
+    facts: Facts = [("Scenario", scenario.name)]
+    if scenario.spec.description:
+        facts.append(("About", scenario.spec.description))
+    east, north = (float(np.ptp(side)) / 1000.0 for side in scenario.bounds)
+    facts.append(("Map origin", _position(scenario.origin.lat_deg, scenario.origin.lon_deg)))
+    area = scenario.spec.area
+    floor = f"from {number(scenario.floor)} " if area is not None and area.floor_amsl_m is not None else ""
+    if not scenario.external:
+        facts += [
+            ("Area", f"{number(east)} km east–west, {number(north)} km north–south"),
+            ("Heights allowed", f"{floor}up to {number(scenario.ceiling)} m AMSL"),
+        ]
+    for name, point in (("Start", scenario.start), ("Destination", scenario.destination)):
+        lat, lon = geographic(scenario, point)
+        facts.append((name, f"{_position(float(lat), float(lon))}, {quantity(float(point[2]), 'm')} AMSL"))
+    if terrain is None:
+        facts.append(("Terrain", "none was given; nothing is said about the ground"))
+    else:
+        error = f", stated error {quantity(terrain.vertical_error, 'm')}" if terrain.vertical_error is not None else ""
+        facts.append(("Terrain", f"{terrain.source}, every {quantity(terrain.spacing, 'm')}; {terrain.datum}{error}"))
+    missiles = int(np.count_nonzero(scenario.threats.kill_radius > 0.0))
+    radars = int(np.count_nonzero(scenario.threats.detection_radius > 0.0))
+    facts.append(("Threats", f"{len(scenario.threats)} units: {missiles} with missiles, {radars} with radars"))
+    facts += _limit_facts(setup)
+    return facts
+
+
+def _position(lat_deg: float, lon_deg: float) -> str:
+    ns, ew = "N" if lat_deg >= 0.0 else "S", "E" if lon_deg >= 0.0 else "W"
+    return f"{abs(lat_deg):.6f}° {ns}, {abs(lon_deg):.6f}° {ew}"
+
+
+def _limit_facts(setup: FlightSetup) -> Facts:
+    limits, wind = setup.scenario.limits, setup.scenario.wind
+
+    def angle(value: float | str) -> str:
+        return "the aircraft's" if isinstance(value, str) else quantity(value, "deg")
+
+    wind_text = f"{quantity(wind.speed, 'm/s')} from {math.degrees(wind.from_course) % 360.0:03.0f}°"
+    if wind.gradient:
+        gain = number(100.0 * wind.gradient, signed=True)
+        wind_text += f" at {quantity(wind.reference_amsl, 'm')} AMSL, {gain} m/s per 100 m of height"
+    return [
+        (
+            "Limits",
+            f"turn {angle(limits.max_turn_deg)}, climb {angle(limits.max_climb_deg)}, "
+            f"dive {angle(limits.max_dive_deg)}; {quantity(limits.min_clearance_m, 'm')} above ground; "
+            f"within {quantity(setup.corridor, 'm')} of the legs",
+        ),
+        ("Wind", f"{wind_text if wind.speed else 'calm'}; turbulence: {wind.turbulence}"),
+    ]
+
+
+def flight_facts(setup: FlightSetup, track: Track | None, ended: str) -> Facts:
+    """Aircraft, mission and flight in numbers."""
+    bank = min(setup.max_bank, setup.envelope.max_bank)
+    braking = "may drive the motor" if setup.envelope.motor_braking else "does not drive the motor"
+    route = setup.route
+    facts: Facts = [
+        ("Aircraft", f"{setup.aircraft}, at {quantity(setup.airspeed, 'm/s')}, bank up to {quantity(bank, 'rad')}"),
+        ("Descent", f"the propeller {braking}"),
+        ("Mission", f"{setup.mission.source}: {len(setup.mission.items)} items, {route.legs} legs"),
+        ("Route", f"{quantity(float(path_length(route.waypoints)) / 1000.0, 'km')} long"),
+        ("Started", route.started),
+    ]
+    if setup.plan is not None:
+        plan = setup.plan
+        how = f"{plan.algorithm}, seed {plan.seed}, {plan.evaluations} paths tried"
+        facts.append(("Plan", f"{how}; {_standing(plan.feasible, plan.safe)}"))
+    if track is not None and len(track):
+        facts.append(("Time in the air", quantity(float(track.time[-1] - track.time[0]), "s")))
+        facts.append(("Distance flown", quantity(float(path_length(track.position)) / 1000.0, "km")))
+    if ended:
+        facts.append(("Flight ended", ended))
+    return facts
+
+
+def _standing(feasible: bool, safe: bool) -> str:
+    if safe:
+        return "feasible, and outside every missile's reach"
+    return "feasible, but within a missile's reach" if feasible else "not feasible"
+
+
+def event_rows(events: Sequence["LogEvent"]) -> list[tuple[str, str, str]]:
+    """List the first `MAX_EVENTS` events as time (s), text and level."""
+    return [(number(event.time, digits=2), event.text, event.level) for event in events[:MAX_EVENTS]]
+
+
+def notes_of(setup: FlightSetup) -> list[str]:
+    """List the mission file's warnings, and what of it cannot be flown as written."""
+    return [*setup.mission.warnings, *setup.route.notes]
+
+
+def energy_facts(setup: FlightSetup, track: Track | None) -> Facts:
+    """Sum up what the flight took from the battery."""
+    if track is None or len(track) == 0:
+        return []
+    used = float(track.energy[-1])
+    if not math.isfinite(used):
+        return []
+    seconds = float(track.time[-1] - track.time[0])
+    distance = float(path_length(track.position)) / 1000.0
+    facts: Facts = [
+        ("Used", quantity(used, "Wh")),
+        ("Battery", quantity(setup.battery, "Wh")),
+        ("Left", f"{quantity(setup.battery - used, 'Wh')}, {quantity(100.0 * (1.0 - used / setup.battery), '%')}"),
+        ("Peak current", quantity(_peak(track.current), "A")),
+    ]
+    if seconds > 0.0:
+        facts.append(("Mean power", quantity(used * 3600.0 / seconds, "W")))
+    if distance > 0.0:
+        facts.append(("Per kilometre", quantity(used / distance, "Wh")))
+    return facts
+
+
+def origin_facts(setup: FlightSetup, versions: Mapping[str, str]) -> Facts:
+    """Seed, versions and hashes: what it takes to have the same flight again."""
+    wind_seed = setup.scenario.wind.seed
+    facts: Facts = [("Seed", f"{setup.seed}" + (f"; turbulence {wind_seed}" if wind_seed is not None else ""))]
+    facts += [(name, versions[name]) for name in sorted(versions)]
+    facts.append(("Mission file, SHA-256", hashlib.sha256(setup.mission_text.encode("utf-8")).hexdigest()))
+    if setup.envelope.model_hash:
+        facts.append(("Aircraft model, hash", setup.envelope.model_hash))
+    terrain = setup.scenario.terrain
+    if terrain is not None and terrain.sha256:
+        facts.append(("Terrain file, SHA-256", terrain.sha256))
+    return facts
+
+
+PASSAGE_COLUMNS = ("unit", "reach", "entered (s)", "left (s)", "inside (s)", "closest (m)", "radius (m)")
+
+
+def passage_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
+    """List the stays inside missiles' and radars' spheres, in order of time, in the columns of `PASSAGE_COLUMNS`."""
+    if track is None or len(track) == 0:
+        return []
+    threats = setup.scenario.threats
+    stays = [
+        (stay, name, unit, float(radii[k]))
+        for k, name in enumerate(threats.names)
+        for unit, radii in (("missile", threats.kill_radius), ("radar", threats.detection_radius))
+        for stay in passages(track.time, track.position, threats.position[k], float(radii[k]))
+    ]
+    return [
+        (
+            name,
+            unit,
+            number(stay.start, digits=1),
+            number(stay.end, digits=1) if stay.whole else "still inside",
+            number(stay.end - stay.start, digits=1),
+            number(stay.closest, digits=0),
+            number(radius, digits=0),
+        )
+        for stay, name, unit, radius in sorted(stays, key=lambda item: item[0].start)
+    ]
+
+
+def saturation_rows(setup: FlightSetup, track: Track | None) -> list[tuple[str, ...]]:
+    """List each control: its limit, its largest command, and for how long that stood at the limit (s, %)."""
+    if track is None or len(track) < 2:
+        return []
+    lasts = np.append(np.diff(track.time), 0.0)
+    rows: list[tuple[str, ...]] = []
+    for k, ((name, limit), command) in enumerate(zip(control_limits(setup.aircraft), track.commands.T, strict=True)):
+        low = 0.0 if name == "throttle" else -limit
+        held = float(lasts[held_at_limit(track, k, low, limit)].sum())
+        scale, unit = (100.0, " %") if name == "throttle" else (180.0 / math.pi, "°")
+        peak = number(scale * _peak(command), digits=1)
+        limit_text = number(scale * limit, digits=1)
+        rows.append(
+            (
+                name,
+                limit_text if limit_text == NOTHING else limit_text + unit,
+                peak + unit,
+                number(held, digits=1) if math.isfinite(limit) else NOTHING,
+                number(100.0 * held / max(float(lasts.sum()), 1e-9), digits=1) if math.isfinite(limit) else NOTHING,
+            )
+        )
+    return rows

@@ -1,0 +1,73 @@
+"""Two flights are measured alike, and nothing differs where nothing differs."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+
+from flight.simulation.track import Track
+from logs.recording.reader import FlightLog, read_log
+from logs.views.report.compare import Comparison, compare_logs, difference_lines, write_comparison
+
+
+def compared(first: FlightLog, second: FlightLog) -> tuple[Comparison, dict[str, Any]]:
+    found = compare_logs(first, second, names=("a.mcap", "b.mcap"))
+    return found, {item.name: item for item in found.differences}
+
+
+def test_a_flight_does_not_differ_from_itself(log_file: Path) -> None:
+    log = read_log(log_file)
+    found, items = compared(log, log)
+    assert all(item.first == item.second or math.isnan(item.first) for item in items.values())
+    assert found.notes == ("tracks: 0.00 m apart on average, 0.00 m at most",)
+    assert compare_logs(log, log, names=("x", "x")).names == ("x (first)", "x (second)")
+
+
+def test_differences_and_notes_state_what_differs(log_file: Path, other: FlightLog, track: Track) -> None:
+    found, items = compared(read_log(log_file), other)
+    assert items["time in the air"].second - items["time in the air"].first == pytest.approx(0.5)
+    assert items["energy used"].second == pytest.approx(2 * items["energy used"].first)
+    assert items["energy used"].first == pytest.approx(float(track.energy[-1]))
+    assert any(note.startswith("wind: 3.3 m/s from 211°") for note in found.notes)
+    assert "10.0 m at most" in found.notes[-1]
+    lines = difference_lines(found)
+    assert len({len(line) for line in lines[2:-4]}) == 1
+    assert "energy used (Wh)" in "\n".join(lines)
+
+
+def test_a_flight_without_guidance_has_its_cross_track_named(log_file: Path) -> None:
+    ours = read_log(log_file)
+    none = np.full_like(ours.track.cross_track, np.nan)
+    recorded = replace(ours, track=replace(ours.track, cross_track=none, height_error=none))
+    found, items = compared(ours, recorded)
+    assert math.isnan(items["largest cross-track"].second)
+    (note,) = (note for note in found.notes if "cross-track" in note)
+    assert "the log of b.mcap does not hold" in note
+
+
+# ----------------------------------------------------------------------
+# The comparison's pictures and page: whole, with both verdicts, the same bytes each time.
+
+
+def test_pictures_and_page_are_whole_and_the_same_bytes_each_time(
+    log_file: Path, other: FlightLog, tmp_path: Path
+) -> None:
+    found = compare_logs(read_log(log_file), other, names=("a.mcap", "b.mcap"))
+    files = write_comparison(tmp_path / "out", found, svg=True)
+    assert [file.name for file in files] == [
+        "compare-map.png", "compare-profile.png", "compare-map.svg", "compare-profile.svg", "compare.html",
+    ]  # fmt: skip
+    first = [file.read_bytes() for file in files]
+    assert all(data.startswith(b"\x89PNG") for data in first[:2])
+    assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first[2:4])
+    assert b"energy used" in first[4]
+    # Both verdicts in a sentence first, and the pictures inside: the page can be sent alone.
+    page = first[4].decode("utf-8")
+    assert 0 < page.index("a.mcap:</strong>") < page.index("b.mcap:</strong>") < page.index("<table")
+    assert page.count("data:image/png;base64,") == 2
+    assert 'src="compare' not in page
+    assert [file.read_bytes() for file in write_comparison(tmp_path / "out", found, svg=True)] == first

@@ -1,0 +1,245 @@
+"""Captions of the pictures that were drawn, and of no others, fitting what was flown."""
+
+import base64
+import gzip
+import hashlib
+import json
+import re
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from plotly.offline import get_plotlyjs
+
+import logs.views.figures
+from flight.simulation.setup import FlightSetup
+from flight.simulation.track import Track
+from logs.verdict.findings import Verdict
+from logs.verdict.places import Place
+from logs.views.figures import FIGURE_FILES
+from logs.views.report.page import (
+    CHART_SCRIPTS,
+    VIEW_SCRIPTS,
+    page_library,
+    report_pictures,
+    script_text,
+    style_text,
+    write_report,
+)
+from tests.logs.views.report.report_data import (
+    ARGUMENTS,
+    EVIL,
+    FINDINGS,
+    PNG,
+    VERDICT,
+    Page,
+    finding,
+    make_setup,
+    make_track,
+    report_html,
+)
+from tests.soak import SOAK
+
+NAMES = (*FIGURE_FILES, "time", "exposure", "controls", "energy")
+DRAWN = {f"{name}.png": name.encode() for name in NAMES}
+
+
+def test_every_picture_that_is_drawn_has_its_caption_and_its_bytes() -> None:
+    pictures = report_pictures(make_setup(), True, DRAWN)
+    assert sorted(picture.identifier for picture in pictures) == sorted(NAMES)
+    for picture in pictures:
+        head, _, data = picture.data.partition(",")
+        assert head == "data:image/png;base64"
+        assert base64.b64decode(data) == picture.identifier.encode()
+        assert picture.title
+        assert len(picture.alternative) > 30
+        assert len(picture.caption) > 30
+    assert len({picture.title for picture in pictures}) == len({picture.caption for picture in pictures}) == len(NAMES)
+    assert pictures[0].identifier == "map"
+
+
+def test_what_was_not_drawn_is_left_out_in_the_same_order() -> None:
+    whole = [picture.identifier for picture in report_pictures(make_setup(), True, DRAWN)]
+    some = {name: data for name, data in DRAWN.items() if name not in ("scene.png", "time.png")}
+    left = [picture.identifier for picture in report_pictures(make_setup(), True, some)]
+    assert left == [name for name in whole if name not in ("scene", "time")]
+    assert report_pictures(make_setup(), True, {}) == []
+
+
+def test_a_plan_alone_is_not_said_to_have_been_flown() -> None:
+    setup = make_setup(terrain={"kind": "none"}, threats=[])
+    drawn = {name: DRAWN[name] for name in ("map.png", "profile.png", "scene.png")}
+    flown, planned = report_pictures(make_setup(), True, drawn), report_pictures(setup, False, drawn)
+    assert all("flown" in picture.alternative for picture in flown)
+    assert not any("flown" in picture.alternative for picture in planned)
+    # Three legs and one unit over terrain; the other has neither.
+    assert "shaded terrain, 1 threats, the planned path of 3 legs" in flown[0].alternative
+    assert "no terrain, 0 threats, the planned path of 3 legs." in planned[0].alternative
+
+
+# ----------------------------------------------------------------------
+# The page's scripts are whole files of their own, and plotly.js comes out of the page as it went in.
+
+
+def test_plotly_comes_out_as_it_went_in_and_its_hash_is_named() -> None:
+    library = page_library()
+    text = gzip.decompress(base64.b64decode(library.packed))
+    assert text.decode("utf-8") == get_plotlyjs()
+    assert library.digest == "sha256-" + base64.b64encode(hashlib.sha256(text).digest()).decode()
+    assert library.version in text[:200].decode()
+    # A third of the script, so that a page with all it may hold stays below 8 MB.
+    assert len(library.packed) < 2.2e6
+
+
+def test_every_script_stands_in_the_page_once_and_none_is_long() -> None:
+    folder = resources.files("logs.views.report").joinpath("templates", "scripts")
+    names = {file.name.removesuffix(".js") for file in folder.iterdir()}
+    assert names == {*CHART_SCRIPTS, *VIEW_SCRIPTS, "start"}
+    whole = script_text((*CHART_SCRIPTS, *VIEW_SCRIPTS))
+    for name in names:
+        text = folder.joinpath(f"{name}.js").read_text(encoding="utf-8")
+        assert whole.count(text) == 1
+        assert text.startswith("// ")
+        assert text.count("\n") <= 200, name
+    assert "</script" not in whole
+    assert "http" not in whole + style_text("style", "report", "compare")
+
+
+# ----------------------------------------------------------------------
+# The report is whole in one file, safe with hostile names, the verdict first.
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave pictures undrawn: they cost most of a second, and most tests here read text."""
+
+    def draw(
+        setup: FlightSetup, track: Track | None, verdict: Verdict | None, *, svg: bool = False
+    ) -> dict[str, bytes]:
+        flown = ("time", "exposure", "controls", "energy") if track is not None and len(track) else ()
+        return {f"{name}.png": PNG for name in (*FIGURE_FILES, *flown)}
+
+    monkeypatch.setattr(logs.views.figures, "draw_pictures", draw)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_page_is_whole_and_loads_nothing() -> None:
+    html = report_html(make_setup(), make_track(), VERDICT, **ARGUMENTS)
+    page = Page(html)
+    names = [name for name, _ in page.tags]
+    assert not {"link", "iframe", "object", "form", "base"} & set(names)
+    scripts = [attributes.get("type") for name, attributes in page.tags if name == "script"]
+    assert scripts == [*["application/json"] * 3, "application/gzip", None]
+    assert dict(page.tags)["html"]["lang"] == "en"
+    for name, attributes in page.tags:
+        for key in ("src", "href", "srcset", "action"):
+            value = attributes.get(key)
+            assert value is None or value.startswith(("data:image/png;base64,", "#")), (name, value)
+        assert not [key for key in attributes if key.startswith("on")]
+    script = html.rpartition("<script>")[2].partition("</script>")[0]
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = next(str(a["content"]) for _, a in page.tags if a.get("http-equiv") == "Content-Security-Policy")
+    assert f"script-src 'sha256-{digest}' '{page_library().digest}';" in policy
+    assert "default-src 'none'" in policy
+    words = html.replace(page_library().packed, "")
+    assert "http:" not in words
+    assert "https:" not in words
+    assert "url(" not in words
+    images = [attributes for name, attributes in page.tags if name == "img"]
+    assert [base64.b64decode(str(image["src"]).partition(",")[2]) for image in images] == [PNG] * 9
+    assert all(len(str(image["alt"])) > 30 for image in images)
+    targets = {attributes.get("id") for _, attributes in page.tags}
+    links = [str(attributes["href"]) for name, attributes in page.tags if name == "a"]
+    assert links
+    assert all(link[1:] in targets for link in links)
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_verdict_comes_first_then_what_fails() -> None:
+    page = Page(report_html(make_setup(), make_track(), VERDICT, **ARGUMENTS))
+    text = page.text()
+    order = [
+        "Not flyable",
+        "not flyable: slope on leg 1",
+        "2 of 3 judged findings hold, 1 fails; 1 could not be judged",
+        "Start: in the air",
+        "What fails",
+        "leg 1, slope: flown 11.2°, limit 7.80° (aircraft), beyond it by 3.45°; why leg 1",
+        "Would pass: at most 7.80° (misses by 3.45°).",
+        "item 9: no loiter",
+        "By rule",
+        "Leg by leg",
+        "The failing first",
+        "planfly run small",
+    ]
+    positions = [text.index(part) for part in order]
+    assert positions == sorted(positions)
+    tables = [row for row in page.rows if row[0] in ("fail", "pass", "unjudged") and len(row[1]) == 10]
+    assert [state for state, _ in tables] == ["fail", "pass", "pass", "unjudged"]
+    assert tables[0][1][:9] == ["leg 1", "slope", "✗ fails", "4.00", "11.2", "7.80", "−3.45", "°", "aircraft"]
+    assert "no scenario was given" in tables[3][1][9]
+    rules = [cells for state, cells in page.rows if state and len(cells) == 9]
+    assert rules[1] == ["slope", "✗ fails", "1 of 2 fail", "leg 1", "4.00", "11.2", "7.80", "−3.45", "°"]
+    assert rules[2] == ["bounds", "? not judged", "1 not judged", "no scenario was given", "–", "–", "–", "–", ""]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_hostile_names_stay_text() -> None:
+    setup = make_setup(name=EVIL, description=EVIL)
+    setup = replace(setup, mission=replace(setup.mission, source=EVIL, warnings=(EVIL,)), aircraft=EVIL)
+    evil = finding("threat", Place("missile", 0, name=EVIL), False, -1.0, reason=EVIL, method=EVIL, unit=EVIL)
+    verdict = Verdict((evil,), False, False, (EVIL,), EVIL)
+    html = report_html(setup, make_track(), verdict, ended=EVIL, versions={EVIL: EVIL}, command=EVIL)
+    assert len(re.findall("<script", html)) == 5
+    assert len(re.findall("</script", html)) == 5
+    assert Page(html).text().count("<script>alert('x')</script>") > 8
+    scene = json.loads(html.partition('id="scene-data">')[2].partition("</script>")[0])
+    assert scene["name"] == EVIL
+    assert scene["threats"][0]["name"] == EVIL[:90]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_plan_that_was_not_flown_has_a_report() -> None:
+    setup = make_setup(terrain={"kind": "none"}, threats=[])
+    verdict = Verdict(FINDINGS, False, False, ("no feasible plan: slope",), "plan")
+    for track in (None, make_track().rows(0, 0)):
+        html = report_html(setup, track, verdict, ended=None, versions={}, command="planfly run small")
+        text = Page(html).text()
+        assert "Not flyable: no feasible plan" in text
+        assert "Nothing was flown" in text
+        assert "none was given" in text
+        assert "Energy" not in text
+        assert html.count("<img") == 5
+
+
+def test_pictures_are_drawn_into_page_and_files(tmp_path: Path) -> None:
+    out = tmp_path / "made" / "here"
+    paths = write_report(out, make_setup(), make_track(), VERDICT, **ARGUMENTS)
+    assert [path.name for path in paths] == [*(f"{name}.png" for name in FIGURE_FILES), "report.html"]
+    assert {path.name for path in out.iterdir()} == {path.name for path in paths}
+    html = paths[-1].read_text(encoding="utf-8")
+    assert len(html) < 8e6
+    assert base64.b64encode(paths[0].read_bytes()).decode() in html
+    assert base64.b64encode(paths[1].read_bytes()).decode() in html
+    # Nine, without that of an exposure: this flight is exposed to nothing.
+    assert html.count("data:image/png;base64,iVBOR") == 8
+    before = {path.name: path.read_bytes() for path in paths}
+    more = write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
+    assert {path.name: path.read_bytes() for path in paths} == before
+    drawn = [path for path in more if path.suffix == ".svg"]
+    assert [path.stem for path in drawn] == list(FIGURE_FILES)
+    first = [path.read_bytes() for path in drawn]
+    assert all(ElementTree.fromstring(data).tag.endswith("svg") for data in first)
+    if SOAK:
+        write_report(out, make_setup(), make_track(), VERDICT, svg=True, **ARGUMENTS)
+        assert [path.read_bytes() for path in drawn] == first
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_report_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
+    (tmp_path / "map.png").mkdir()
+    with pytest.raises(OSError, match=r"map\.png"):
+        write_report(tmp_path, make_setup(), make_track(), VERDICT, **ARGUMENTS)
+    assert [path.name for path in tmp_path.iterdir()] == ["map.png"]

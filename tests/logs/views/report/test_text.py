@@ -1,0 +1,179 @@
+"""What would have passed is the limit on the side to which the margin counts, with what the verdict knows beside it."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from flight.simulation.setup import MissionStretch
+from logs.recording.example_log import example_log
+from logs.verdict.findings import Finding, Verdict, make_finding
+from logs.verdict.imported.flown_legs import flown_legs
+from logs.verdict.imported.model_comparison import Spread, compare_with_model
+from logs.verdict.places import FLIGHT, Change, DecidingParameter, Place
+from logs.verdict.wording import place_text
+from logs.views.report.text import (
+    badge_of,
+    finding_rows,
+    left_lines,
+    number,
+    quantity,
+    refly_lines,
+    rule_rows,
+    trust_line,
+    would_pass,
+)
+from tests.logs.views.report.report_data import FINDINGS, finding
+from world.scenario import with_wind
+
+LEG = Place("leg", 4)
+DECIDING = DecidingParameter("TECS_HDEM_TCONST", 3.0, 1.2, "s", "clearance", LEG, -8.2)
+
+
+def failed(rule: str, flown: float | None, limit: float, margin: float | None, place: Place = LEG) -> Finding:
+    return make_finding(rule, place, ok=False, reason="", flown=flown, limit=limit, margin=margin)
+
+
+@pytest.mark.parametrize(
+    ("rule", "flown", "limit", "margin", "bound"),
+    [
+        ("clearance", 52.0, 60.0, -8.0, "at least"),
+        ("stall", 15.0, 17.5, -2.5, "at least"),
+        ("bounds", -7.0, 0.0, -7.0, "at least"),
+        ("turn", 59.0, 9.0, -50.0, "at most"),
+        ("threat", 1.6, 0.0, -1.6, "at most"),
+        # Descents: the steepness is bounded, not the number.
+        ("slope", -11.0, -9.5, -1.5, "at most"),
+        ("energy", 800.0, 710.0, -90.0, "at most"),
+    ],
+)
+def test_the_number_that_passes_bounds_on_the_side_of_the_margin(
+    rule: str, flown: float, limit: float, margin: float, bound: str
+) -> None:
+    found = would_pass(failed(rule, flown, limit, margin), None)
+    assert (found.bound, found.value, found.misses) == (bound, limit, -margin)
+    assert found
+
+
+def test_a_finding_that_fails_by_other_evidence_names_no_number() -> None:
+    found = would_pass(failed("turn", 6.9, 15.6, 8.7), None)
+    assert (found.bound, found.value, found.misses) == (None, None, None)
+    assert not found
+
+
+def test_the_parameter_stands_at_the_finding_that_it_decides_alone() -> None:
+    low = failed("clearance", 52.0, 60.0, -8.0)
+    assert would_pass(low, DECIDING).parameter == DECIDING
+    assert would_pass(failed("clearance", 52.0, 60.0, -8.0, Place("leg", 5)), DECIDING).parameter is None
+    assert would_pass(failed("height", 52.0, 60.0, -8.0), DECIDING).parameter is None
+
+
+def test_suggestions_are_those_of_the_finding() -> None:
+    change = (Change("height", LEG, None, 9.0, "m"),)
+    assert would_pass(replace(failed("turn", 6.9, 15.6, 8.7), suggestions=(change,)), None).suggestions == (change,)
+
+
+# ----------------------------------------------------------------------
+# Numbers keep their value and unit as text, and rows of findings their order.
+
+
+@pytest.mark.parametrize(
+    ("flyable", "complete", "level", "findings", "label"),
+    [
+        (True, True, "flown", FINDINGS[:2], "Flyable"),
+        (True, True, "geometric", FINDINGS[:2], "Flyable on paper, not flown"),
+        (False, True, "flown", FINDINGS, "Not flyable"),
+        (False, False, "flown", FINDINGS, "Not flyable, and incomplete"),
+        (False, False, "flown", (finding("completion", FLIGHT, False, None),), "Incomplete, so not flyable"),
+        (False, False, "plan", FINDINGS, "Not flyable: no feasible plan"),
+    ],
+)
+def test_badge_states_the_verdict(
+    flyable: bool, complete: bool, level: str, findings: tuple[Finding, ...], label: str
+) -> None:
+    badge = badge_of(Verdict(findings, flyable, complete, (), level))
+    assert badge.word == label
+    assert badge.state == ("pass" if flyable else "fail")
+
+
+@given(st.floats(-1e9, 1e9))
+def test_numbers_keep_their_value(value: float) -> None:
+    text = number(value)
+    back = float(text.replace("\u2009", "").replace("−", "-"))
+    half_a_last_digit = 5.1e-5 if abs(value) < 0.01 else 5.1e-4 if abs(value) < 0.1 else 5.1e-3
+    assert back == pytest.approx(value, rel=0.006, abs=half_a_last_digit)
+    assert number(value, signed=True).lstrip("+−") == text.lstrip("−")
+    assert not text.startswith(("−0.0000", "-"))
+    assert text.lstrip("−0.").strip() or not text.startswith("−")
+
+
+def test_numbers_are_shown_with_their_units() -> None:
+    assert number(None) == number(math.nan) == number(math.inf) == "–"
+    assert number(12345.6) == "12\u2009346"
+    assert number(-0.001, digits=1) == "0.0"
+    assert quantity(math.pi / 6, "rad") == "30.0°"
+    assert quantity(4.0, "m/s") == "4.00\u00a0m/s"
+    (row,) = finding_rows([finding("turn", Place("waypoint", 1), True, 0.1, unit="rad", planned=0.5, tolerance=0.01)])
+    assert (row.planned, row.margin, row.unit) == ("28.6", "+5.73", "°")
+    assert row.method == "least squares (±\u00a00.57°)"
+
+
+@given(st.lists(st.tuples(st.sampled_from([True, False, None]), st.floats(-10, 10)), min_size=1, max_size=12))
+def test_rules_show_their_worst_finding(kinds: list[tuple[bool | None, float]]) -> None:
+    findings = [finding("slope", Place("leg", k), ok, margin) for k, (ok, margin) in enumerate(kinds)]
+    (row,) = rule_rows(findings)
+    judged = [item for item in findings if item.ok is not None]
+    failed = [item for item in judged if item.ok is False]
+    assert row.state == ("fail" if failed else "pass" if judged else "unjudged")
+    if judged:
+        worst = min(item.margin or 0.0 for item in (failed or judged))
+        assert row.where in [place_text(item.place) for item in findings if item.margin == worst]
+    states = [item.state for item in finding_rows(findings)]
+    assert states == sorted(states, key=["fail", "pass", "unjudged"].index)
+
+
+# ----------------------------------------------------------------------
+# Refly lines.
+
+LOG = example_log()
+FLOWN = flown_legs(LOG.setup, LOG.track, MissionStretch(0.0, 36.5, "AUTO", "log"))
+assert FLOWN is not None
+AGAIN = compare_with_model(LOG.setup, FLOWN, LOG.track, "completed")
+
+
+def test_a_row_a_leg_and_a_turn() -> None:
+    lines = refly_lines(AGAIN)
+    assert [line.split()[:2] for line in lines if line.startswith(("leg", "waypoint"))] == [
+        ["leg", "0"],
+        ["leg", "1"],
+        ["waypoint", "1"],
+    ]
+
+
+def test_what_is_not_known_is_a_dash() -> None:
+    silent = replace(AGAIN.legs[0], energy=(math.nan, 2.0))
+    assert "- / 2.0" in refly_lines(replace(AGAIN, legs=(silent,)))[2]
+
+
+def test_the_trust_is_a_line_with_medians() -> None:
+    spread = (Spread("cross_track", "m", 0.5, 2.0),)
+    line = trust_line(replace(AGAIN, spreads=spread))
+    blown = "Model aerosonde in 0.0 m/s of wind, no gusts, against the flight"
+    assert line == f"{blown}, median (95 %): cross-track 0.50 m (2.00 m)"
+    scenario = with_wind(AGAIN.setup.scenario, 4.0, 0.0, "light")
+    gusty = replace(AGAIN, setup=replace(AGAIN.setup, scenario=scenario))
+    assert "in 4.0 m/s of wind, light turbulence, against" in trust_line(gusty)
+    assert "which stands in for an aircraft that is not named" in trust_line(replace(AGAIN, stands_in=True))
+    assert "ended early: departure" in trust_line(replace(AGAIN, ended="departure"))
+    assert "no place in common" in trust_line(replace(AGAIN, spreads=()))
+
+
+def test_what_was_not_flown_again_is_named_with_its_reason() -> None:
+    other = MissionStretch(50.0, 60.0, "AUTO", "log")
+    assert left_lines((AGAIN,), (AGAIN.stretch,), 9) == []
+    (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 9)
+    assert line == "Not flown again: AUTO from 50.0 s to 60.0 s: it passed no two waypoints in order"
+    (line,) = left_lines((AGAIN,), (AGAIN.stretch, other), 1)
+    assert line.endswith("in order, or 1 longer ones were")

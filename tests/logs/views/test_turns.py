@@ -1,0 +1,90 @@
+"""Turn by turn: each finding's numbers stand at its place's number, and what fails is ringed."""
+
+import math
+
+import numpy as np
+
+from logs.verdict.findings import Finding, Verdict
+from logs.verdict.places import FLIGHT, Place
+from logs.views.drawing import FAIL, FLOWN
+from logs.views.turns import draw_turns, place_values
+
+
+def slope(leg: int, planned: float, flown: float | None, ok: bool | None) -> Finding:
+    return Finding("slope", Place("leg", leg), planned, flown, 8.0, "aircraft", 0.1, None, "deg", "fit", ok, "")
+
+
+FINDINGS = (
+    slope(2, 7.0, None, None),
+    slope(0, 4.0, 4.5, True),
+    Finding("slope", FLIGHT, 1.0, 1.0, 8.0, "aircraft", 0.1, None, "deg", "fit", True, ""),
+    Finding("turn", Place("waypoint", 1, 5), 40.0, 41.0, 45.0, "scenario", 0.1, 4.0, "deg", "fit", True, ""),
+    slope(1, 6.0, 9.0, False),
+)
+
+
+def test_values_are_in_the_order_of_their_places_and_the_flights_own_are_left_out() -> None:
+    values = place_values(FINDINGS, "slope")
+    assert [value.number for value in values] == [0, 1, 2]
+    assert [value.planned for value in values] == [4.0, 6.0, 7.0]
+    assert [value.flown for value in values[:2]] == [4.5, 9.0]
+    assert math.isnan(values[2].flown)
+    assert [value.ok for value in values] == [True, False, None]
+    assert [value.number for value in place_values(FINDINGS, "turn")] == [1]
+    assert place_values(FINDINGS, "threat") == []
+
+
+def test_bars_dots_and_dashes_stand_at_the_findings_numbers() -> None:
+    figure = draw_turns("a flight", Verdict(FINDINGS, False, True, ("not flyable",), "flown"))
+    turn, slopes = figure.axes
+    assert (turn.get_xlabel(), slopes.get_xlabel()) == ("waypoint", "leg")
+    heights = {round(bar.get_x() + bar.get_width() / 2.0): bar.get_height() for bar in slopes.patches}
+    assert heights == {0: 4.0, 1: 6.0, 2: 7.0}
+    dots = next(line for line in slopes.lines if line.get_color() == FLOWN)
+    np.testing.assert_array_equal(dots.get_xydata(), [[0.0, 4.5], [1.0, 9.0], [2.0, np.nan]])
+    dashes = slopes.collections[0].get_segments()
+    assert [segment[0][1] for segment in dashes] == [8.0, 8.0, 8.0]
+    ring = next(line for line in slopes.lines if line.get_markeredgecolor() == FAIL)
+    np.testing.assert_array_equal(ring.get_xydata(), [[1.0, 9.0]])
+    red = [label.get_text() for label in slopes.get_xticklabels() if label.get_color() == FAIL]
+    assert red == ["1"]
+    assert "fails" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def test_the_highest_bar_dot_and_ring_are_whole() -> None:
+    """A clearance 30 times the least, a turn that fails at ten times its limit, and a slope beyond its own."""
+    found = [
+        Finding("clearance", Place("leg", k), high, high, 60.0, "scenario", 0.1, 1.0, "m", "fit", True, "")
+        for k, high in enumerate((70.0, 1800.0))
+    ]
+    found += [
+        Finding("turn", Place("waypoint", 1), 134.0, 134.0, 15.0, "aircraft", 0.1, -1.0, "deg", "fit", False, ""),
+        Finding("slope", Place("leg", 0), -20.0, -21.0, -8.0, "aircraft", 0.1, -1.0, "deg", "fit", False, ""),
+    ]
+    figure = draw_turns("a flight", Verdict(tuple(found), False, True, ("not flyable",), "flown"))
+    figure.canvas.draw()
+    turn, slopes, clearance = figure.axes
+    for axes, value in ((turn, 134.0), (slopes, -21.0)):
+        _, at = axes.transData.transform((0.0, value))
+        # The ring's radius: half its size and its edge, in points of 150/72 pixels.
+        radius = (0.5 * 12.5 + 1.0) * 150.0 / 72.0
+        assert axes.bbox.y0 <= at - radius
+        assert at + radius <= axes.bbox.y1
+    assert clearance.get_ylim()[1] > 1800.0
+    assert clearance.get_ylim()[0] == 0.0
+
+
+def test_limits_far_above_all_turns_are_named_instead() -> None:
+    far = Finding("turn", Place("waypoint", 1), 10.0, 10.0, 152.0, "aircraft", 0.1, 1.0, "deg", "fit", True, "")
+    near = Finding("turn", Place("waypoint", 2), 10.0, 12.0, 45.0, "aircraft", 0.1, 1.0, "deg", "fit", True, "")
+    (axes,) = draw_turns("a flight", Verdict((far, near), True, True, ("flyable",), "flown")).axes
+    assert 45.0 < axes.get_ylim()[1] < 60.0
+    assert [text.get_text() for text in axes.texts] == ["other limits from 152°"]
+
+
+def test_nothing_is_ringed_where_nothing_fails() -> None:
+    figure = draw_turns("a flight", Verdict(FINDINGS[:4], True, True, ("flyable",), "flown"))
+    assert "fails" not in [text.get_text() for text in figure.legends[0].get_texts()]
+    for axes in figure.axes:
+        assert all(not len(line.get_xdata()) for line in axes.lines if line.get_markeredgecolor() == FAIL)
+    assert draw_turns("nothing", Verdict((), True, True, ("flyable",), "flown")).axes == []
