@@ -316,7 +316,7 @@ def _finding_data(finding: Finding) -> dict[str, Any]:
 #
 # A log's verdict is worked out anew from its rows; the flights beside it are not in it, and their answers are kept.
 
-REFERENCE_SCHEMA = "planfly.reference/1"
+REFERENCE_SCHEMA = "planfly.beside/1"
 
 _Number = Annotated[float, Field(allow_inf_nan=False)]
 
@@ -379,7 +379,7 @@ def reference_flights_json(reference: ReferenceFlights) -> str:
 def parse_reference_flights(text: str | bytes, source: str) -> ReferenceFlights:
     """Read the answers of a text.  Raises LogError, in one line, for what does not fit; source names it.
 
-    >>> parse_reference_flights('{"schema": "planfly.reference/1", "airframe": null, "deciding": null}', "a.mcap")
+    >>> parse_reference_flights('{"schema": "planfly.beside/1", "airframe": null, "deciding": null}', "a.mcap")
     ReferenceFlights(airframe=None, deciding=None)
     """
     try:

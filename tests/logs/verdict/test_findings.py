@@ -208,7 +208,7 @@ def changed(**fields: Any) -> bytes:
     [
         (b"", "a.mcap: "),
         (b"{}", "a.mcap: airframe"),
-        (changed(schema="planfly.reference/9"), "a.mcap: schema"),
+        (changed(schema="planfly.beside/9"), "a.mcap: schema"),
         (changed(more=1), "a.mcap: more"),
         (changed(airframe={"flyable": True, "headline": "", "failed": [["juggling", {}]]}), "a.mcap: airframe"),
         (changed(airframe=7), "a.mcap: airframe"),
