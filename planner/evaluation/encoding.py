@@ -1,9 +1,10 @@
-"""Encodings: how a vector of numbers in a box becomes waypoints.
+"""Encodings: how a vector in a box becomes the waypoints of a path.
 
-`rotated` is the idea of Yang, Tang and Lozano (CEC 2014, section III, eq. 12); `cartesian` and `polar` are what they
-compare it with, and `bearing` is a polar encoding that they do not have.
-Lengths, angles and slopes survive the rotation, so nothing outside this file works in rotated axes except the
-grids that seed a search.
+`rotated` is the encoding proposed by Yang, Tang and Lozano (CEC 2014, section III, eq. 12): an axis along the direction
+of the path, with one interval of it for each waypoint, which deviates across. `cartesian` and `polar` are the encodings
+that they compare it with; `bearing` is a polar encoding that the paper does not have.
+Lengths, angles and slopes are invariant under the rotation, so only encodings and the grids that seed a search work in
+rotated axes.
 """
 
 import math
@@ -17,25 +18,23 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
-# ----------------------------------------------------------------------
-# Frames of a path's inner waypoints: one straight frame for all of them, or one for each along a route.
-#
-# The idea of Yang, Tang and Lozano (CEC 2014, section III) is a frame whose axis leads where the path leads: each
-# waypoint has its own interval along it, and deviates across it.  Their axis is the line from start to destination,
-# and no path turns back along that.  Where the axis is a route instead, a chain of straight pieces, each waypoint has
-# the frame of its own piece, and along is the length of the route.
+# --- Frames of the inner waypoints ---
+
+# In the paper the axis is the line from start to destination, and no path can turn back along it. Where the axis is a
+# route instead, a chain of straight pieces, each waypoint has the frame of its own piece, and `along` is the length of
+# the route.
 
 
-# A piece of a route shorter than this (m) has the course of the piece before it.
+# A piece of a route shorter than this (m) takes the course of the piece before it.
 _SHORTEST_LEG = 1.0
 
 
 class WaypointFrames(NamedTuple):
     """One rotated frame for each of n inner waypoints.
 
-    east, north: (n,) of the place where along and across are 0, m.
+    east, north: (n,) position where along and across are 0, m.
     cosine, sine: (n,) of the angle from east to along, counter-clockwise.
-    edges: (n + 1,) along, between which each waypoint lies, m.
+    edges: (n + 1,) limits along of the waypoints' intervals, m.
     """
 
     east: Floats
@@ -45,7 +44,7 @@ class WaypointFrames(NamedTuple):
     edges: Floats
 
     def restore(self, points: ArrayLike) -> Floats:
-        """Along, across, up (..., n, 3) to world.
+        """World positions (..., n, 3) of points in along, across, up.
 
         >>> frames = frames_along(np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 50.0]]))
         >>> frames.restore([[60.0, 5.0, 9.0], [120.0, 5.0, 9.0]]).round(6).tolist()
@@ -60,7 +59,7 @@ class WaypointFrames(NamedTuple):
         return out
 
     def rotate(self, points: ArrayLike) -> Floats:
-        """World (..., n, 3) to along, across, up: the inverse of `restore`."""
+        """Points in along, across, up of world positions (..., n, 3): the inverse of `restore`."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         return np.stack(
@@ -71,7 +70,7 @@ class WaypointFrames(NamedTuple):
 def frames_along(route: Floats) -> WaypointFrames:
     """Frames along a route (n + 1, 2) on the map, one for each of its straight pieces.
 
-    A piece without a course takes that of the piece before it, the first that of the next that has one.
+    A piece that is too short for a course takes that of the piece before it, or of the first piece with a course.
     """
     steps = np.diff(route, axis=0)
     lengths = np.hypot(steps[:, 0], steps[:, 1])
@@ -87,14 +86,14 @@ def frames_along(route: Floats) -> WaypointFrames:
 
 
 def straight_frames(east: float, north: float, cosine: float, sine: float, edges: Floats) -> WaypointFrames:
-    """The same frame for all of the waypoints: its origin (m), its angle from east, and n + 1 edges along (m)."""
+    """The same frame for all waypoints: its origin (m), its angle from east, and n + 1 edges along (m)."""
     count = edges.size - 1
     one = np.ones(count)
     return WaypointFrames(east * one, north * one, cosine * one, sine * one, edges)
 
 
 def spread_over(route: Floats, count: int) -> tuple[Floats, Floats]:
-    """So many points (count, 3) at even steps along a route (k, 3), and where they are along it (count,), m on the map.
+    """Points (count, 3) at equal distances along a route (k, 3), and their distances along it on the map (count,), m.
 
     >>> points, along = spread_over(np.array([[0.0, 0.0, 10.0], [30.0, 0.0, 10.0], [30.0, 10.0, 10.0]]), 5)
     >>> along.tolist(), points[:, 0].tolist(), points[:, 1].tolist()
@@ -106,16 +105,18 @@ def spread_over(route: Floats, count: int) -> tuple[Floats, Floats]:
     return np.column_stack([np.interp(along, runs, route[:, axis]) for axis in range(3)]), along
 
 
-# Lower end of a polar step, as a share of the mean leg: a zero step has no direction.
+# --- Encodings ---
+
+# Shortest polar step, as a share of the mean leg: a step of 0 has no direction.
 _SHORTEST = 0.05
-# Half-width of the box along a route, in pieces of it.
+# Half-width of the box along a route, in lengths of its pieces.
 ASIDE = 2.0
 
 
 class RotatedFrame(NamedTuple):
     """The rotated frame: `along` from start to destination on the map, `across` to its left, `up` unchanged (eq. 12).
 
-    east, north: of its origin, the start, m.
+    east, north: origin, at the start, m.
     cosine, sine: of the angle from east to the destination, counter-clockwise.
     length: horizontal distance D from start to destination, m.
     """
@@ -127,14 +128,14 @@ class RotatedFrame(NamedTuple):
     length: float
 
     def rotate(self, points: ArrayLike) -> Floats:
-        """World (..., 3) to along, across, up (eq. 12)."""
+        """Points in along, across, up of world positions (..., 3) (eq. 12)."""
         points = np.asarray(points, dtype=np.float64)
         east, north = points[..., 0] - self.east, points[..., 1] - self.north
         c, s = self.cosine, self.sine
         return np.stack([c * east + s * north, c * north - s * east, points[..., 2]], axis=-1)
 
     def restore(self, points: ArrayLike) -> Floats:
-        """Along, across, up (..., 3) to world: the inverse of `rotate`."""
+        """World positions (..., 3) of points in along, across, up: the inverse of `rotate`."""
         points = np.asarray(points, dtype=np.float64)
         along, across = points[..., 0], points[..., 1]
         c, s = self.cosine, self.sine
@@ -146,7 +147,7 @@ class RotatedFrame(NamedTuple):
 
 
 def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
-    """Frame of a mission.  Raises ValueError if start and destination share a place on the map."""
+    """Frame of a mission. Raises ValueError if start and destination coincide on the map."""
     step = destination[:2] - start[:2]
     length = math.hypot(step[0], step[1])
     if length == 0.0:
@@ -157,13 +158,13 @@ def rotated_frame(start: Floats, destination: Floats) -> RotatedFrame:
 
 @dataclass(frozen=True, slots=True)
 class Encoding:
-    """A box and the way from its vectors to paths.
+    """A box and the mapping from its vectors to paths.
 
-    name: by which scenarios and commands know it.
+    name: as scenarios and commands name it.
     waypoints: w, of a path, start and destination included.
-    lower, upper: (d,) box, d = 3(w - 2), three numbers a waypoint in flying order.
+    lower, upper: (d,) box, d = 3(w - 2), three numbers per waypoint in flying order.
     decode: (n, d) -> (n, w, 3) world m, start and destination included.
-    frames: in which its vectors are along, across and up of each inner waypoint; None where they are not.
+    frames: those in which vectors are along, across and up of each inner waypoint; None for other encodings.
 
     >>> space = Space(np.zeros(3), np.array([3000.0, 4000.0, 0.0]), np.array([[0, 3000], [0, 4000]]), (0.0, 500.0))
     >>> encoding = rotated(space, 4)
@@ -190,12 +191,12 @@ class Encoding:
 
 @dataclass(frozen=True, slots=True)
 class Space:
-    """Where a path may go; lengths in m.
+    """Search space of a path; lengths in m.
 
     start, destination: (3,) fixed ends.
     bounds: (2, 2) map.
     up: lowest and highest waypoint.
-    across: half-width of the box either side of the straight line, or None to take it from the map.
+    across: half-width of the box on either side of the straight line, or None for that of the map.
     """
 
     start: Floats
@@ -212,7 +213,7 @@ def _with_ends(space: Space, inner: Floats) -> Floats:
 
 
 def rotated(space: Space, waypoints: int) -> Encoding:
-    """Rotated frame: inner waypoint i lies in the i-th of w - 2 equal intervals along the way (section III)."""
+    """Rotated frame: inner waypoint i lies in the i-th of w - 2 equal intervals along the axis (section III)."""
     frame = rotated_frame(space.start, space.destination)
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     left, right = _across_spans(frame, space, edges)
@@ -227,9 +228,9 @@ def rotated(space: Space, waypoints: int) -> Encoding:
 
 
 def along_route(space: Space, route: Floats) -> Encoding:
-    """As `rotated`, but along is the length of a route (w - 1, 2) on the map, which may turn back.
+    """Like `rotated`, with a route (w - 1, 2) on the map as its axis, which may turn back.
 
-    Inner waypoint i lies along the i-th piece of the route, across as far as `ASIDE` pieces.
+    Inner waypoint i lies along the i-th piece of the route, and across within `ASIDE` lengths of a piece.
     """
     frames = frames_along(route)
     waypoints = len(route) + 1
@@ -244,7 +245,7 @@ def along_route(space: Space, route: Floats) -> Encoding:
 
 
 def frames_of(encoding: Encoding) -> WaypointFrames:
-    """The frames of an encoding's waypoints.  Raises ValueError where it has none."""
+    """The frames of an encoding's waypoints. Raises ValueError for an encoding without frames."""
     if encoding.frames is None:
         raise ValueError(f"{encoding.name}: an encoding without frames along a way")
     return encoding.frames
@@ -257,9 +258,9 @@ def rotated_vectors(space: Space, encoding: Encoding, paths: Floats) -> Floats:
 
 
 def _across_spans(frame: RotatedFrame, space: Space, edges: Floats) -> tuple[Floats, Floats]:
-    """Span (k,), (k,) across the line that the map covers between each two edges (k + 1,) along.
+    """Limits across (k,), (k,) of the map between consecutive edges (k + 1,) along.
 
-    From -across to across where the space gives that.
+    -across and across if the space states a half-width.
     """
     if space.across is not None:
         return np.full(edges.size - 1, -space.across), np.full(edges.size - 1, space.across)
@@ -288,30 +289,30 @@ def cartesian(space: Space, waypoints: int) -> Encoding:
 
 
 def polar(space: Space, waypoints: int) -> Encoding:
-    """Each inner waypoint as a step from the one before: r, theta, up (section III.A).
+    """Each inner waypoint as a step from the previous one: r, theta, up (section III.A).
 
-    theta: "the turning angle at each waypoint", from the leg before, the first from the direction start-destination;
-    within +-180 degrees, positive to the left.  r: from 5 % to 200 % of the straight distance over the number of legs.
-    The paper states neither range; `polar-45` allows no turn beyond the paper's limit.
+    theta: "the turning angle at each waypoint", relative to the previous leg, of the first to the direction
+    start-destination; within +-180 degrees, positive to the left. r: from 5 % to 200 % of the straight distance over
+    the number of legs. The paper states neither range; `polar-45` allows no turn beyond the paper's limit.
     """
     return _steps("polar", space, waypoints, math.pi, turning=True)
 
 
 def polar_45(space: Space, waypoints: int) -> Encoding:
-    """As `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
+    """Like `polar`, with theta within +-45 degrees, the sharpest turn that the paper allows."""
     return _steps("polar-45", space, waypoints, math.pi / 4.0, turning=True)
 
 
 def bearing(space: Space, waypoints: int) -> Encoding:
-    """As `polar`, but theta is each leg's angle from the direction start-destination, so that errors do not add up.
+    """Like `polar`, with theta measured from the direction start-destination, so that errors do not accumulate.
 
-    It is not the paper's: a change of one waypoint shifts those after it, but does not turn them.
+    Not in the paper: changing one waypoint shifts the following ones but does not turn them.
     """
     return _steps("bearing", space, waypoints, math.pi, turning=False)
 
 
 def _steps(name: str, space: Space, waypoints: int, widest: float, *, turning: bool) -> Encoding:
-    """Steps r, theta, up; theta within +-widest (rad): turning, from the step before, else from the straight line."""
+    """Steps r, theta, up, theta within +-widest (rad): relative to the previous step if `turning`, else to the line."""
     frame = rotated_frame(space.start, space.destination)
     mean = frame.length / (waypoints - 1)
     low, high = np.array([_SHORTEST * mean, -widest, space.up[0]]), np.array([2.0 * mean, widest, space.up[1]])

@@ -1,7 +1,8 @@
-"""The graded scores: how far a path violates its constraints, along the whole of it, and how long missiles reach it.
+"""Graded scores: the amount by which a path violates each constraint along its whole length, and its kill exposure.
 
-They look at every leg, and at the arcs and parabolas with which a flight cuts the corners, where these could come out
-differently.
+Where the paper counts violations at six points per leg, these scores measure them along every leg, so that a search can
+descend them. Corners are evaluated as flown, with arcs and parabolas or with the autopilot's tracking error, wherever
+that could change the result. One call evaluates many paths; `score_path` evaluates one from other kernels.
 """
 
 import math
@@ -42,32 +43,32 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Heights = NDArray[np.float32]
 
-# A corner that a flight takes further from the legs than this (m) is evaluated in any case.
+# A flown corner that departs from the legs by more than this (m) is always evaluated.
 CORNER_TOLERANCE = 30.0
-# Rise of an arc above its chord, as a share of its radius.
+# Sagitta of an arc over its chord, as a share of its radius.
 CHORD_RISE = 1.0 - math.cos(0.5 * ARC_STEP)
-# How a corner that is flown departs from the legs, m: radius of its arc, downwards and sideways at most.
+# Departure of a flown corner from the legs, m: radius of its arc, and largest departures downwards and sideways.
 FLOWN_CORNER = np.dtype(
     [
         ("radius", np.float64),
         ("blend_deviation", np.float64),
         ("fly_by_offset", np.float64),
-        # How far from the legs missiles matter to it; 0 where it is evaluated in any case.
+        # Distance from the legs within which missiles matter; 0 if the corner is always evaluated.
         ("missile_distance", np.float64),
     ],
     align=True,
 )
-# Distance from missiles near both ends of a leg, m.
+# Distance of missiles from both ends of a leg, m.
 MISSILE_GAP = np.dtype([("at_beginning", np.float64), ("at_end", np.float64)], align=True)
 
 
 class PathScratch(NamedTuple):
-    """Scratch for evaluating one path of w waypoints after another.
+    """Scratch for evaluating paths of w waypoints one after another.
 
-    legs: `LEG` records (w - 1,), and corners: `CORNER` records (w,), as measured.
+    legs: `LEG` records (w - 1,). corners: `CORNER` records (w,).
     flown: `FLOWN_CORNER` records (w,).
-    extents: (w,) how far from each waypoint a flight leaves the legs, m.
-    terrain_legs: `TERRAIN_LEG` records (w - 1,), and unfinished: (w - 1,) legs whose samples are not all taken.
+    extents: (w,) distance from each waypoint within which the flight leaves the legs, m.
+    terrain_legs: `TERRAIN_LEG` records (w - 1,). unfinished: (w - 1,) legs that still have samples to take.
     gaps: `MISSILE_GAP` records (w - 1,).
     lags: `HEIGHT_LAG` records (w - 1,).
     """
@@ -106,8 +107,8 @@ def score_path(
     violations: Record,
     objectives: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Evaluate a path (w, 3): fill a `VIOLATIONS` record, which must be 0, and an `OBJECTIVES` record."""
-    # Arrays are taken out of the data once: handing it on costs more than a leg's whole evaluation.
+    """Evaluate a path (w, 3): add to a zeroed `VIOLATIONS` record and fill an `OBJECTIVES` record."""
+    # Arrays are taken out of the data once: passing it on costs more than evaluating a leg.
     heights, to_pixel, missiles = data.heights, data.to_pixel, data.missiles
     bounds, aircraft, required, margin = data.slope_bounds, data.aircraft, limits.required, data.kill_margin
     legs, corners, flown, extents = scratch.legs, scratch.corners, scratch.flown, scratch.extents
@@ -161,12 +162,12 @@ def score_path(
 
 
 def graded_scores(data: ProblemArrays, paths: Floats) -> tuple[Floats, Floats]:
-    """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and fly-by arcs.
+    """Graded violations (n, 4) and objectives (n, 4) of paths (n, w, 3), along legs and flown corners.
 
-    Violations by `planner.plan.Violation`: rad and 100 m of leg; m per m; m x km; m.  Of the objectives, by
-    `planner.plan.Objective`, length ratio and kill exposure: the mean density along the path times the paper's number
-    of points, so that it compares with its sum.  Detection and height stay 0: here they would decide between paths of
-    the same length to the last digit only.
+    Violations by `planner.plan.Violation`: rad and 100 m of leg; m per m; m x km; m. Objectives by
+    `planner.plan.Objective`: length ratio and kill exposure, which is the mean density along the path times the paper's
+    number of points, to be comparable with the paper's sum. Detection and height stay 0: they would only decide between
+    paths of exactly equal length.
     """
     violations, objectives = np.zeros(len(paths), dtype=VIOLATIONS), np.zeros(len(paths), dtype=OBJECTIVES)
     _score_paths(data, paths, violations, objectives)
@@ -185,9 +186,9 @@ def _score_paths(
 
 @inlined
 def _arc_radius(legs_hold_turns: bool, legs: Records, corners: Records, i: int) -> float:  # pragma: no cover - compiled
-    """Radius of the arc at waypoint i: 0 where a number alone limits turns and a leg there is too short for its two.
+    """Radius of the arc at waypoint i; 0 where a number alone limits turns and a leg is too short for its two turns.
 
-    The ends have no arc.  `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
+    The ends have no arc. `planner.evaluation.corners.fly_by_radii` gives the radii of a whole path.
     """
     radius: float = corners[i].radius
     if math.isinf(corners[i].tangent):
@@ -212,11 +213,10 @@ def _measure_flown(
     flown: Records,
     extents: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of a path's inner waypoints.
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path without tracking error.
 
-    The flown corner departs from the legs downwards by the blend of heights, and sideways by at most
-    R(1/cos(theta/2) - 1) and a chord's rise; and it does so within its extent: within the tangent and half the arc, or
-    the blend of heights.
+    The flown corner departs from the legs downwards by the blend of slopes, and sideways by at most R(1/cos(theta/2) -
+    1) plus the sagitta of a chord; it does so within the tangent and half the arc, or within the blend.
     """
     start, first = path[0], path[1]
     slope_out = (first[2] - start[2]) / max(legs[0].run, 1e-6)
@@ -237,14 +237,14 @@ def _measure_flown(
 
 @inlined
 def _lag_about(lag: Record, leg: Record, corner: Record) -> tuple[float, float]:  # pragma: no cover - compiled
-    """How far below and above the legs a flight may be about a corner, m; lag, leg: of the leg after it."""
+    """Largest deviation of the flight below and above the legs near a corner, m; lag, leg: of the leg after it."""
     here, settled = below_at(lag, 0.0), below_at(lag, min(1.0, corner.after / max(leg.run, 1e-6)))
     return max(0.0, here, settled), max(0.0, -here, -settled)
 
 
 @inlined
 def _measure_strayed(corners: Records, flown: Records, extents: Floats) -> None:  # pragma: no cover - compiled
-    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints that an autopilot strays about."""
+    """Fill `FLOWN_CORNER` records (w,) and extents (w,) of the inner waypoints of a path with tracking error."""
     for i in range(1, corners.shape[0] - 1):
         aside = corners[i].excursion
         flown[i].radius, flown[i].blend_deviation, flown[i].fly_by_offset = 0.0, 0.0, aside
@@ -261,7 +261,7 @@ def _corner_depth(
     more: float,
     vertices: Floats,
 ) -> float:  # pragma: no cover - compiled
-    """Depth below the required clearance and `more` (m) along a flown corner (k, 3), m x km."""
+    """Depth below the required clearance plus `more` (m) along a flown corner (k, 3), m x km."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]
@@ -275,7 +275,7 @@ def _corner_depth(
 def _corner_kill(
     missiles: MissileIndex, margin: float, vertices: Floats, below: float, above: float
 ) -> float:  # pragma: no cover - compiled
-    """Kill density x length along a flown corner (k, 3); below, above: m that it may be flown lower and higher."""
+    """Kill density x length along a flown corner (k, 3); below, above: vertical tracking error, m."""
     total = 0.0
     for k in range(vertices.shape[0] - 1):
         x, y, z = vertices[k, 0], vertices[k, 1], vertices[k, 2]

@@ -1,4 +1,9 @@
-"""What every evaluation asks of waypoints and legs: turns and available length for them, slopes, and the map."""
+"""Constraints on waypoints and legs that all scores share: turns and the leg length they take, slopes, map bounds.
+
+The first part holds the scratch with which the paper's scores evaluate blocks of paths side by side. The second part
+derives limits that hold for all paths of a problem (`PrecomputedLimits`) and adds the violations of one path, as counts
+or as graded amounts (eq. 1-4 and 7 of Yang, Tang and Lozano, CEC 2014).
+"""
 
 import math
 from typing import NamedTuple
@@ -15,11 +20,10 @@ from world.kernels import Record, Records, compiled, inlined
 Floats = NDArray[np.float64]
 
 
-# ----------------------------------------------------------------------
-# Blocks of paths side by side: their scratch, rows of numbers with one a path, and the places of a leg in it.
+# --- Blocks of paths evaluated side by side ---
 
 
-# Paths side by side: as many as leave a block's scratch in the fastest cache.
+# Paths per block: the scratch of a block fits the level 1 cache.
 BLOCK = 128
 
 
@@ -27,29 +31,29 @@ def _rows(kind: type[np.generic], *names: str) -> list[tuple[str, type[np.generi
     return [(name, kind, (BLOCK,)) for name in names]
 
 
-# A place of each path: position (m) and pixel.
+# One point of each path: position (m) and pixel.
 _PLACE = np.dtype(_rows(np.float64, "east", "north", "up", "column", "row"), align=True)
-# What is summed along a path.
+# Sums along each path.
 _SUMS = np.dtype(
     _rows(np.float64, "below", "height", "kill", "detection", "turns", "slopes", "outside", "length"), align=True
 )
 BLOCK_SCRATCH = np.dtype(
     [
-        # Both ends of a leg, the step between them, and a point of it.
+        # Both ends of a leg, the step between them, and a point on it.
         ("begin", _PLACE),
         ("end", _PLACE),
         ("step", _PLACE),
         ("point", _PLACE),
-        # A leg's run, and the east, north and run of the one before it, m.
+        # A leg's run, and the east, north and run of the previous leg, m.
         *_rows(np.float64, "run", "east_before", "north_before", "run_before"),
         ("sums", _SUMS),
-        # The ground at a point and the clearance wanted there, m.
+        # Ground height at a point and the clearance required there, m.
         *_rows(np.float64, "ground", "need"),
-        # The place within a pixel; within the map, from -1 to 1; and the row of a polynomial.
+        # Position within a pixel; position within the map, from -1 to 1; and one row of a polynomial.
         *_rows(np.float64, "u", "v", "x", "y", "inner"),
-        # Heights of the pixels about a point.
+        # Heights of the four pixels around a point.
         *_rows(np.float32, "top_left", "top_right", "low_left", "low_right"),
-        # A pixel or a cell, where a cell's units begin and how many there are, and the paths in question.
+        # Index of a pixel or cell; first entry and number of entries of a cell's units; paths still to be processed.
         *_rows(np.int64, "index", "first", "count", "asked"),
     ],
     align=True,
@@ -58,7 +62,7 @@ BLOCK_SCRATCH = np.dtype(
 
 @inlined
 def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
-    """Begin all sums with 0."""
+    """Reset all sums to 0."""
     for b in range(BLOCK):
         sums.below[b], sums.height[b], sums.kill[b], sums.detection[b] = 0.0, 0.0, 0.0, 0.0
         sums.turns[b], sums.slopes[b], sums.outside[b], sums.length[b] = 0.0, 0.0, 0.0, 0.0
@@ -66,7 +70,7 @@ def clear_sums(sums: Record) -> None:  # pragma: no cover - compiled
 
 @inlined
 def copy_place(place: Record, out: Record, size: int) -> None:  # pragma: no cover - compiled
-    """Copy one place of each path to another."""
+    """Copy one point of each path to another."""
     for b in range(size):
         out.east[b], out.north[b], out.up[b] = place.east[b], place.north[b], place.up[b]
         out.column[b], out.row[b] = place.column[b], place.row[b]
@@ -74,7 +78,7 @@ def copy_place(place: Record, out: Record, size: int) -> None:  # pragma: no cov
 
 @inlined
 def subtract_places(end: Record, begin: Record, size: int, out: Record) -> None:  # pragma: no cover - compiled
-    """Fill in the step from one place of each path to another."""
+    """Fill the step from one point of each path to another."""
     for b in range(size):
         out.east[b] = end.east[b] - begin.east[b]
         out.north[b] = end.north[b] - begin.north[b]
@@ -87,7 +91,7 @@ def subtract_places(end: Record, begin: Record, size: int, out: Record) -> None:
 def divide_legs(
     begin: Record, step: Record, share: float, size: int, out: Record
 ) -> None:  # pragma: no cover - compiled
-    """Fill in the point of each path's leg that lies this share of the step from its beginning."""
+    """Fill the point of each path's leg at this fraction of the step from its beginning."""
     for b in range(size):
         out.east[b] = begin.east[b] + share * step.east[b]
         out.north[b] = begin.north[b] + share * step.north[b]
@@ -100,7 +104,7 @@ def divide_legs(
 def load_waypoints(
     to_pixel: PolyMapRecord, paths: Floats, begin: int, i: int, size: int, block: Record
 ) -> None:  # pragma: no cover - compiled
-    """Fill in waypoint i of each path, and take it to the raster: `polymap`, for all of them at once."""
+    """Fill waypoint i of each path and its pixel: `polymap`, for all paths at once."""
     end, x, y, inner = block.end, block.x, block.y, block.inner
     east, north, up = end.east, end.north, end.up
     for b in range(size):
@@ -119,7 +123,7 @@ def load_waypoints(
 def _horner(
     coefficients: Floats, terms: int, size: int, x: Floats, y: Floats, inner: Floats, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Fill out with the sum of coefficients[i, j] x^i y^j, i + j < terms, of each path; inner is scratch."""
+    """Fill out with the sum of coefficients[i, j] x^i y^j, i + j < terms, for each path; inner is scratch."""
     for b in range(size):
         out[b] = 0.0
     for i in range(terms - 1, -1, -1):
@@ -133,22 +137,24 @@ def _horner(
             out[b] = out[b] * x[b] + inner[b]
 
 
-# No roll from one turn into the next takes more, m: at 60 degrees of bank and 90 m/s over the ground.
+# --- Limits and violations of one path ---
+
+# Upper bound on the length of any roll between two turns, m: at 60 degrees of bank and 90 m/s over the ground.
 MOST_ROLL = 50.0
-# Shortest leg that the graded scores and the certificate let pass, m.
+# Shortest leg without a violation, in the graded scores and in the certificate, m.
 LEAST_LEG, CERTIFIED_LEG = 10.0, 5.0
 
 
 class PrecomputedLimits(NamedTuple):
-    """What holds for all paths of a problem.
+    """Limits that hold for all paths of a problem.
 
-    cos_max_turn: of the largest turn.
-    wind: unit vector downwind, east and north.
-    climb_slope, dive_slope: tangents that no leg may exceed, or, where the aircraft limits them, that every leg may
+    cos_max_turn: cosine of the largest turn.
+    wind: downwind unit vector, east and north.
+    climb_slope, dive_slope: tangents that no leg may exceed, or, where the aircraft limits slopes, that every leg may
     use.
     slopes_by_aircraft: whether the aircraft limits slopes.
     straight_distance: from start to destination in three dimensions, m.
-    required: clearance.
+    required: clearance above ground.
     """
 
     cos_max_turn: float
@@ -162,7 +168,7 @@ class PrecomputedLimits(NamedTuple):
 
 @compiled
 def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no cover - compiled
-    """What holds for all paths of a problem."""
+    """The limits that hold for all paths of a problem."""
     climb, dive = data.max_climb, data.max_dive
     by_aircraft = math.isnan(climb) or math.isnan(dive)
     if math.isnan(climb):
@@ -170,7 +176,7 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
     if math.isnan(dive):
         dive = _slope_everywhere(data, data.aircraft.descent)
     return PrecomputedLimits(
-        # A turn cannot exceed half a circle, whatever rounding says.
+        # No turn exceeds half a circle; -2 is below any rounded cosine.
         math.cos(data.max_turn) if data.max_turn < math.pi else -2.0,
         downwind(data.aircraft),
         math.tan(climb - data.angle_margin),
@@ -183,9 +189,10 @@ def precompute_limits(data: ProblemArrays) -> PrecomputedLimits:  # pragma: no c
 
 @inlined
 def _slope_everywhere(data: ProblemArrays, air_angles: Floats) -> float:  # pragma: no cover - compiled
-    """Slope (rad) that the aircraft can fly on any course between floor and ceiling; -1 for none.
+    """Slope (rad) that the aircraft can fly on every course between floor and ceiling; -1 if there is none.
 
-    air_angles: (h,) to the air, of its heights.  The slope over the ground is least with the strongest wind behind.
+    air_angles: (h,) flight-path angles relative to the air at the table's heights. The slope over the ground is
+    smallest with the strongest tailwind.
     """
     wind = max(wind_speed_at(data.aircraft, data.floor), wind_speed_at(data.aircraft, data.ceiling))
     speed, air_angle = data.aircraft.airspeed, math.inf
@@ -208,7 +215,7 @@ def _straight_distance(start: Floats, destination: Floats) -> float:  # pragma: 
 def _slope_limits_on(
     data: ProblemArrays, ux: float, uy: float, low: float, high: float, wind: Wind
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive, rad, on the unit course u from one height to another."""
+    """Steepest climb and dive, rad, on the unit course u between two heights."""
     climb, dive = data.max_climb, data.max_dive
     if math.isnan(climb) or math.isnan(dive):
         wx, wy = wind
@@ -225,7 +232,7 @@ def _slope_limits_on(
 
 @compiled
 def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Steepest climb and dive of the leg a-b, rad: the tightest at its ends and its middle height, less the margin."""
+    """Steepest climb and dive of the leg a-b, rad: smallest over its ends and middle height, minus the margin."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     ux, uy = (dx / run, dy / run) if run > 0.0 else (0.0, 1.0)
@@ -236,9 +243,9 @@ def slope_limits(data: ProblemArrays, a: Floats, b: Floats) -> tuple[float, floa
 def slope_excess(
     data: ProblemArrays, limits: PrecomputedLimits, ux: float, uy: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
-    """How far a leg is too steep, as m of height per m of run; 0 where it is not (eq. 3-4).
+    """Amount by which a leg is too steep, in m of height per m of run; 0 if it is not (eq. 3-4).
 
-    u: its unit course.  run: m.  low, high: heights of its ends.
+    u: its unit course. run: m. low, high: heights of its ends, m.
     """
     rise = high - low
     over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run)
@@ -253,11 +260,11 @@ def slope_excess(
 def _turn_excess(
     cosine: float, largest: float, ux: float, uy: float, vx: float, vy: float
 ) -> float:  # pragma: no cover - compiled
-    """How far the turn between two unit courses exceeds the largest, rad; 0 where it does not (eq. 1-2)."""
+    """Amount by which the turn between two unit courses exceeds the largest, rad; 0 if it does not (eq. 1-2)."""
     dot = ux * vx + uy * vy
     if dot >= cosine or (ux == 0.0 and uy == 0.0) or (vx == 0.0 and vy == 0.0):
         return 0.0
-    # A hair above zero, so that what is over is counted.
+    # Slightly above zero, so that an excess lost to rounding is counted.
     return max(1e-12, math.atan2(abs(ux * vy - uy * vx), dot) - largest)
 
 
@@ -271,18 +278,18 @@ def add_leg_violations(
     graded: bool,
     violations: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record: counts, or how far each goes.
+    """Add turn, slope and bounds violations of a path (w, 3) to a `VIOLATIONS` record: counts, or amounts if graded.
 
-    Turn also takes, where legs must hold their turns, each leg that is shorter than its two (eq. 1-4, 7).
-    legs, corners: measured.
+    Where legs must hold their turns, each leg shorter than its two turns adds to turn (eq. 1-4, 7).
+    legs, corners: measurements of the path.
     """
-    # Each sum grows in the order of these lines, on which its last digit depends.
+    # The order of these lines fixes the order of summation, and with it the last digit.
     _add_turns(data, limits, legs, graded, violations)
     _add_bounds(data, path, corners, graded, violations)
     if data.legs_hold_turns:
         _add_turn_lengths(data, limits, path, legs, corners, graded, violations)
     for i in range(legs.shape[0]):
-        # Two waypoints in one place have no course between them, and would make two sharp turns none.
+        # Coincident waypoints have no course between them, and would hide two sharp turns.
         violations.turn += max(0.0, LEAST_LEG - legs[i].run) / 100.0 if graded else 0.0
         rise, run = path[i + 1, 2] - path[i, 2], legs[i].run
         over = max(0.0, rise - limits.climb_slope * run, -rise - limits.dive_slope * run) / max(run, 1.0)
@@ -298,7 +305,7 @@ def add_leg_violations(
 def _add_turns(
     data: ProblemArrays, limits: PrecomputedLimits, legs: Records, graded: bool, violations: Record
 ) -> None:  # pragma: no cover - compiled
-    """Add the turns that are too sharp, those from and to the courses asked for at the ends last."""
+    """Add the turns that are too sharp, last those from and to the courses prescribed at the ends."""
     largest, last = data.max_turn, legs.shape[0]
     for i in range(1, last):
         ux, uy, vx, vy = legs[i - 1].east, legs[i - 1].north, legs[i].east, legs[i].north
@@ -313,7 +320,7 @@ def _add_turns(
 def _add_bounds(
     data: ProblemArrays, path: Floats, corners: Records, graded: bool, violations: Record
 ) -> None:  # pragma: no cover - compiled
-    """Add the waypoints off the map, with what is strayed about them, below the floor or above the ceiling (eq. 7)."""
+    """Add the waypoints off the map (tracking error included), below the floor or above the ceiling (eq. 7)."""
     west, east, south, north = data.west, data.east, data.south, data.north
     floor, ceiling = data.floor, data.ceiling
     for i in range(path.shape[0]):
@@ -334,7 +341,7 @@ def _add_turn_lengths(
     graded: bool,
     violations: Record,
 ) -> None:  # pragma: no cover - compiled
-    """Add the legs that are shorter than what their turns, the roll between them and settling take, in 100 m."""
+    """Add legs shorter than their turns, the roll between them and settling require, in units of 100 m."""
     for i in range(legs.shape[0]):
         need, run = turn_length(data.fly_over, corners, i), legs[i].run
         short = need + settling_length(need, run) - run if need > 0.0 else 0.0
@@ -348,7 +355,7 @@ def _add_turn_lengths(
 def _arc_excess(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, i: int, legs: Records, corners: Records
 ) -> float:  # pragma: no cover - compiled
-    """How far the arc at waypoint i is steeper than the aircraft can fly on either course, m per m."""
+    """Amount by which the arc at waypoint i is steeper than the aircraft can fly on either course, m per m."""
     rise_in = (path[i, 2] - path[i - 1, 2]) / max(legs[i - 1].run, 1.0)
     rise_out = (path[i + 1, 2] - path[i, 2]) / max(legs[i].run, 1.0)
     slope = arc_slope(rise_in, rise_out, corners[i].tangent, corners[i].radius)
@@ -363,7 +370,7 @@ def _arc_excess(
 
 @inlined
 def _violation(over: float, graded: bool) -> float:  # pragma: no cover - compiled
-    """What a constraint that is exceeded by `over` adds: that, or one."""
+    """Violation added for an excess `over`: the excess itself if graded, otherwise 1."""
     if graded:
         return over
     return 1.0 if over > 0.0 else 0.0

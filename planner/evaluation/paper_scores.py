@@ -1,13 +1,12 @@
-"""The paper's four constraints and four objectives, compiled, for many paths at once.
+"""The paper's four constraints and four objectives for many paths at once.
 
-`paper_scores` looks at the paper's six points a leg: eq. 1-11 of Yang, Tang and Lozano, "Estimation of Distribution
-Algorithms based Unmanned Aerial Vehicle Path Planner Using a New Coordinate System", CEC 2014.
-`planner.evaluation.graded_scores` looks along the whole path and says how far a constraint is violated instead of how
-often; both share what `planner.evaluation.leg_constraints` asks of waypoints and legs.
+Eq. 1-11 of Yang, Tang and Lozano, "Estimation of Distribution Algorithms based Unmanned Aerial Vehicle Path Planner
+Using a New Coordinate System", CEC 2014, evaluated at six points per leg. `planner.evaluation.graded_scores` measures
+violations along the whole path instead of counting them.
 
-Paths are evaluated in blocks, side by side: each step is a short loop over the paths of a block, on rows of numbers,
-that a compiler turns into vector instructions.  Every path's sums are in an order of its own, from its start to its
-destination, so that a score depends neither on the block nor on the width of the machine's vectors.
+Paths are evaluated in blocks, side by side: each step is a short loop over the paths of a block, which the compiler
+turns into vector instructions. The sums of each path run from its start to its destination, so that a score depends
+neither on the block nor on the vector width of the machine.
 """
 
 import math
@@ -45,12 +44,12 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Heights = NDArray[np.float32]
 
-# Dividing points a leg (eq. 6).
+# Points per leg (eq. 6).
 POINTS = 6
 
 
 def paper_scores(data: ProblemArrays, paths: Floats) -> tuple[Ints, Floats]:
-    """Counts and objectives of paths (n, w, 3) on six points a leg and the destination (eq. 1-11).
+    """Violation counts and objectives of paths (n, w, 3) at six points per leg and the destination (eq. 1-11).
 
     Returns violations (n, 4) by `planner.plan.Violation` and objectives (n, 4) by `planner.plan.Objective`.
     """
@@ -74,7 +73,7 @@ def _score_paths(
 ) -> None:  # pragma: no cover - compiled
     """Fill `VIOLATIONS` and `OBJECTIVES` records (n,) of paths (n, w, 3).
 
-    scratch: a `BLOCK_SCRATCH` record (1,); legs, corners: records of one path.
+    scratch: a `BLOCK_SCRATCH` record (1,). legs, corners: scratch records of one path.
     """
     number, block = paths.shape[0], scratch[0]
     limits = precompute_limits(data)
@@ -103,7 +102,7 @@ def _score_paths(
 
 @inlined
 def _by_numbers(data: ProblemArrays, limits: PrecomputedLimits) -> bool:  # pragma: no cover - compiled
-    """Whether turns and slopes are limited by numbers alone, and the ends have no course."""
+    """Whether numbers alone limit turns and slopes, and no course is prescribed at the ends."""
     courses = math.isnan(data.start_course) and math.isnan(data.destination_course)
     return courses and not data.legs_hold_turns and not limits.slopes_by_aircraft
 
@@ -114,7 +113,7 @@ def _score_block(
 ) -> None:  # pragma: no cover - compiled
     """Fill the sums of paths begin : begin + size.
 
-    A waypoint is taken to the raster once; between waypoints a leg counts as straight in pixels.
+    Each waypoint is mapped to the raster once; between waypoints a leg is taken as straight in pixels.
     """
     last = paths.shape[1] - 1
     clear_sums(block.sums)
@@ -126,7 +125,8 @@ def _score_block(
         _add_outside(data, size, block.end, block.sums)
         subtract_places(block.end, block.begin, size, block.step)
         _add_leg(limits, size, i == 0, block)
-        # A departure: eq. 6 never reaches the destination, which is the seventh point of the last leg.
+        # Departure from the paper: eq. 6 never reaches the destination, which is the seventh point of the last leg
+        # here.
         for j in range(POINTS + (i == last - 1)):
             divide_legs(block.begin, block.step, j * (1.0 / POINTS), size, block.point)
             _find_ground(data.heights, size, block)
@@ -137,7 +137,7 @@ def _score_block(
 
 @inlined
 def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma: no cover - compiled
-    """Fill in the ground's height at the points, as `pixel_height` gives it."""
+    """Fill the ground height at the points; the same as `pixel_height`."""
     rows, columns = heights.shape
     flat = heights.reshape(heights.size)
     last_column, last_row = columns - 2.0, rows - 2.0
@@ -145,7 +145,7 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma:
     index, us, vs, ground = block.index, block.u, block.v, block.ground
     top_left, top_right, low_left, low_right = block.top_left, block.top_right, block.low_left, block.low_right
     for b in range(size):
-        # What is outside, or no number, reads some pixel, and is put right at the end.
+        # Points off the raster and NaN read an arbitrary pixel; the last loop sets them to NaN.
         column, row = point_column[b], point_row[b]
         c, r = column if column > 0.0 else 0.0, row if row > 0.0 else 0.0
         j, i = int(c if c < last_column else last_column), int(r if r < last_row else last_row)
@@ -175,7 +175,7 @@ def _find_ground(heights: Heights, size: int, block: Record) -> None:  # pragma:
 def _add_terrain(
     required: RequiredClearance, size: int, inner: bool, block: Record
 ) -> None:  # pragma: no cover - compiled
-    """Add what the ground at the points says of terrain and height (eq. 5, 11)."""
+    """Add the points' terrain violations and heights above ground (eq. 5, 11)."""
     east, north, up = block.point.east, block.point.north, block.point.up
     ground, need, below, height = block.ground, block.need, block.sums.below, block.sums.height
     for b in range(size):
@@ -184,7 +184,7 @@ def _add_terrain(
         for b in range(size):
             need[b] = clearance_at(required, east[b], north[b])
     for b in range(size):
-        # Written so that NaN is below.
+        # This form counts NaN as below.
         below[b] += 0.0 if up[b] > ground[b] + need[b] else 1.0
     if inner:
         for b in range(size):
@@ -194,8 +194,8 @@ def _add_terrain(
 
 @inlined
 def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:  # pragma: no cover - compiled
-    """Fill in where the list of the units near each point begins, and its length."""
-    # These cells are as tall as the world.
+    """Fill first entry and length of the list of units near each point."""
+    # A cell is not bounded in height; it notes the heights its units reach.
     west, south, per_metre = threat_cells.west, threat_cells.south, 1.0 / threat_cells.side
     columns, rows, cells = threat_cells.columns, threat_cells.rows, threat_cells.cells
     outside = columns * rows
@@ -215,15 +215,15 @@ def _find_units(threat_cells: ThreatCells, size: int, block: Record) -> None:  #
 
 @inlined
 def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> None:  # pragma: no cover - compiled
-    """Add kill and detection exposure of the points to the units that were found near them (eq. 9, 10).
+    """Add kill and detection exposure of the points to the units found near them (eq. 9, 10).
 
-    In rounds: the first unit of each list, then the second, as long as there are any.  Within a round no loop depends
-    on what is in a list, which nobody could guess.
+    Round k takes the k-th unit of every list that has one. No branch within a round depends on the contents of a list,
+    which branch prediction could not follow.
     """
     east, north, up = block.point.east, block.point.north, block.point.up
     kill, detection = block.sums.kill, block.sums.detection
     first, count, asked = block.first, block.count, block.asked
-    # Unsigned: numba would look whether each index counts from the end.
+    # Unsigned: numba checks signed indices for wrap-around.
     one = np.uintp(1)
     open_paths = np.uintp(0)
     for b in range(size):
@@ -240,7 +240,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
             d2 = dx * dx + dy * dy + dz * dz
             closest2 = d2 if d2 > CLOSEST * CLOSEST else CLOSEST * CLOSEST
             share = 1.0 / (closest2 * closest2)
-            # By multiplication: whether a radius is passed cannot be guessed, and a wrong guess costs more.
+            # By multiplication: a branch on the radius is unpredictable, and a misprediction costs more.
             kill[lane] += sphere.kill_scale4 * share * (1.0 if d2 <= sphere.kill_radius2 else 0.0)
             detection[lane] += sphere.detection_scale4 * share * (1.0 if d2 <= sphere.detection_radius2 else 0.0)
             asked[left] = np.int64(lane)
@@ -251,7 +251,7 @@ def _add_exposures(spheres: Records, units: Short, size: int, block: Record) -> 
 
 @inlined
 def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -> None:  # pragma: no cover - compiled
-    """Add a leg's length, and whether its slope and the turn into it are too much (eq. 1-4, 8)."""
+    """Add a leg's length, and whether its slope and the turn into it exceed their limits (eq. 1-4, 8)."""
     climb, dive, cosine = limits.climb_slope, limits.dive_slope, limits.cos_max_turn
     east, north, up, runs = block.step.east, block.step.north, block.step.up, block.run
     east_before, north_before, run_before = block.east_before, block.north_before, block.run_before
@@ -265,7 +265,7 @@ def _add_leg(limits: PrecomputedLimits, size: int, first: bool, block: Record) -
         slopes[b] += 1.0 if (rise - climb * run > 0.0) | (-rise - dive * run > 0.0) else 0.0
     if not first:
         for b in range(size):
-            # A leg without a course has no turn: both sides are 0.
+            # A leg without a course makes no turn: both sides are 0.
             dot = east[b] * east_before[b] + north[b] * north_before[b]
             turns[b] += 0.0 if dot >= cosine * (runs[b] * run_before[b]) else 1.0
     for b in range(size):

@@ -1,4 +1,9 @@
-"""A scenario and its limits as a planning problem: arrays for compiled code, and the space that encodings search."""
+"""A scenario and its limits as a planning problem: arrays for compiled code, and the search space of encodings.
+
+`make_problem` makes two sets of arrays. `certified` has the margins that a certificate requires, which cover the errors
+of a flight. `search` has larger margins, which also cover what lies between the samples of the search. Near fixed ends
+that do not have these margins both require less.
+"""
 
 import math
 from dataclasses import dataclass
@@ -24,19 +29,18 @@ Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 
-# ----------------------------------------------------------------------
-# What compiled code evaluates paths with: a scenario and its limits as numbers and arrays.
+# --- Arrays for compiled code ---
 
 
-# One unit of the scenario: its position (m), and radius and scale (m) of its missile and its radar.
+# A threat: its position (m), and radius and scale (m) of its missile and its radar.
 THREAT = np.dtype(
     [
         (name, np.float64)
         for name in ("east", "north", "up", "kill_radius", "kill_scale", "detection_radius", "detection_scale")
     ]
 )
-# A unit as a point is compared with it: its position (m), radii to the power of two, scales to the power of four, and
-# what makes the record as long as a line of the processor's cache.
+# A threat in the form in which points are tested: its position (m), squared radii, scales to the power of four, and
+# padding to the length of a cache line.
 SPHERE = np.dtype(
     [
         (name, np.float64)
@@ -44,13 +48,13 @@ SPHERE = np.dtype(
     ]
     + [("padding", np.float64)]
 )
-# What is found of one path, by the names of `Violation` and `Objective` and in their order.
+# Violations and objectives of one path, in the order of `Violation` and `Objective`.
 VIOLATIONS = np.dtype([(item.name.lower(), np.float64) for item in Violation])
 OBJECTIVES = np.dtype([(item.name.lower(), np.float64) for item in Objective])
 
 
 class SlopeBounds(NamedTuple):
-    """How steep the ground is at most, m per m.
+    """Upper bounds on the slope of the ground, m per m.
 
     steepest: anywhere.
     tiles: within `tile_side` m of each tile of `world.terrain.TILE` pixels a side.
@@ -62,29 +66,29 @@ class SlopeBounds(NamedTuple):
 
 
 class ProblemArrays(NamedTuple):
-    """What paths are evaluated against; lengths in m, angles in rad.
+    """Data that paths are evaluated against; lengths in m, angles in rad.
 
     heights: raster of the ground.
     to_pixel: map from positions to its pixels.
     threats: `THREAT` records (m,).
-    spheres: `SPHERE` records (m,), each of the threat with its number.
-    aircraft: what it can do, of which turbulence leaves a plan a share.
-    west, east, south, north: edges of the map; floor and ceiling: lowest and highest waypoint.
+    spheres: `SPHERE` records (m,) of the same threats.
+    aircraft: its performance, reduced in turbulence.
+    west, east, south, north: edges of the map. floor, ceiling: lowest and highest waypoint.
     start, destination: (3,) fixed ends.
     max_turn: largest course change.
     legs_hold_turns: whether a leg must be as long as its turns.
     fly_over: whether a turn begins at its waypoint, not before it.
-    max_climb, max_dive: NaN to ask the aircraft.
-    angle_margin: kept inside slope limits.
-    clearance: required above ground; buffer: wanted on top of it, and start_buffer and destination_buffer at the ends.
-    kill_margin: wanted between path and missile spheres.
-    sample_pitch: between samples of the terrain along a leg, of the graded scores.
-    start_course, destination_course: NaN where none is asked for.
+    max_climb, max_dive: NaN where the aircraft limits them.
+    angle_margin: margin to slope limits.
+    clearance: required above ground. buffer: additional height, and start_buffer and destination_buffer at the ends.
+    kill_margin: required between the path and missile spheres.
+    sample_pitch: between samples of the terrain along a leg, in the graded scores.
+    start_course, destination_course: NaN where none is prescribed.
     threat_cells: the threats by the points that they may reach.
-    missiles: the missiles by where they stand.
+    missiles: the missiles by position.
     slope_bounds: of the ground.
-    tracking: a record of `aircraft.tracking.TRACKING`: how far the autopilot strays from its legs.
-    airspace: zones, and the greatest height above ground.
+    tracking: a record of `aircraft.tracking.TRACKING`, the autopilot's tracking error.
+    airspace: zones and the maximum height above ground.
     """
 
     heights: Heights
@@ -122,7 +126,7 @@ class ProblemArrays(NamedTuple):
 
 
 def threat_records(threats: Threats) -> Records:
-    """Units of a scenario as `THREAT` records (m,)."""
+    """Threats of a scenario as `THREAT` records (m,)."""
     out = np.zeros(len(threats.position), dtype=THREAT)
     for axis, name in enumerate(("east", "north", "up")):
         out[name] = threats.position[:, axis]
@@ -139,7 +143,7 @@ def sphere_records(threats: Records) -> Records:
         out[name] = threats[name]
     for kind in ("kill", "detection"):
         radius = threats[f"{kind}_radius"]
-        # A radius of 0 is no weapon, and no square is below this.
+        # A radius of 0 means no weapon, and no squared distance is below -1.
         out[f"{kind}_radius2"] = np.where(radius > 0.0, radius * radius, -1.0)
         out[f"{kind}_scale4"] = threats[f"{kind}_scale"] ** 4
     out.setflags(write=False)
@@ -151,22 +155,23 @@ def as_columns(records: Records) -> Floats:
     return records.view(np.float64).reshape(len(records), -1)
 
 
-# ----------------------------------------------------------------------
-# The height above ground that a path needs: the required clearance, and a buffer that fixed ends may not have.
+# --- Required clearance ---
+
+# Growth of the buffer away from an end without it, m per m.
 
 # Growth of the clearance buffer away from an end that starts without it, m per m.
 BUFFER_GROWTH = 0.05
 
 
 class RequiredClearance(NamedTuple):
-    """What height above ground is required where; lengths in m.
+    """The height above ground that a path requires at each point; lengths in m.
 
-    clearance: required everywhere; buffer: on top of it, away from the ends.
+    clearance: required everywhere. buffer: additional, away from the ends.
     start_east, start_north, destination_east, destination_north: the ends.
-    start_buffer, destination_buffer: what the ends leave of the buffer.
-    same_everywhere: whether they leave all of it.
-    growth: what the buffer alone adds to the ground's slope, m per m.
-    steepest_loss: fastest loss of height above what is required, m per m.
+    start_buffer, destination_buffer: buffer at the ends.
+    same_everywhere: whether the ends have the full buffer.
+    growth: slope of the required height due to the buffer, m per m.
+    steepest_loss: fastest possible loss of height above the required height, m per m.
     sample_pitch: between samples of the terrain.
     """
 
@@ -186,13 +191,13 @@ class RequiredClearance(NamedTuple):
 
 @compiled
 def required_clearance(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
-    """What clearance a problem requires."""
+    """The clearance that a problem requires."""
     return _required(data, data.clearance, data.buffer, data.start_buffer, data.destination_buffer)
 
 
 @compiled
 def required_below(data: ProblemArrays) -> RequiredClearance:  # pragma: no cover - compiled
-    """What a problem's greatest height above ground requires where heights of path and ground change their signs."""
+    """The maximum height above ground as a required clearance, with the heights of path and ground negated."""
     space = data.airspace
     return _required(data, -space.max_height, space.buffer, space.start_buffer, space.destination_buffer)
 
@@ -221,9 +226,9 @@ def _required(
 
 @inlined
 def clearance_at(required: RequiredClearance, east: float, north: float) -> float:  # pragma: no cover - compiled
-    """Height above ground that a path needs here, m: the buffer grows from what the fixed ends leave of it."""
-    # Without branches, so that a loop over many places becomes vector instructions: an end that leaves the whole
-    # buffer takes nothing from it anywhere.
+    """Height above ground required at a point, m: the buffer grows away from fixed ends that have less of it."""
+    # Without branches, so that loops over many points become vector instructions: an end with the full buffer never
+    # reduces it.
     dx, dy = east - required.start_east, north - required.start_north
     keep = required.start_buffer + BUFFER_GROWTH * math.sqrt(dx * dx + dy * dy)
     dx, dy = east - required.destination_east, north - required.destination_north
@@ -234,36 +239,38 @@ def clearance_at(required: RequiredClearance, east: float, north: float) -> floa
     return need
 
 
-# Plans keep this inside turn and slope limits.
+# --- Margins ---
+
+# Margin of plans to turn and slope limits, rad.
 ANGLE_MARGIN = math.radians(0.5)
-# Course changes that a plan may ask of the aircraft where no number limits them.
+# Largest course change of a plan where no number limits it.
 AIRCRAFT_TURN = math.radians(150.0)
-# m above the required clearance, and outside kill spheres, that the search aims for and the certificate asks for.
-# What is between the two covers the search's terrain samples and chords; what the certificate keeps covers the
-# height error of a flight (1.3 m worst of 120 flights) and its cross-track error (2 m).
+# Heights above the required clearance and distances from kill spheres, m, that the search aims for and the certificate
+# requires. The difference covers the search's terrain samples and chords; the certificate's margin covers the height
+# error of a flight (1.3 m worst of 120 flights) and its cross-track error (2 m).
 SEARCH_BUFFER, CERTIFIED_BUFFER = 8.0, 5.0
 SEARCH_KILL_MARGIN, CERTIFIED_KILL_MARGIN = 15.0, 10.0
-# The same beside zones, and under a greatest height above ground: of what the certificate leaves between that and the
-# required clearance, a search keeps no more than this share on either side.
+# The same for zones and below a maximum height above ground. A search keeps no more than this share of the band between
+# the certificate's limits on either side.
 SEARCH_ZONE_MARGIN, CERTIFIED_ZONE_MARGIN = 15.0, 10.0
 BAND_SHARE = 0.25
-# Of what a fixed end leaves of the buffer, the share that the certificate asks for.
+# Share of the buffer available at a fixed end that the certificate requires.
 CERTIFIED_END_SHARE = 0.75
-# More buffer for each attempt after the first, m: the search had not sampled all ground.
+# Additional buffer per attempt after the first, m: the samples of the previous search missed ground.
 ATTEMPT_BUFFER = 5.0
-# Of the aircraft's steepest climb and dive, the share that a plan uses: holding a path in gusts takes the rest.
+# Share of the aircraft's steepest climb and dive that a plan uses; gusts take the rest.
 TURBULENCE_SHARE = {"none": 1.0, "light": 0.9, "moderate": 0.8}
-# m inside the map, and inside floor and ceiling, that a search keeps where the fixed ends do.
+# Margins of a search to the map's edges and to floor and ceiling, m, where the fixed ends allow them.
 MAP_MARGIN, HEIGHT_MARGIN = 10.0, 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """What a search works on.
+    """The data of a search.
 
     search: arrays with the margins that a search aims for.
-    certified: arrays with those that the certificate asks for.
-    space: where a path may go.
+    certified: arrays with the margins that the certificate requires.
+    space: search space of the encodings.
     """
 
     scenario: Scenario
@@ -274,9 +281,9 @@ class Problem:
 
 
 def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Problem:
-    """A scenario in the form of compiled code.  Raises ScenarioError if nothing can be planned on it.
+    """A scenario as arrays for compiled code. Raises ScenarioError if no path can be planned on it.
 
-    attempt: how many searches have failed; each adds to the clearance that the next one keeps.
+    attempt: number of searches that have failed; each increases the clearance of the next.
     """
     terrain = scenario.terrain
     if terrain is None:
@@ -292,7 +299,7 @@ def make_problem(scenario: Scenario, limits: Limits, attempt: int = 0) -> Proble
             )
     certified = _certified_arrays(scenario, limits, terrain)
     across, up = (certified.tracking.across, certified.tracking.up) if certified.tracking.strays else (0.0, 0.0)
-    # What the ground rises across the way comes on top; the certificate looks at the ground there.
+    # Plus the rise of the ground across the tracking error; the certificate measures the ground there.
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up + across * certified.slope_bounds.steepest
     airspace = _search_airspace(scenario, certified, attempt, up)
     if airspace.max_height < math.inf:
@@ -352,28 +359,28 @@ def _certified_arrays(scenario: Scenario, limits: Limits, terrain: Terrain) -> P
 
 
 def _search_airspace(scenario: Scenario, certified: ProblemArrays, attempt: int, up: float) -> KeptAirspace:
-    """The airspace with the margins of a search."""
+    """Airspace with the margins of a search."""
     buffer = SEARCH_BUFFER + attempt * ATTEMPT_BUFFER + up
     margins = _zone_margins(scenario, SEARCH_ZONE_MARGIN, buffer, 1.0)
     return keep_airspace(scenario, margins, min(buffer, _most_buffer(certified)))
 
 
 def _zone_margins(scenario: Scenario, beside: float, beyond: float, share: float) -> ZoneMargins:
-    """Margins of zones, m, changed by as much as the scenario asks to keep more or less; in height never less."""
+    """Margins of zones, m, changed by the scenario's `zone_margin_m`; in height never reduced."""
     asked = scenario.planner.zone_margin_m
     more = 0.0 if asked is None else asked - CERTIFIED_ZONE_MARGIN
     return ZoneMargins(beside + more, beyond + max(0.0, more), share)
 
 
 def _most_buffer(certified: ProblemArrays) -> float:
-    """The most that a search keeps from either edge of a band of heights above ground, m; inf without one."""
+    """Largest margin of a search to either edge of a band of heights above ground, m; inf without a maximum height."""
     space = certified.airspace
     between = space.max_height - certified.clearance - certified.buffer - space.buffer
     return certified.buffer + BAND_SHARE * max(0.0, between)
 
 
 def _performance(scenario: Scenario, limits: Limits) -> PerformanceTable:
-    """What the aircraft can do, of which turbulence leaves a plan a share, and no more than its autopilot asks for."""
+    """Performance of the aircraft, reduced in turbulence and limited to the rates that its autopilot demands."""
     table = derated(limits.performance(), TURBULENCE_SHARE[scenario.wind.turbulence])
     if limits.tracking is not None:
         table = within_rates(table, limits.tracking.climb_rate, limits.tracking.sink_rate)
@@ -391,7 +398,7 @@ def _or_nan(value: float | None) -> float:
 
 
 def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, share: float = 1.0) -> float:
-    """Buffer at a fixed end, m: all of it, or the share of what the end leaves."""
+    """Buffer at a fixed end, m: the full buffer, or a share of the height available there."""
     above = float(point[2] - terrain.height(point[0], point[1]))
     left = above - limits.min_clearance - 0.01
     return buffer if left >= buffer else share * max(0.0, left)
@@ -400,7 +407,7 @@ def _end_buffer(terrain: Terrain, limits: Limits, point: Floats, buffer: float, 
 def _slope_bounds(terrain: Terrain) -> SlopeBounds:
     slopes = steepest_slopes(terrain.heights, terrain.spacing)
     steepest = float(slopes.max())
-    # Each tile with its neighbours, so that a tile's side from any place of it is known.
+    # Each tile with its neighbours, so that the bound holds within a tile's side of any of its points.
     padded = np.pad(slopes, 1)
     shape = slopes.shape
     around = np.max([padded[i : i + shape[0], j : j + shape[1]] for i in range(3) for j in range(3)], axis=0)
@@ -409,7 +416,7 @@ def _slope_bounds(terrain: Terrain) -> SlopeBounds:
 
 
 def _inset(data: ProblemArrays, beside: float, height: float) -> ProblemArrays:
-    """Arrays with the map and the heights shrunk by these margins (m), or by what the ends leave of them."""
+    """Arrays with map and heights shrunk by these margins (m), but never excluding the fixed ends."""
     ends = np.stack([data.start, data.destination])
     low, high = ends.min(axis=0), ends.max(axis=0)
     return data._replace(
@@ -423,7 +430,7 @@ def _inset(data: ProblemArrays, beside: float, height: float) -> ProblemArrays:
 
 
 def _space(scenario: Scenario, data: ProblemArrays) -> Space:
-    """Space that a search may use; heights start at the lowest ground that a path may be above."""
+    """Search space; heights start at the lowest height that the ground allows."""
     ends = min(scenario.start[2], scenario.destination[2])
     low = min(max(data.floor, float(np.nanmin(data.heights)) + data.clearance), ends)
     high = max(data.ceiling, low + 1.0)

@@ -1,6 +1,8 @@
-"""The ground under a path: how deep legs are below the clearance that is wanted, and how high above it.
+"""Clearance of legs above the ground: depth below the required clearance, and smallest heights near waypoints.
 
-Steps over the ground grow with the height above it: ground can rise no faster than its steepest slope about there.
+Height is sampled along a leg. The steps grow with the height above the required clearance, because the ground cannot
+rise faster than its steepest slope nearby; near the ground they are the sample pitch. An autopilot that follows the
+height demand with a lag flies below or above its legs, and that deviation is added to the required height.
 """
 
 import math
@@ -22,23 +24,22 @@ Ints = NDArray[np.int64]
 Heights = NDArray[np.float32]
 
 
-# ----------------------------------------------------------------------
-# How far an autopilot is below or above the legs that it follows late: the height that a plan leaves it for that.
-#
-# Height follows the demand as a first-order lag of `TrackingError.lag` seconds: on a long climb it is lag x climb
-# rate low, and that far high on a descent; after a change of slope the difference decays over the lag's length, from
-# leg to leg.  A leg that changes height by less than a step is demanded at its end's height from its beginning.  So
-# ArduPlane's TECS does it (ardupilot.org, Plane, TECS_HDEM_TCONST; GLIDE_SLOPE_MIN).
+# --- Height lag ---
 
-# How far the aircraft is below a leg at a share f of it, m: steady + slant (1 - f) + rest E(f x decay), where E is the
-# decay; and the most and the least of that and 0.
+# The height follows its demand as a first-order lag of `TrackingError.lag` seconds: on a long climb it is lag x climb
+# rate low, and as much high on a descent; after a change of slope the difference decays over the lag's length and is
+# carried into the next leg. A leg whose change of height is below a step is demanded at its final height from its
+# beginning. ArduPlane's TECS behaves like this (ardupilot.org, Plane, TECS_HDEM_TCONST; GLIDE_SLOPE_MIN).
+
+# Distance of the aircraft below a leg at the fraction f, m: steady + slant (1 - f) + rest E(f x decay), where E is the
+# decay; and the largest and smallest of it, 0 included.
 HEIGHT_LAG = np.dtype([(name, np.float64) for name in ("steady", "slant", "rest", "decay", "most", "least")])
 
 
 @inlined
 def _left(lengths: float) -> float:  # pragma: no cover - compiled
-    """What is left of a difference after so many lengths of the lag: exp(-x), a little more."""
-    # By four terms of exp(x): a library's exponential rounds as the machine has it.
+    """Share of a difference that remains after this many lag lengths: an upper bound on exp(-x)."""
+    # By four terms of exp(x): a library's exponential rounds differently on different machines.
     left: float = 1.0 / (1.0 + lengths * (1.0 + lengths * (0.5 + lengths / 6.0)))
     return left
 
@@ -47,10 +48,10 @@ def _left(lengths: float) -> float:  # pragma: no cover - compiled
 def lag_length(
     tracking: Record, aircraft: PerformanceTable, east: float, north: float, amsl: float, wind: Wind
 ) -> float:  # pragma: no cover - compiled
-    """Way (m) over the ground that the aircraft makes in its height's lag on a unit course."""
+    """Distance (m) that the aircraft covers over the ground during the lag, on a unit course."""
     speed, (wx, wy) = wind_speed_at(aircraft, amsl), wind
     along = ground_speed(aircraft.airspeed, speed * (east * wx + north * wy), speed * (east * wy - north * wx))
-    # Where the wind leaves no way there is no plan either.
+    # A course that cannot be held against the wind has no plan either.
     along = aircraft.airspeed if math.isnan(along) else along
     length: float = tracking.lag * (along + faster_by(tracking, amsl))
     return max(1e-6, length)
@@ -60,9 +61,9 @@ def lag_length(
 def set_lag(
     tracking: Record, length: float, run: float, rise: float, below: float, lag: Record
 ) -> float:  # pragma: no cover - compiled
-    """Fill a `HEIGHT_LAG` record of a leg; returns how far the aircraft is below its end, m.
+    """Fill the `HEIGHT_LAG` record of a leg; returns the distance of the aircraft below its end, m.
 
-    length: of `lag_length`.  run, rise: of the leg.  below: how far the aircraft is below its beginning, m.
+    length: from `lag_length`. run, rise: of the leg. below: distance of the aircraft below its beginning, m.
     """
     lag.steady, lag.slant = length * rise / max(run, 1e-6), 0.0
     if abs(rise) < tracking.step:
@@ -78,7 +79,7 @@ def set_lag(
 def measure_lags(
     tracking: Record, aircraft: PerformanceTable, wind: Wind, path: np.ndarray, legs: Records, lags: Records
 ) -> None:  # pragma: no cover - compiled
-    """Fill `HEIGHT_LAG` records (w - 1,) of a path (w, 3) that begins at its own height."""
+    """Fill `HEIGHT_LAG` records (w - 1,) of a path (w, 3), flown without deviation at its start."""
     below = 0.0
     for i in range(legs.shape[0]):
         leg, rise = legs[i], path[i + 1, 2] - path[i, 2]
@@ -88,33 +89,35 @@ def measure_lags(
 
 @inlined
 def below_at(lag: Record, share: float) -> float:  # pragma: no cover - compiled
-    """How far the aircraft is below a leg at a share of it, m; negative above."""
+    """Distance of the aircraft below a leg at a fraction of it, m; negative above."""
     below: float = lag.steady + lag.slant * (1.0 - share) + lag.rest * _left(share * lag.decay)
     return below
 
 
+# --- Terrain samples ---
+
 # Columns and rows of both ends of a segment.
 Pixels = tuple[float, float, float, float]
 
-# Up to this height above the required clearance (m) samples are no further apart than the pitch; corners may use it.
+# Below this height above the required clearance (m) samples are spaced by the pitch; corners rely on it.
 NEAR_GROUND = 10.0
-# Violation of a sample without known ground, m.
+# Violation of a sample where the ground is unknown, m.
 UNKNOWN = 1000.0
-# A leg over the ground.
+# State of sampling a leg.
 TERRAIN_LEG = np.dtype(
     [
-        # Pixel of its beginning, and the step from there to its end.
+        # Pixel of its beginning, and the step to its end.
         ("column", np.float64),
         ("row", np.float64),
         ("column_step", np.float64),
         ("row_step", np.float64),
-        # Shares of the leg: between two samples near the ground; of the next sample; up to which a sample counts as
-        # near the beginning, and from which on as near the end.
+        # Fractions of the leg: spacing of samples near the ground; the next sample; the limits up to which and from
+        # which a sample counts as near the beginning and near the end.
         ("pitch", np.float64),
         ("share", np.float64),
         ("beginning", np.float64),
         ("ending", np.float64),
-        # Sum of depths below the required clearance, m x km; and least heights above it near both ends, m.
+        # Sum of depths below the required clearance, m x km; and smallest heights above it near both ends, m.
         ("depth", np.float64),
         ("height_at_beginning", np.float64),
         ("height_at_end", np.float64),
@@ -137,16 +140,16 @@ def _sample(
     rise: float,
     pitch: float,
 ) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Height above the required clearance at a point of a line, and the share of the line to the next sample.
+    """Height above the required clearance at a point of a line, and the fraction of the line to the next sample.
 
-    tiles, tile_side: of `SlopeBounds`.  growth: of `RequiredClearance`.  need: required clearance; later: how much more
-    may be required elsewhere on the line, m.
-    run, rise: of the whole line, m.  pitch: share from one sample to the next where the ground is near.
+    tiles, tile_side: of `SlopeBounds`. growth: of `RequiredClearance`. need: required clearance. later: largest further
+    requirement elsewhere on the line, m. run, rise: of the whole line, m. pitch: spacing of samples near the ground, as
+    a fraction.
     """
     ground = pixel_height(heights, column, row)
     gap = up - ground - need if ground == ground else -UNKNOWN
     i, j = min(max(int(row) // TILE, 0), tiles.shape[0] - 1), min(max(int(column) // TILE, 0), tiles.shape[1] - 1)
-    # Fastest loss of height above ground, m for the whole line.
+    # Fastest loss of height above ground, m per length of the line.
     fall = (tiles[np.uintp(i), np.uintp(j)] + growth) * run + abs(rise) + 1e-9
     ahead, known = (gap - later - NEAR_GROUND) / fall, tile_side / (run + 1e-9)
     ahead = ahead if ahead < known else known
@@ -169,7 +172,7 @@ def terrain_excess(
 ) -> float:  # pragma: no cover - compiled
     """Depth below the required clearance along a-b, summed over samples (m x km).
 
-    more: m, required here beside that.  ends: columns and rows of a and b.
+    more: additional height required here, m. ends: columns and rows of a and b.
     """
     column, row, last_column, last_row = ends
     column_step, row_step = last_column - column, last_row - row
@@ -206,7 +209,7 @@ def _begin_legs(
         leg.column, leg.row = column, row
         leg.column_step, leg.row_step = after_column - column, after_row - row
         leg.pitch, leg.share = pitch, 0.0
-        # A sample stands for the step that follows it, and for the one before.
+        # A sample represents the steps before and after it.
         per_metre = 1.0 / max(run, 1e-9)
         leg.beginning = extents[i] * per_metre + pitch
         leg.ending = 1.0 - extents[i + 1] * per_metre - pitch
@@ -227,13 +230,13 @@ def sample_terrain(
     terrain_legs: Records,
     unfinished: Ints,
 ) -> None:  # pragma: no cover - compiled
-    """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance, and least heights.
+    """Fill `TERRAIN_LEG` records (w - 1,) of a path (w, 3): depths below the required clearance and smallest heights.
 
-    extents: (w,) how far from each waypoint a place is near an end, m.  lags: `HEIGHT_LAG` records (w - 1,), by which a
-    flight is below its legs.  unfinished: (w - 1,) scratch.
+    extents: (w,) distance within which a point counts as near a waypoint, m. lags: `HEIGHT_LAG` records (w - 1,).
+    unfinished: (w - 1,) scratch.
 
-    The least heights are right up to `NEAR_GROUND`; above that they say no more than "at least that".  In rounds, a
-    sample of each leg: the next one of the same leg would wait for what this one finds.
+    Smallest heights are exact up to `NEAR_GROUND`; above that they are lower bounds. Legs take turns, one sample each:
+    the next sample of a leg depends on the result of its last one.
     """
     count = legs.shape[0]
     _begin_legs(to_pixel, required.sample_pitch, path, legs, extents, terrain_legs)

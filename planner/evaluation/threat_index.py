@@ -1,4 +1,9 @@
-"""Threats by where they stand: lists by grid cell, and the exposure of a line past each missile."""
+"""Spatial indexes of threats: units by grid cell for points, missiles by position for line segments.
+
+`ThreatCells` lists for each cell of a grid the units whose spheres reach it; the paper's scores look up points in it.
+`MissileIndex` stores missiles in the order of grid cells, one grid per class of similar radii; `kill_density`
+integrates the kill density along a segment and measures the distance of the nearest spheres.
+"""
 
 import math
 from typing import NamedTuple
@@ -14,31 +19,30 @@ Short = NDArray[np.int32]
 Ints = NDArray[np.int64]
 
 
-# ----------------------------------------------------------------------
-# Which threats may reach a place: lists by the cells of a grid, so that an evaluation asks only those nearby.
+# --- Threats that reach a cell ---
 
 
-# Side of a cell, as a share of the median radius; and cells of one grid, at most.
+# Side of a cell as a share of the median radius, and the maximum number of cells.
 CELL_SIDE = 0.2
 MOST_THREAT_CELLS = 300_000
-# Highest whole metre that a cell notes.
+# Largest height (m) that a cell stores.
 HIGHEST_METRE = 2_000_000_000
-# Ground beyond the map that the grid covers, as a share of the map's sides.
+# Extension of the grid beyond the map, as a share of the map's sides.
 BEYOND = 0.1
-# A cell: where its units begin in the list of units, their number, and the lowest and the highest place (m) that any of
-# them reaches.
+# A cell: first entry and number of its units in the list, and the lowest and highest heights (m) that any of them
+# reaches.
 THREAT_CELL = np.dtype(
     [("first", np.int32), ("count", np.int32), ("lowest", np.int32), ("highest", np.int32)], align=True
 )
 
 
 class ThreatCells(NamedTuple):
-    """Lists of units by the cells that they reach, in the form that the compiled functions take.
+    """Lists of units by the cells that they reach, for compiled functions.
 
-    cells: `THREAT_CELL` records (c,), row by row; the last stands for all places outside the grid and holds every unit.
-    units: of one cell after the other, in increasing order.
+    cells: `THREAT_CELL` records (c,), row by row; the last represents all points outside the grid and lists every unit.
+    units: of one cell after another, in increasing order.
     west, south, side: of the grid and of its cells, m.
-    columns, rows: cells across and up.
+    columns, rows: of the grid.
     """
 
     cells: Records
@@ -51,9 +55,9 @@ class ThreatCells(NamedTuple):
 
 
 def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> ThreatCells:
-    """Lists of the units (m, 3) whose sphere of this radius (m,), where it is above 0, meets a cell seen from above.
+    """Lists of the units (m, 3) whose sphere, seen from above, meets a cell.
 
-    bounds: (2, 2) map.
+    radius: (m,) of the spheres, m; 0 for none. bounds: (2, 2) map.
     """
     low, high = bounds[:, 0], bounds[:, 1]
     low, high = low - BEYOND * (high - low), high + BEYOND * (high - low)
@@ -64,7 +68,7 @@ def make_threat_cells(position: Floats, radius: Floats, bounds: Floats) -> Threa
         side = min(max(side, CELL_SIDE * float(np.median(armed))), float(size.max()))
     columns, rows = max(1, math.ceil(size[0] / side)), max(1, math.ceil(size[1] / side))
     first, units = _lists(np.ascontiguousarray(position), radius, float(low[0]), float(low[1]), side, columns, rows)
-    # Whole metres, a hair wider, for what rounding would leave out.
+    # Whole metres, widened against rounding.
     lowest = np.clip(np.floor(position[:, 2] - radius) - 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
     highest = np.clip(np.ceil(position[:, 2] + radius) + 1.0, -HIGHEST_METRE, HIGHEST_METRE).astype(np.int32)
     cells = np.zeros(first.size - 1, dtype=THREAT_CELL)
@@ -96,13 +100,13 @@ def _lists(
     first = np.zeros(count + 2, dtype=np.int32)
     units = np.empty(0, dtype=np.int32)
     filled = first[:0].copy()
-    # Counted first, then filled.
+    # The first pass counts, the second fills.
     for turn in range(2):
         for k in range(position.shape[0]):
             if radius[k] <= 0.0:
                 continue
             x, y, r = (position[k, 0] - west) / side, (position[k, 1] - south) / side, radius[k] / side
-            # A hair wider, for what rounding would leave out.
+            # Widened against rounding.
             r += 1e-6
             for row in range(max(0, math.floor(y - r)), min(rows - 1, math.floor(y + r)) + 1):
                 dy = max(0.0, row - y, y - row - 1.0)
@@ -128,17 +132,16 @@ def _lists(
     return first, units
 
 
-# ----------------------------------------------------------------------
-# Missiles by where they stand, and what a line past them is exposed to.
+# --- Missiles near a segment ---
 
 
-# Classes of missiles by radius, at most; and missiles a cell, on the mean.
+# Maximum number of classes by radius, and mean number of missiles per cell.
 MOST_CLASSES = 8
 MISSILES_A_CELL = 2.0
 # A missile: its position, kill radius and scale, m.
 MISSILE = np.dtype([(name, np.float64) for name in ("east", "north", "up", "radius", "scale")])
-# Missiles alike in radius, with a grid of their own: west and south of it (m), cells a metre, columns and rows, where
-# its cells begin in `MissileIndex.first`, and the largest radius (m).
+# Missiles of similar radius, with a grid of their own: its west and south (m), cells per metre, columns and rows, first
+# cell in `MissileIndex.first`, and the largest radius (m).
 MISSILE_CLASS = np.dtype(
     [
         ("west", np.float64),
@@ -153,11 +156,11 @@ MISSILE_CLASS = np.dtype(
 
 
 class MissileIndex(NamedTuple):
-    """Missiles in the order of the cells that they stand in, so that those near a line are read one after the other.
+    """Missiles in the order of their grid cells, so that those near a segment are adjacent in memory.
 
     missiles: `MISSILE` records (m,), of those with a radius.
     classes: `MISSILE_CLASS` records (k,).
-    first: (c,) where the missiles of each cell begin, and after each class's cells where the last one's end.
+    first: (c,) first missile of each cell, and after each class's cells the end of its last one.
     """
 
     missiles: Records
@@ -166,15 +169,15 @@ class MissileIndex(NamedTuple):
 
 
 def make_missile_index(threats: Records, side: float | None = None) -> MissileIndex:
-    """Missiles of records with fields east, north, up, kill_radius and kill_scale (m).
+    """Index of the missiles of records with fields east, north, up, kill_radius and kill_scale (m).
 
-    side: of a cell, m; None for `MISSILES_A_CELL` missiles a cell.
+    side: of a cell, m; None for `MISSILES_A_CELL` missiles per cell.
     """
     armed = threats[threats["kill_radius"] > 0.0]
     missiles = np.zeros(len(armed), dtype=MISSILE)
     for name, source in zip(MISSILE.names or (), ("east", "north", "up", "kill_radius", "kill_scale"), strict=True):
         missiles[name] = armed[source]
-    # Alike: within a factor of two, as long as there are not too many classes.
+    # A class spans a factor of two; the last class takes all smaller radii.
     largest = float(missiles["radius"].max(initial=1.0))
     alike = np.minimum(MOST_CLASSES - 1, np.floor(np.log2(largest / missiles["radius"]))).astype(np.int64)
     ordered, classes, first = [missiles[:0]], [], [np.zeros(0, dtype=np.int64)]
@@ -215,10 +218,10 @@ def kill_density(
     below: float,
     above: float,
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """Mean kill density over the segment a-b, radii grown by the margin, and distances to the nearest such sphere, m.
+    """Mean kill density over the segment a-b, radii enlarged by the margin, and distances to the nearest spheres, m.
 
-    first, last: lengths (m) at a and at b: the distances are from there, and right if they are less than `within`.
-    below, above: how far below and above the segment a flight may be, m.
+    first, last: lengths (m) at a and at b from which the two distances are measured; a distance is exact if below
+    `within`. below, above: vertical tracking error, m.
     """
     dx, dy, dz = bx - ax, by - ay, bz - az
     length2 = dx * dx + dy * dy + dz * dz
@@ -228,12 +231,12 @@ def kill_density(
     for number in range(index.classes.shape[0]):
         kind = index.classes[number]
         per_metre, columns, rows = kind.cells_per_metre, kind.columns, kind.rows
-        # A hair more, for what rounding would leave out.
+        # Enlarged against rounding.
         radius, side = kind.largest_radius + margin + within + 1e-6, 1.0 / per_metre
         lowest = _cell((min(ay, by) - radius - kind.south) * per_metre, rows)
         highest = _cell((max(ay, by) + radius - kind.south) * per_metre, rows)
         for row in range(max(0, lowest), min(rows, highest + 1)):
-            # The part of the segment from which something in this row of cells may be near.
+            # The part of the segment that can be near missiles in this row of cells.
             north = kind.south + row * side - ay
             f, g = _part((north - radius) * slant, (north + side + radius) * slant) if slant != 0.0 else (0.0, 1.0)
             x, x2 = ax + f * dx - kind.west, ax + g * dx - kind.west
@@ -263,16 +266,16 @@ def kill_density(
 
 @inlined
 def _part(f: float, g: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """Fractions of a line in order, and within it."""
+    """Two fractions of a line in increasing order, clipped to it."""
     f, g = (f, g) if f < g else (g, f)
     return f if f > 0.0 else 0.0, g if g < 1.0 else 1.0
 
 
 @inlined
 def _nearer(z: float, rise: float, below: float, above: float) -> float:  # pragma: no cover - compiled
-    """Height of a segment's beginning over a missile, m, where its nearest place comes as near as the flight may.
+    """Height of a segment's beginning above a missile (m), shifted by the vertical tracking error towards it.
 
-    rise: of the segment up to that place.
+    rise: of the segment up to its closest point.
     """
     over = z + rise
     shift = min(over, below) if over > 0.0 else max(over, -above)
@@ -281,7 +284,7 @@ def _nearer(z: float, rise: float, below: float, above: float) -> float:  # prag
 
 @inlined
 def _cell(place: float, count: int) -> int:  # pragma: no cover - compiled
-    """Number of the cell along one axis; -1 and `count` stand for what is outside."""
+    """Index of the cell along one axis; -1 and `count` if outside."""
     inside = place if place > -1.0 else -1.0
     number: int = math.floor(inside if inside < count else count)
     return number
@@ -293,7 +296,7 @@ def _closest2(
 ) -> float:  # pragma: no cover - compiled
     """Squared distance from a point to the part low..high (fractions) of a segment.
 
-    nearest: fraction of the whole line that is nearest to it.  along, start2, length2: see `window_exposure`.
+    nearest: fraction of the infinite line that is closest to the point. along, start2, length2: see `window_exposure`.
     """
     f = nearest if nearest < high else high
     f = f if f > low else low
