@@ -1,4 +1,9 @@
-"""How far a piece of a path is from every zone: what a certificate looks at, exact on straight edges and circles."""
+"""Penetration of zones by legs, for the search, and margins of path pieces to zones, for the certificate.
+
+A search charges each leg for the depth of its penetration times the length of it, computed from a zone's extent across
+and along the leg; for levels above ground the terrain is sampled. A certificate cuts pieces near a zone short enough
+for heights and positions to belong together, and measures their distances exactly for straight edges and circles.
+"""
 
 import math
 from typing import NamedTuple
@@ -16,22 +21,21 @@ Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 
-# ----------------------------------------------------------------------
-# How deep a leg is in zones, and how long: what a search is charged for it.
-#
-# What is charged is 0 only where the leg keeps out of them.  An exclusion counts along the whole part of the leg that
-# is level with its shape, so that a leg may be charged that passes a hollow of it.
+# --- Penetration of zones, for the search ---
 
-# A leg that leaves an inclusion is looked at this often (m), and this many times at most.
+# The charge is 0 only if the leg violates no margin. An exclusion counts along the full part of the leg that is abreast
+# of its shape, so that a leg through a concave part of the outline may be charged although it stays outside.
+
+# Spacing of samples on a leg that leaves an inclusion (m), and their maximum number.
 OUTSIDE_PITCH, MOST_PLACES = 100.0, 20
-# Shortest stretch that counts, m: depth is charged for at least that.
+# Shortest length that is charged, m.
 LEAST_STRETCH = 1.0
-# Where the ground is not known, heights are taken to be within this of it, m.
+# Bound on the height above unknown ground, m.
 UNKNOWN = 9000.0
 
 
 class Stretch(NamedTuple):
-    """Lowest and highest of a part of a path, above mean sea level and above the ground below it, m."""
+    """Range of heights of a part of a path: above mean sea level, and above the ground below it, m."""
 
     lowest: float
     highest: float
@@ -51,10 +55,9 @@ def zone_excess(
     below: float,
     above: float,
 ) -> float:  # pragma: no cover - compiled
-    """Depth in zones along the leg a-b, with their margins, summed over its length: m x km.
+    """Depth of the leg a-b in zones enlarged by their margins, integrated over its length: m x km.
 
-    pitch: between samples of the ground (m), for levels above ground.  beside, below, above: how far from the leg a
-    flight may be, m.
+    pitch: of terrain samples (m), for levels above ground. beside, below, above: tracking error, m.
     """
     line = line_between(a[0], a[1], b[0], b[1])
     total, kept, records = 0.0, zones.kept, zones.records
@@ -92,9 +95,9 @@ def zone_excess(
 def inside_depth(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> tuple[float, float, float]:  # pragma: no cover - compiled
-    """How far a line must move sideways to be `wanted` m from exclusion z on the map, and the shares of it about that.
+    """Lateral shift that brings a line `wanted` m away from exclusion z on the map, and the line's fractions abreast.
 
-    0 m where it is that far from it.
+    0 m if the line is that far away.
     """
     reach = reach_of(records, z, line, wanted)
     if not reach.inside and reach.distance >= wanted:
@@ -112,7 +115,7 @@ def inside_depth(
 def _aside_excess(
     records: ZoneRecords, z: int, line: MapSegment, wanted: float
 ) -> float:  # pragma: no cover - compiled
-    """How far a line is from being `wanted` m inside inclusion z on the map, summed over its length: m x km."""
+    """Shortfall of a line's distance inside inclusion z from `wanted` (m), integrated over its length: m x km."""
     reach = reach_of(records, z, line, wanted)
     if reach.inside and reach.distance >= wanted:
         return 0.0
@@ -123,14 +126,14 @@ def _aside_excess(
         east, north = line.east + along * line.course_east, line.north + along * line.course_north
         total += max(0.0, wanted + edge_distance(records, z, east, north))
     stretch = max(line.run, LEAST_STRETCH) / places
-    # Between the places it may be less far inside than at them.
+    # Between the samples the line may be nearer to the outline.
     nearest = max(1e-9, wanted - reach.distance) if total == 0.0 else 0.0
     return (total * stretch + nearest * LEAST_STRETCH) / 1000.0
 
 
 @inlined
 def stretch_of(up: float, to_up: float, below: float, above: float) -> Stretch:  # pragma: no cover - compiled
-    """The heights of a level or slanting line of which the ground is not asked; below, above: what is added to them."""
+    """Range of heights of a straight line with unknown ground; below, above: tracking error, m."""
     lowest, highest = min(up, to_up) - below, max(up, to_up) + above
     return Stretch(lowest, highest, -UNKNOWN, UNKNOWN)
 
@@ -147,7 +150,7 @@ def _sampled_stretch(
     below: float,
     above: float,
 ) -> Stretch:  # pragma: no cover - compiled
-    """The heights of a-b between two shares of it, above ground by samples."""
+    """Range of heights of a-b between two fractions of it, above ground by samples."""
     dx, dy, dz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     plain = stretch_of(a[2] + first * dz, a[2] + last * dz, below, above)
     column, row = polymap(to_pixel, a[0] + first * dx, a[1] + first * dy)
@@ -166,9 +169,9 @@ def _sampled_stretch(
 
 @inlined
 def beyond(zone: Record, stretch: Stretch) -> float:  # pragma: no cover - compiled
-    """How far heights are below a zone's floor or above its ceiling, m; negative where they are not.
+    """Distance of heights below a zone's floor or above its ceiling, m; negative between them.
 
-    Of an exclusion how far all of them are, of an inclusion how far the furthest is.
+    For an exclusion the smallest over the range of heights, for an inclusion the largest.
     """
     under_low, under_high = stretch.lowest, stretch.highest
     if zone.floor_above_ground:
@@ -182,11 +185,13 @@ def beyond(zone: Record, stretch: Stretch) -> float:  # pragma: no cover - compi
     return far
 
 
-# Pieces near a zone are cut to this length (m), so that heights and the way beside them belong together.
+# --- Margins to zones, for the certificate ---
+
+# Pieces near a zone are cut to this length (m), so that heights and positions belong together.
 CUT = 25.0
-# What a piece of a path keeps from zones.  nearest: least distance outside an exclusion or inside an inclusion, on the
-# map or in height, m; negative where it is in one, or out of one.  kept: whether it has the margin of each.  zone: the
-# nearest of those of which it has not, or of all; -1 for none.
+# Margin of a piece of a path. nearest: smallest distance outside an exclusion or inside an inclusion, horizontal or
+# vertical, m; negative where a zone is violated. kept: whether every zone's margin is satisfied. zone: the nearest
+# zone, preferring those whose margin is violated; -1 for none.
 ZONE_ROOM = np.dtype([("nearest", np.float64), ("kept", np.bool_), ("zone", np.int64)])
 
 
@@ -205,8 +210,8 @@ def measure_zone_room(
 ) -> None:  # pragma: no cover - compiled
     """Fill the `ZONE_ROOM` record of the piece a-b.
 
-    depths: the ground's heights, the other sign.  beside: (2,) how far beside a and b a flight may be; below, above:
-    how far below and above the piece, m.
+    depths: negated heights of the ground. beside: (2,) lateral tracking error at a and b; below, above: vertical
+    tracking error, m.
     """
     room.nearest, room.kept, room.zone = math.inf, True, -1
     records, most = zones.records, max(beside[0], beside[1])
@@ -246,12 +251,12 @@ def measure_zone_room(
 def _note(
     zone: Record, keeps: Record, z: int, away: float, over: float, room: Record
 ) -> None:  # pragma: no cover - compiled
-    """Take a stretch's distances from a zone into account."""
+    """Update the record with the distances of a piece from a zone."""
     enough = away >= keeps.beside or over >= keeps.beyond
     if not zone.exclusion:
         enough = away >= keeps.beside and -over >= keeps.beyond
     here = _room(zone, away, over)
-    # A zone of which the margin is not kept goes before one that is nearer.
+    # A zone whose margin is violated takes precedence over a nearer one.
     if room.kept != enough:
         if not enough:
             room.zone = z
@@ -263,15 +268,15 @@ def _note(
 
 @compiled
 def _room(zone: Record, away: float, over: float) -> float:  # pragma: no cover - compiled
-    """Distance from a zone, of the distances on the map and in height from what is forbidden, m."""
+    """Distance from violating a zone, given the horizontal and vertical distances, m."""
     return max(away, over) if zone.exclusion else min(away, -over)
 
 
 @compiled
 def _away(records: ZoneRecords, z: int, a: Floats, b: Floats, within: float) -> float:  # pragma: no cover - compiled
-    """Least distance on the map of the line a-b outside an exclusion, or inside an inclusion, m; negative otherwise.
+    """Smallest horizontal distance of the line a-b outside an exclusion or inside an inclusion, m; else negative.
 
-    A distance above `within` may be inf.
+    Distances above `within` may be inf.
     """
     line = line_between(a[0], a[1], b[0], b[1])
     reach = reach_of(records, z, line, within)
@@ -295,7 +300,7 @@ def _exact_stretch(
     below: float,
     above: float,
 ) -> Stretch:  # pragma: no cover - compiled
-    """Heights along a-b, and above the ground below it and as far beside it as `beside` (2,) says."""
+    """Range of heights along a-b, and above the ground below it and `beside` (2,) m to both sides."""
     plain = stretch_of(a[2], b[2], below, above)
     run = max(1e-9, math.hypot(b[0] - a[0], b[1] - a[1]))
     ux, uy = (b[0] - a[0]) / run, (b[1] - a[1]) / run

@@ -1,4 +1,9 @@
-"""The zones that a plan keeps out of or stays inside: as arrays for compiled code, widened by what tracking needs."""
+"""Zones as arrays for compiled code: margins, the airspace of a problem, and distances of lines from shapes.
+
+Each zone has a horizontal and a vertical margin. A fixed end that violates a margin reduces it for its zone. Exclusions
+are sorted from west to east, so that a kernel visits only those near a leg. Distances are computed in the axes of the
+line: along it from its beginning, and off to its left.
+"""
 
 import math
 from collections.abc import Sequence
@@ -17,20 +22,19 @@ Floats = NDArray[np.float64]
 Heights = NDArray[np.float32]
 
 
-# ----------------------------------------------------------------------
-# Zones with what a path is to keep from each, in an order in which those near a leg are found fast.
+# --- Zones with their margins ---
 
-# What a path keeps from one zone, m: beside its outline, and below its floor or above its ceiling (inside both, of an
-# inclusion).  number: of the zone, as the scenario has them.  furthest_east: of this exclusion and of all before it, m.
+# Margins of one zone, m: beside its outline, and below its floor or above its ceiling (for an inclusion, inside them).
+# number: of the zone in the scenario. furthest_east: of this exclusion and of all before it, m.
 KEPT = record_dtype(("number", np.int64), "beside", "beyond", "furthest_east")
 
 
 class KeptZones(NamedTuple):
-    """Zones in the order in which kernels read them: the inclusions, then the exclusions from west to east.
+    """Zones in the order in which kernels visit them: the inclusions, then the exclusions from west to east.
 
-    records: the zones, and kept: `KEPT` records (z,) of them.
-    inclusions: how many there are.
-    beside: the most that is kept beside any, m.
+    records: the zones. kept: `KEPT` records (z,) with their margins.
+    inclusions: number of inclusions.
+    beside: largest horizontal margin, m.
     """
 
     records: ZoneRecords
@@ -40,9 +44,9 @@ class KeptZones(NamedTuple):
 
 
 class ZoneMargins(NamedTuple):
-    """What a path keeps from zones, m: beside and beyond as in `KEPT`.
+    """Margins of a path to zones, m: beside and beyond as in `KEPT`.
 
-    share: where a fixed end is nearer to a zone than that, of what the end keeps.
+    share: where a fixed end is within a margin, the share of its distance that becomes the margin.
     """
 
     beside: float
@@ -51,9 +55,9 @@ class ZoneMargins(NamedTuple):
 
 
 def keep_zones(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, margins: ZoneMargins) -> KeptZones:
-    """Zones with these margins, or with less from a zone that a fixed end is near.
+    """Zones with these margins, reduced for zones within whose margin a fixed end is.
 
-    ends: (k, 3) m.  An end inside an exclusion, or outside an inclusion, leaves a margin of 0.
+    ends: (k, 3) m. An end inside an exclusion, or outside an inclusion, makes its margin 0.
 
     >>> from world.airspace.zones import Cylinder
     >>> zone = Zone("mast", "exclusion", Cylinder(0.0, 500.0, 200.0))
@@ -80,7 +84,7 @@ def keep_zones(zones: Sequence[Zone], ends: Floats, terrain: Terrain | None, mar
 def _give_way(
     records: ZoneRecords, ends: Floats, grounds: Floats, share: float, kept: Records
 ) -> None:  # pragma: no cover - compiled
-    """Let margins shrink to a share of what the ends (k, 3) keep; grounds: (k,) heights of the ground there."""
+    """Reduce margins to a share of the distances of the ends (k, 3); grounds: (k,) ground heights there, m."""
     for z in range(kept.shape[0]):
         zone, keeps = records.zones[z], kept[z]
         for k in range(ends.shape[0]):
@@ -90,7 +94,7 @@ def _give_way(
                 keeps.beside = min(keeps.beside, max(0.0, -share * away))
                 keeps.beyond = min(keeps.beyond, max(0.0, -share * over))
             elif away < keeps.beside and not over >= keeps.beyond:
-                # The one of the two of which more is left.
+                # Reduce the margin of which the larger part is available.
                 if away * keeps.beyond >= over * keeps.beside or math.isnan(over):
                     keeps.beside = max(0.0, share * away)
                 else:
@@ -99,7 +103,7 @@ def _give_way(
 
 @compiled
 def first_near(zones: KeptZones, west: float) -> int:  # pragma: no cover - compiled
-    """The first exclusion of those, in their order, that may reach as far east as `west` (m)."""
+    """Index of the first exclusion that may reach as far east as `west` (m)."""
     low, high = zones.inclusions, zones.kept.shape[0]
     while low < high:
         middle = (low + high) // 2
@@ -110,17 +114,17 @@ def first_near(zones: KeptZones, west: float) -> int:  # pragma: no cover - comp
     return low
 
 
-# ----------------------------------------------------------------------
-# The airspace of a problem for compiled code: zones, and the greatest height above ground.
+# --- Zones and maximum height of a problem ---
 
 
 class KeptAirspace(NamedTuple):
-    """Where a path may be beside the map, its floor and its ceiling; lengths in m.
+    """Zones and the maximum height above ground; lengths in m.
 
-    zones: to keep out of, and to stay in.
-    max_height: greatest height above ground, inf for none.
-    buffer: kept below it, and start_buffer and destination_buffer at the ends.
-    depths: the ground's heights, the other sign: seen from below, what is not to be exceeded is what is to be cleared.
+    zones: exclusions and inclusions with their margins.
+    max_height: maximum height above ground, inf for none.
+    buffer: margin below it, and start_buffer and destination_buffer at the ends.
+    depths: negated heights of the ground, for which staying below the maximum is a clearance like that above the
+    ground.
     """
 
     zones: KeptZones
@@ -132,9 +136,9 @@ class KeptAirspace(NamedTuple):
 
 
 def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> KeptAirspace:
-    """The airspace of a scenario with what is kept from it.
+    """The airspace of a scenario with its margins.
 
-    buffer: kept below the greatest height, m; where a fixed end leaves less, the margins' share of that.
+    buffer: margin below the maximum height, m; at a fixed end with less, a share (`ZoneMargins.share`) of what it has.
 
     >>> from world.scenario import load_scenario
     >>> space = keep_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0)
@@ -145,7 +149,7 @@ def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Ke
     ends = np.stack([scenario.start, scenario.destination])
     zones = keep_zones(scenario.zones, ends, terrain, margins)
     asked = most is not None or any(zone.above_ground for zone in scenario.zones)
-    # Where nobody asks for them, next to nothing that fits.
+    # Unused otherwise: a small array of the right type.
     depths = -terrain.heights if terrain is not None and asked else np.zeros((2, 2), dtype=np.float32)
     depths.setflags(write=False)
     buffers = [buffer, buffer]
@@ -156,7 +160,7 @@ def keep_airspace(scenario: Scenario, margins: ZoneMargins, buffer: float) -> Ke
 
 
 def is_limited(airspace: KeptAirspace) -> bool:
-    """Whether there is a zone or a greatest height.
+    """Whether there is a zone or a maximum height above ground.
 
     >>> from world.scenario import load_scenario
     >>> is_limited(keep_airspace(load_scenario("tight"), ZoneMargins(10.0, 5.0, 1.0), 5.0))
@@ -165,14 +169,11 @@ def is_limited(airspace: KeptAirspace) -> bool:
     return len(airspace.zones.kept) > 0 or airspace.max_height < math.inf
 
 
-# ----------------------------------------------------------------------
-# How a line lies to a zone's shape on the map: inside it, how near its outline, and how far aside and ahead that is.
-#
-# Shapes are taken into the line's own axes: along it from its beginning, and off to its left.
+# --- A line and a zone's shape on the map ---
 
 
 class MapSegment(NamedTuple):
-    """A level line on the map: its beginning and its unit course, east and north, and its length, m."""
+    """A horizontal line: its beginning, its unit course (east, north) and its length, m."""
 
     east: float
     north: float
@@ -182,12 +183,12 @@ class MapSegment(NamedTuple):
 
 
 class ShapeView(NamedTuple):
-    """A shape seen from a line, m.
+    """A shape as seen from a line, m.
 
     inside: whether the line begins in it.
-    distance: from the line to the shape's outline, 0 where they meet; inf where that is more than was asked for.
-    right, left: furthest off the line of the shape's places, negative to the right.
-    first, last: nearest and furthest along the line of them.
+    distance: from the line to the shape's outline, 0 where they meet; inf if beyond the requested limit.
+    right, left: extent of the shape across the line, negative to the right.
+    first, last: extent of the shape along the line.
     """
 
     inside: bool
@@ -200,7 +201,7 @@ class ShapeView(NamedTuple):
 
 @inlined
 def line_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # pragma: no cover - compiled
-    """The line from a to b; of no length it leads north."""
+    """The line from a to b; one without length points north."""
     dx, dy = bx - ax, by - ay
     run = math.sqrt(dx * dx + dy * dy)
     if run < 1e-9:
@@ -210,7 +211,7 @@ def line_between(ax: float, ay: float, bx: float, by: float) -> MapSegment:  # p
 
 @compiled
 def reach_of(records: ZoneRecords, z: int, line: MapSegment, within: float) -> ShapeView:  # pragma: no cover - compiled
-    """Zone z's shape seen from a line; distances above `within` (m) do not matter."""
+    """Zone z's shape as seen from a line; distances above `within` (m) may be inf."""
     zone = records.zones[z]
     if zone.round:
         off_e, off_n = zone.centre_east - line.east, zone.centre_north - line.north
@@ -244,12 +245,12 @@ def reach_of(records: ZoneRecords, z: int, line: MapSegment, within: float) -> S
 
 @inlined
 def _circle_reach(along: float, off: float, radius: float, run: float) -> ShapeView:  # pragma: no cover - compiled
-    """A circle, its centre at this place in the line's axes."""
+    """A circle as seen from a line, given its centre in the line's axes."""
     beside = along - min(run, max(0.0, along))
     nearest = math.sqrt(beside * beside + off * off) - radius
     furthest = math.sqrt(max(abs(along), abs(along - run)) ** 2 + off * off) - radius
     inside = along * along + off * off <= radius * radius
-    # All of it outside, all of it inside, or across the outline.
+    # The line is outside, or inside, or crosses the outline.
     distance = nearest if nearest > 0.0 else max(0.0, -furthest)
     return ShapeView(inside, distance, off - radius, off + radius, along - radius, along + radius)
 
@@ -258,14 +259,14 @@ def _circle_reach(along: float, off: float, radius: float, run: float) -> ShapeV
 def _edge_distance2(
     along: float, off: float, to_along: float, to_off: float, run: float
 ) -> float:  # pragma: no cover - compiled
-    """Squared distance of an edge that does not cross the line from it: at an end of the one or of the other."""
+    """Squared distance of the line from an edge that does not cross it: at an end of one of the two."""
     beside = along - min(run, max(0.0, along))
     nearest = beside * beside + off * off
     beside = to_along - min(run, max(0.0, to_along))
     nearest = min(nearest, beside * beside + to_off * to_off)
     step, rise = to_along - along, to_off - off
     length2 = step * step + rise * rise
-    # From the line's beginning and from its end.
+    # From the line's beginning, then from its end.
     share = min(1.0, max(0.0, -(along * step + off * rise) / length2))
     x, y = along + share * step, off + share * rise
     nearest = min(nearest, x * x + y * y)

@@ -1,8 +1,8 @@
-"""Cheapest routes over grids among zones and within a band of heights above ground, in the rotated frame.
+"""Cheapest routes over grids among zones and below a maximum height above ground, in the rotated frame.
 
-A dynamic programme over forward steps, as `planner.seeding.grids` is, but its layers follow the ground where a
-greatest height above it is to be kept, and each step is asked by itself whether it passes a zone: what lies between two
-cells may be narrower than they are apart.
+Dynamic programming over forward steps as in `planner.seeding.grids`, with two differences. Where there is a maximum
+height above ground, the layers follow the terrain. And each step is tested against the zones itself, because an
+obstacle between two cells may be narrower than their spacing.
 """
 
 import math
@@ -34,20 +34,20 @@ Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
 
 
-# A m of way at the edge of the band costs this share more than in its middle: legs are longer than a grid's steps.
+# Additional cost per m at the edges of the height band, relative to its middle: legs are longer than grid steps.
 EDGE_COST = 0.3
-# On a gentle grid: what a change of course costs, in steps of the grid, for each step sideways more or less than the
-# one before, squared; and of the steepest slopes, the share that a route uses: legs cut its corners.
+# On a gentle grid: cost of a change of course, in grid steps per squared change of the lateral step; and share of the
+# steepest slopes that a route uses, because legs cut its corners.
 TURN_COST, SLOPE_SHARE = 0.15, 0.9
-# A place on a grid: its ground, and the lowest and highest that a path may be there, m; lowest > highest for none.
+# A grid column: its ground and the lowest and highest allowed height, m; lowest > highest for none.
 COLUMN = np.dtype([("ground", np.float64), ("lowest", np.float64), ("highest", np.float64)])
 
 
 class AirspaceGrid(NamedTuple):
-    """One resolution: places across (m from the line) at each of stages + 1 places along, and layers of height.
+    """One resolution: positions across (m from the line) at stages + 1 positions along, and layers of height.
 
-    pitch: between layers, m.  The first layer is at the lowest height allowed where `follows`, else at `floor` (m).
-    gentle: whether changes of course cost something, and slopes are less than the steepest.
+    pitch: between layers, m. The first layer is at the lowest allowed height if `follows`, otherwise at `floor` (m).
+    gentle: whether changes of course have a cost and slopes stay below the steepest.
     """
 
     stages: int
@@ -60,7 +60,7 @@ class AirspaceGrid(NamedTuple):
 
 
 class _Passage(NamedTuple):
-    """Heights closed to a step, m: from low to high; low > high for none."""
+    """Heights closed to a step, from low to high, m; low > high for none."""
 
     low: float
     high: float
@@ -70,7 +70,7 @@ class _Passage(NamedTuple):
 def _column(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, along: float, across: float, column: Record
 ) -> None:  # pragma: no cover - compiled
-    """Fill the `COLUMN` record of a place."""
+    """Fill the `COLUMN` record of a grid position."""
     east, north = position_of(frame, along, across)
     column.lowest, column.highest = math.inf, -math.inf
     if not (data.west <= east <= data.east and data.south <= north <= data.north):
@@ -95,7 +95,7 @@ def _column(
 def _passage(
     zones: KeptZones, line: MapSegment, beside: float, ground: float
 ) -> _Passage:  # pragma: no cover - compiled
-    """Heights that zones close to a level line; beside: m kept from them beside their margins."""
+    """Heights that zones close to a horizontal step; beside: lateral tracking error added to their margins, m."""
     low, high = math.inf, -math.inf
     for z in range(zones.inclusions):
         wanted = zones.kept[z].beside + beside
@@ -123,7 +123,7 @@ def _passage(
 def _slopes(
     data: ProblemArrays, frame: RotatedFrame, step: float, amsl: float, share: float
 ) -> Floats:  # pragma: no cover - compiled
-    """Tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height, m."""
+    """Tangents (sideways, 2) of this share of the steepest climb and dive of each step at a height (m)."""
     out, a, b = np.zeros((2 * SIDEWAYS + 1, 2)), np.zeros(3), np.zeros(3)
     a[0], a[1] = frame.east, frame.north
     a[2], b[2] = amsl, amsl
@@ -138,7 +138,7 @@ def _slopes(
 def _set_cell_prices(
     grid: AirspaceGrid, columns: Records, obstacles: Records, along: float, extra: Floats, price: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Cost per m of a stage's cells price (across, layers); inf where a path may not be."""
+    """Fill the cost per m of a stage's cells (across, layers); inf where a path is not allowed."""
     for y in range(grid.across.size):
         column = columns[y]
         first = column.lowest if grid.follows else grid.floor
@@ -173,13 +173,14 @@ def _step_on(
     came_before: Codes,
     came: Codes,
 ) -> None:  # pragma: no cover - compiled
-    """Relax one stage: costs (across, layers) before and after it, and the cell (across x layers) that each came from.
+    """Relax one stage: costs (across, layers) before and after it, and the parent cell (across x layers) of each.
 
-    before, columns: `COLUMN` records (across,) of the stage before and of this one.  came_before: of the stage before;
-    a change of course is counted from the cheapest way to a cell alone, so that a route is not quite the cheapest.
+    before, columns: `COLUMN` records (across,) of the previous stage and of this one. came_before: parents of the
+    previous stage. Changes of course are counted along the cheapest route to a cell only, so the result is not exactly
+    the optimum.
     """
     step, wide, zones = frame.length / grid.stages, grid.across.size, data.airspace.zones
-    # At a fixed end the flight is where the plan is.
+    # No tracking error at a fixed end.
     beside = 0.0 if stage in (1, grid.stages) else float(data.tracking.across)
     turn_cost, share = (TURN_COST * step, SLOPE_SHARE) if grid.gentle else (0.0, 1.0)
     slopes = _slopes(data, frame, step, 0.5 * (data.start[2] + data.destination[2]), share)
@@ -221,9 +222,9 @@ def _step_on(
 def cheapest_airspace_route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, extra: Floats, bound: float
 ) -> tuple[Floats, float]:  # pragma: no cover - compiled
-    """Points (stages + 1, 3) along, across and up of the cheapest route over a grid, and its cost; none: (0, 3), inf.
+    """Points (stages + 1, 3) along, across, up of the cheapest route over a grid, and its cost; else (0, 3) and inf.
 
-    extra: (stages + 1, across) added to the cost per m.  bound: the most that it may cost.
+    extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost.
     """
     stages, wide, step = grid.stages, grid.across.size, frame.length / grid.stages
     home = int(np.argmin(np.abs(grid.across)))
@@ -278,29 +279,28 @@ def cheapest_airspace_route(
 
 @compiled
 def _layer(grid: AirspaceGrid, column: Record, amsl: float) -> int:  # pragma: no cover - compiled
-    """The layer that is nearest to a height, m."""
+    """Index of the layer nearest to a height, m."""
     first = column.lowest if grid.follows else grid.floor
     layer: int = min(grid.layers - 1, max(0, round((amsl - first) / grid.pitch)))
     return layer
 
 
-# ----------------------------------------------------------------------
-# Routes over grids that know zones and the greatest height above ground, where a scenario has them.
+# --- Grids and routes ---
 
-# Stages, to those of a grid that knows no zones: steps are to be short against hills and gaps.
+# Factor on the number of stages of a grid without zones: hills and gaps need short steps.
 FINER = 2
-# Layers of a band of heights above ground, at least and at most.
+# Minimum and maximum number of layers of a band of heights above ground.
 FEWEST_LAYERS, MOST_LAYERS = 8, 24
-# Pitch of layers that do not follow the ground, as a share of the pitch along, at least.
+# Minimum pitch of layers that do not follow the ground, as a share of the step along.
 LEAST_PITCH = 0.05
-# Cells of one grid, at most: stages x across x layers.
+# Maximum number of cells of a grid: stages x across x layers.
 MOST_CELLS = 1_200_000
 
 
 def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> AirspaceGrid:
-    """A grid of this many stages, or of fewer where it would get too large.
+    """A grid with this many stages, or fewer where it would become too large.
 
-    span: lowest and highest place across, m.
+    span: limits across, m.
     """
     level = np.array([*data.destination[:2], data.start[2]])
     gentlest = math.tan(max(0.0, min(slope_limits(data, np.array(data.start), level))))
@@ -314,7 +314,7 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
         pitch = max(1.0, gentlest * step / LAYERS_A_STEP)
         if follows:
             layers = min(MOST_LAYERS, max(FEWEST_LAYERS, math.ceil(band / pitch) + 1))
-            # Near an end that leaves less of the buffers the band is wider.
+            # Near an end with smaller buffers the band is wider.
             widest = space.max_height - data.clearance
             pitch = max(1.0, band) / (layers - 1)
             layers = max(layers, min(2 * MOST_LAYERS, math.ceil(widest / pitch) + 1))
@@ -329,10 +329,10 @@ def airspace_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, f
 def airspace_routes(
     data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
 ) -> Iterator[GridRoute]:
-    """Routes as found: of each grid's number of stages, `FINER` times as many, up to so many different ones.
+    """Routes in the order found, for each grid (stages, number of different routes), with `FINER` times its stages.
 
-    Those of gentle grids are flown more easily; the first route of all is also looked for where the grid is not gentle,
-    as gaps are passed that way only.
+    Routes of gentle grids are easier to fly. The first grid is also searched without that restriction, because narrow
+    gaps can require steep or curved routes.
     """
     expected = EXPECTED * math.dist(data.start, data.destination)
     for number, (stages, each) in enumerate(grids):
@@ -354,7 +354,7 @@ def airspace_routes(
 def _route(
     data: ProblemArrays, frame: RotatedFrame, grid: AirspaceGrid, used: tuple[GridRoute, ...], expected: float
 ) -> GridRoute | None:
-    """Cheapest way over a grid beside those used; None where there is none.  expected: a cost that may be enough."""
+    """Cheapest route over a grid away from those used, None if there is none. expected: first bound to try."""
     extra = beside_used(np.linspace(0.0, frame.length, grid.stages + 1), grid.across, used)
     for bound in (expected, math.inf):
         points, cost = cheapest_airspace_route(data, frame, grid, extra, bound)

@@ -1,7 +1,8 @@
 """First samples and the smooth basis of the rotated encoding.
 
-A waypoint's neighbours go the same way round an obstacle.  Independent marginals of each coordinate destroy that;
-independent marginals along the eigenvectors of the Brownian-bridge kernel, fixed at both ends, keep it.
+Neighbouring waypoints pass an obstacle on the same side. Independent marginal distributions of each coordinate lose
+this dependence; independent marginals along the eigenvectors of the Brownian-bridge kernel, which is fixed at both
+ends, retain it.
 """
 
 import numpy as np
@@ -11,17 +12,17 @@ from planner.evaluation.encoding import Encoding, Space
 
 Floats = NDArray[np.float64]
 
-# Share of a seeded first population that is drawn around the seeds.
+# Share of a seeded first population that is sampled around the seeds.
 AROUND_SEEDS = 1.0
-# Spread around a seed, as a share of the free spread: log-uniform between these.
+# Limits of the spread around a seed, as a share of the unseeded spread; sampled log-uniformly.
 LEAST_SPREAD, MOST_SPREAD = 0.003, 0.3
 
 
 def bridge_modes(inner: int) -> tuple[Floats, Floats]:
-    """Eigenvectors (inner, inner) and deviations (inner,) of the bridge kernel min(s, t) - s t at even steps.
+    """Eigenvectors (inner, inner) and deviations (inner,) of the bridge kernel min(s, t) - s t at equidistant points.
 
-    In closed form: the kernel's inverse is the second difference, so the eigenvectors are sines.  Deviations are
-    relative to the first mode's.
+    In closed form: the inverse of the kernel is the second difference, so the eigenvectors are sines. Deviations are
+    relative to that of the first mode.
     """
     k = np.arange(1, inner + 1)
     modes = np.sqrt(2.0 / (inner + 1)) * np.sin(np.pi * np.outer(k, k) / (inner + 1))
@@ -30,7 +31,7 @@ def bridge_modes(inner: int) -> tuple[Floats, Floats]:
 
 
 def bridge_basis(inner: int) -> Floats:
-    """Orthogonal basis (3 inner, 3 inner): across and up in bridge modes, along as it is."""
+    """Orthogonal basis (3 inner, 3 inner): bridge modes for across and up, unit vectors for along."""
     modes, _ = bridge_modes(inner)
     basis = np.zeros((3 * inner, 3 * inner))
     basis[0::3, 0::3] = np.eye(inner)
@@ -42,7 +43,7 @@ def bridge_basis(inner: int) -> Floats:
 def first_samples(
     space: Space, encoding: Encoding, population: int, starts: Floats, rng: np.random.Generator
 ) -> Floats:
-    """First population (n, d): the starts and smooth paths around them; without any, about the straight line.
+    """First population (n, d): the starts and smooth paths around them; without starts, around the straight line.
 
     starts: vectors (s, d) to start from.
     """
@@ -50,7 +51,7 @@ def first_samples(
     modes, deviations = bridge_modes(inner)
     lower, upper = encoding.lower.reshape(inner, 3), encoding.upper.reshape(inner, 3)
     spread = np.array([1.0, 0.25 * np.median(upper[:, 1] - lower[:, 1]), 0.25 * (space.up[1] - space.up[0])])
-    # A bridge mode's entries shrink with the number of waypoints; its middle should move by the spread.
+    # The entries of a bridge mode decrease with the number of waypoints; its middle should move by the spread.
     spread[1:] *= np.sqrt((inner + 1) / 2.0)
 
     def bridges(count: int) -> Floats:

@@ -1,8 +1,11 @@
-"""Routes over coarse grids: cheapest ways through terrain and threats in the rotated frame, stage by stage.
+"""Routes over coarse grids: cheapest routes through terrain and threats in the rotated frame, stage by stage.
 
-The grid picks the side of each obstacle; `planner.seeding.waypoint_fitting` then puts the path's waypoints, one an
-interval, where whole legs are evaluated.  Both are dynamic programmes over forward steps: a path that the rotated
-encoding can hold never turns back.
+A grid decides on which side to pass each obstacle; `planner.seeding.waypoint_fitting` then places the path's waypoints,
+one per interval, by evaluating whole legs. Both use dynamic programming over forward steps, because a path in the
+rotated encoding never turns back.
+Cells cost more near the ground and inside kill spheres (`set_prices`). `cheapest_route` relaxes one stage after another
+and prunes every cell through which no route stays within a cost bound; a route found within the bound is optimal.
+`grid_routes` repeats this with a penalty near earlier routes, to find routes on other sides.
 """
 
 import math
@@ -24,30 +27,29 @@ Floats = NDArray[np.float64]
 Codes = NDArray[np.int32]
 
 
-# ----------------------------------------------------------------------
-# What a m of way costs in the cells of a grid: near the ground, and inside kill spheres.
+# --- Cost per metre of grid cells ---
 
 
-# Cost of a m inside a kill sphere, in m of path.
+# Additional cost per m inside a kill sphere, in m of path.
 KILL_COST = 40.0
-# Steps between stages longer than this (m) are coarse: kill spheres grow there by this share of a step, for what lies
-# between the cells.  Finer grids keep them as they are, and find the narrow gaps.
+# On grids with steps longer than this (m), kill spheres are enlarged by this share of a step, for what lies between the
+# cells. Finer grids use their true size and find the narrow gaps.
 COARSE, COARSE_GROWTH = 250.0, 0.15
-# Share of a step to either side of a cell within which the highest ground counts.
+# Share of a step around a cell over which the highest ground is taken.
 GROUND_SPREAD = 0.4
-# A threat in the rotated frame, m, with the radius that routes keep away.
+# A threat in the rotated frame, with the radius that routes avoid, m.
 OBSTACLE = np.dtype(
     [("along", np.float64), ("across", np.float64), ("up", np.float64), ("radius", np.float64)], align=True
 )
 
 
 class Grid(NamedTuple):
-    """One resolution: stages along, places across (m from the line) and layers of height (m).
+    """One resolution: number of stages along, positions across (m from the line) and layers of height (m).
 
-    shrink: share of a step by which kill spheres are taken to be smaller than they are; 0 for none.  What such a grid
-    finds may have to be moved to be safe, and it finds gaps between its cells.
-    spread: share of a step to either side of a cell within which the highest ground counts.
-    ratio: between places across, as a share of a step; below 1 the grid knows more courses and finer gaps.
+    shrink: share of a step by which kill spheres are reduced; 0 for none. Routes on such a grid may have to be
+    shortened to be safe, but pass gaps between its cells.
+    spread: share of a step around a cell over which the highest ground is taken.
+    ratio: spacing across as a share of a step; below 1 the grid has more courses and resolves finer gaps.
     """
 
     stages: int
@@ -59,7 +61,7 @@ class Grid(NamedTuple):
 
 
 class _PixelSteps(NamedTuple):
-    """Columns and rows of the raster from one sample of the ground to the next, along and across."""
+    """Steps in raster columns and rows between samples of the ground, along and across."""
 
     columns_along: float
     rows_along: float
@@ -69,7 +71,7 @@ class _PixelSteps(NamedTuple):
 
 @compiled
 def position_of(frame: RotatedFrame, along: float, across: float) -> tuple[float, float]:  # pragma: no cover - compiled
-    """East and north of a place in the rotated frame."""
+    """East and north of a point in the rotated frame."""
     return (
         frame.east + frame.cosine * along - frame.sine * across,
         frame.north + frame.sine * along + frame.cosine * across,
@@ -85,7 +87,7 @@ def _lowest_height(
     across: float,
     steps: _PixelSteps,
 ) -> float:  # pragma: no cover - compiled
-    """Lowest height allowed in a cell: highest ground on 3 x 3 samples, plus clearance; inf outside the map.
+    """Lowest height allowed in a cell: highest ground of 3 x 3 samples plus the clearance; inf outside the map.
 
     steps: 0 along for the middle sample alone.
     """
@@ -112,7 +114,7 @@ def _lowest_height(
 def _pixel_steps(
     data: ProblemArrays, frame: RotatedFrame, along: float, pitch: float
 ) -> _PixelSteps:  # pragma: no cover - compiled
-    """Steps over the raster that are `pitch` m along and across the line, at this distance along."""
+    """Steps in the raster of `pitch` m along and across the line, at this distance along."""
     east, north = position_of(frame, along, 0.0)
     column, row = polymap(data.to_pixel, east, north)
     east, north = position_of(frame, along + pitch, 0.0)
@@ -149,7 +151,7 @@ def find_obstacles(
 def _add_danger(
     obstacles: Records, along: float, grid: Grid, low: int, high: int, price: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Add the cost per m inside kill spheres, growing inwards, to a stage's cells price (layers, across) low..high."""
+    """Add the cost per m inside kill spheres, increasing inwards, to a stage's cells (layers, low..high)."""
     across, layers = grid.across, grid.layers
     pitch = across[1] - across[0] if across.size > 1 else 1.0
     for k in range(obstacles.shape[0]):
@@ -184,12 +186,12 @@ def set_prices(
     high: int,
     price: Floats,
 ) -> None:  # pragma: no cover - compiled
-    """Cost per m of a stage's cells price (layers, across) low..high; inf where the ground is too near."""
+    """Fill the cost per m of a stage's cells (layers, low..high); inf where the ground is too near."""
     across, layers = grid.across, grid.layers
     step = frame.length / grid.stages
     steps = _pixel_steps(data, frame, stage * step, grid.spread * step if stage < grid.stages else 0.0)
     for y in range(low, high + 1):
-        # The destination is where it is, whatever its clearance.
+        # The destination is fixed, whatever its clearance.
         if stage == grid.stages and across[y] == 0.0:
             lowest = -math.inf
         else:
@@ -199,20 +201,16 @@ def set_prices(
     _add_danger(obstacles, stage * step, grid, low, high, price)
 
 
-# ----------------------------------------------------------------------
-# Cheapest routes over grids in the rotated frame, stage by stage: the compiled part of `planner.seeding.grids`.
-#
-# A dynamic programme over forward steps.  It leaves out every cell through which no route is cheaper than a bound;
-# where a route within the bound is found it is the cheapest of all.
+# --- Dynamic programme over stages ---
 
 
-# Steps across a grid's cell that one stage forward may make.
+# Maximum lateral step, in cells, per stage.
 SIDEWAYS = 3
-# A cell of a route: its places among those across and among the layers.
+# A cell of a route: its indices across and among the layers.
 ROUTE_CELL = np.dtype([("across", np.int64), ("layer", np.int64)], align=True)
-# Layers that one step may climb and sink.
+# Maximum climb and descent of a step, in layers.
 STEP_LAYERS = np.dtype([("climb", np.int64), ("sink", np.int64)], align=True)
-# First and last place across, of a layer, that has a cost; first > last for none.
+# First and last index across with a finite cost, per layer; first > last for none.
 SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 
 
@@ -220,7 +218,7 @@ SPAN = np.dtype([("first", np.int64), ("last", np.int64)], align=True)
 def layers_a_step(
     data: ProblemArrays, frame: RotatedFrame, step: float, layers: Floats, ratio: float
 ) -> Records:  # pragma: no cover - compiled
-    """`STEP_LAYERS` records (sideways, layers) of one step on its course and at its height."""
+    """`STEP_LAYERS` records (sideways, layers): climb and descent of a step on its course and at its height."""
     pitch = layers[1] - layers[0] if layers.size > 1 else 1.0
     out = np.zeros((2 * SIDEWAYS + 1, layers.size), dtype=STEP_LAYERS)
     a, b = np.zeros(3), np.zeros(3)
@@ -249,10 +247,10 @@ def relax(
     count: int,
     length: float,
 ) -> None:  # pragma: no cover - compiled
-    """One move from `count` cells beside each other to as many, at the prices of cells from `priced`; all flat."""
+    """Relax `count` adjacent cells to as many of the next stage, with cell costs from `priced`; all arrays flat."""
     for k in range(count):
-        # Unsigned, or numba would look whether each index counts from the end; and without a branch.  So this, the
-        # innermost loop, takes several cells at once.
+        # Unsigned indices (numba checks signed ones for wrap-around) and no branches: this innermost loop is
+        # vectorised.
         i, j = np.uintp(start) + np.uintp(k), np.uintp(end) + np.uintp(k)
         total = cost[i] + length * price[np.uintp(priced) + np.uintp(k)]
         better = total < after[j]
@@ -272,9 +270,9 @@ def step_on(
     pitch: float,
     ratio: float,
 ) -> None:  # pragma: no cover - compiled
-    """Relax one stage: costs (layers, across) before and after, the cell each came from, and the cost per m of cells.
+    """Relax one stage: costs (layers, across) before and after it, parent cells, and cost per m of the cells.
 
-    spans: `SPAN` records (layers,) of the cells with a cost before.  pitch: between layers, m.
+    spans: `SPAN` records (layers,) of the cells with a finite cost before. pitch: between layers, m.
     """
     high, wide = cost.shape
     flat, flat_after, flat_came, flat_price = cost.ravel(), after.ravel(), came.ravel(), price.ravel()
@@ -298,7 +296,7 @@ def step_on(
 def way_ahead(
     columns: int, home: int, left: int, step: float, ratio: float, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Length on the map of the shortest way from each place across to the destination, `left` stages away, m."""
+    """Shortest horizontal distance from each position across to the destination, `left` stages away, m."""
     for y in range(columns):
         aside = abs(y - home)
         if aside > SIDEWAYS * left:
@@ -314,10 +312,10 @@ def way_ahead(
 def prune(
     after: Floats, spans: Records, ahead: Floats, rises: Floats, bound: float, low: int, high: int
 ) -> None:  # pragma: no cover - compiled
-    """Drop cells low..high from which no route ends within the bound; note which are left.
+    """Drop cells low..high from which no route reaches the destination within the bound; note the remaining spans.
 
-    spans: `SPAN` records (layers,) to fill.  ahead: (across,) m on the map to the destination.  rises: (layers,) m of
-    height to it.
+    spans: `SPAN` records (layers,) to fill. ahead: (across,) horizontal distance to the destination, m. rises:
+    (layers,) height difference to it, m.
     """
     for z in range(after.shape[0]):
         spans[z].first, spans[z].last = after.shape[1], -1
@@ -335,10 +333,10 @@ def prune(
 def cheapest_route(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, extra: Floats, bound: float
 ) -> tuple[Records, float]:  # pragma: no cover - compiled
-    """`ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty where none is.
+    """`ROUTE_CELL` records (stages + 1,) of the cheapest route over a grid, and its cost; empty if there is none.
 
-    extra: (stages + 1, across) added to the cost per m.  bound: the most that it may cost; a route that costs more is
-    not looked for.
+    extra: (stages + 1, across) added to the cost per m. bound: upper limit on the cost; more expensive routes are not
+    searched.
     """
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
@@ -386,30 +384,32 @@ def trace_back(came: Codes, layer: int, across: int) -> Records:  # pragma: no c
     return cells
 
 
-# Pitch of the layers, as a share of the pitch along: what the gentler slope limit climbs or sinks in a step, over this,
-# and between these.
+# --- Grids and routes ---
+
+# Pitch of the layers as a share of the step along: the gentler slope limit's climb per step over LAYERS_A_STEP, within
+# these limits.
 LAYERS_A_STEP = 2.5
 LOW_LAYER, HIGH_LAYER = 0.05, 0.12
-# Cells of one grid, at most: stages x across x layers.
+# Maximum number of cells of a grid: stages x across x layers.
 MOST_CELLS = 1_200_000
-# What the first route is expected to cost, over the straight line; grids know eight courses and are too long by that.
+# Expected cost of the first route over the straight line; with few courses, grid routes are too long by about this.
 EXPECTED = 1.12
-# Routes beside one another: within this of an earlier one (m, or steps if that is more) a route costs up to twice.
+# Different routes: within this distance of an earlier one (m, or steps if larger) a route costs up to twice as much.
 APART, APART_STEPS = 800.0, 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class GridRoute:
-    """A way over a grid: points (stages + 1, 3) along, across, up, and its cost in m of path."""
+    """A route over a grid: points (stages + 1, 3) along, across, up, and its cost in m of path."""
 
     points: Floats
     cost: float
 
 
 def make_grid(data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], stages: int) -> Grid:
-    """A grid of this many stages, square in the plane, its layers passing through the start's height.
+    """A grid with this many stages, square in the plane, with a layer at the start's height.
 
-    span: lowest and highest place across, m.  The pitch grows where the grid would get too large.
+    span: limits across, m. The number of stages is reduced where the grid would become too large.
     """
     low, high = max(data.floor, float(np.nanmin(data.heights))), data.ceiling
     level = np.array([*data.destination[:2], data.start[2]])
@@ -433,10 +433,10 @@ def grid_route(
     used: tuple[GridRoute, ...] = (),
     expected: float = math.inf,
 ) -> GridRoute | None:
-    """Cheapest way over a grid; None where terrain and ceiling close it.
+    """Cheapest route over a grid; None if terrain and ceiling leave none.
 
-    used: earlier routes; keeping near them costs extra, so that the next one takes another side.  expected: a cost
-    that is probably enough, as that on a coarser grid: it is found faster, and without it all is looked at.
+    used: earlier routes, near which the cost is higher, so that the next route takes another side. expected: cost bound
+    to try first, such as the cost on a coarser grid; a search without a bound follows if it fails.
     """
     if grid.layers.size == 0:
         return None
@@ -453,7 +453,7 @@ def grid_route(
 
 
 def beside_used(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> Floats:
-    """What keeping near routes costs more, per m, at places along (s,) and across (y,), m: (s, y)."""
+    """Additional cost per m near earlier routes, at positions along (s,) and across (y,), m: (s, y)."""
     extra = np.zeros((along.size, across.size))
     width = max(APART, APART_STEPS * along[-1] / (along.size - 1))
     for route in used:
@@ -465,7 +465,7 @@ def beside_used(along: Floats, across: Floats, used: tuple[GridRoute, ...]) -> F
 def grid_routes(
     data: ProblemArrays, frame: RotatedFrame, span: tuple[float, float], grids: tuple[tuple[int, int], ...]
 ) -> Iterator[GridRoute]:
-    """Routes as found: of each grid's number of stages, up to so many different ones."""
+    """Routes in the order found, for each grid (stages, number of different routes)."""
     expected = EXPECTED * math.dist(data.start, data.destination)
     for stages, each in grids:
         grid = make_grid(data, frame, span, stages)

@@ -1,4 +1,10 @@
-"""Routes that may turn back and go round to climb: over a lattice of places, heights and courses, pulled taut."""
+"""Routes that may turn back or circle to climb: A* over a lattice of positions, layers of height and eight courses.
+
+A* search (Hart, Nilsson and Raphael, 1968) over states of a lattice point and one of eight courses. A step leads to a
+neighbouring point, turns by no more than a right angle, and climbs or descends within the slope limits; a route that
+needs more distance to climb than is available therefore circles. The heuristic is the straight distance to the goal.
+The resulting route is simplified by replacing steps with feasible straight legs (`pulled_taut`).
+"""
 
 import heapq
 import math
@@ -23,33 +29,27 @@ Flags = NDArray[np.bool_]
 Bytes = NDArray[np.int8]
 
 
-# ----------------------------------------------------------------------
-# Cheapest routes over a lattice of places, heights and courses: the compiled part of `planner.seeding.lattice`.
-#
-# A search after Hart, Nilsson and Raphael (A*, 1968) over states of a place, a layer and one of eight courses.  A
-# step goes to a place beside the last, turns by no more than a right angle, and climbs and sinks no more than the
-# limits allow; so a route that needs more way to climb than there is goes round in the lattice.
+# --- A* search ---
 
 
-# Steps to the eight places beside a place, along and across, in the order of their courses.
+# Steps to the eight neighbours, along and across, in the order of their courses.
 _STEPS = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1]])
-# What each eighth of a circle of a turn costs, as a share of a step: of ways of one length, that with the fewest turns.
+# Cost per 45 degrees of turn, as a share of a step: among routes of equal length prefers the one with the fewest turns.
 TURN_COST = 0.1
-# A step whose cost is more than this many times its length is closed.
+# A step is closed if its cost exceeds its length by this factor.
 CLOSED = 1.05
-# What is known of a step.
+# Status of a step.
 _UNKNOWN, _FREE, _SHUT = range(3)
-# A state of a route: places along and across from the start's, and its layer.
+# A point of a route: steps along and across from the start, and its layer.
 LATTICE_CELL = np.dtype([("along", np.int64), ("across", np.int64), ("layer", np.int64)], align=True)
 
 
 class Lattice(NamedTuple):
-    """Places in the rotated frame and layers of height.
+    """Points in the rotated frame and layers of height.
 
-    step: between places, m.  behind, right: places before the start's and to its right; along, across: places in all.
-    goal: place of the destination along.  low: height of the first layer, m.  pitch: between layers, m.
-    layers: in all.
-    start_layer, goal_layer: those of the ends.
+    step: between points, m. behind, right: points behind the start and to its right. along, across: number of points.
+    goal: index along of the destination. low: height of the first layer, m. pitch: between layers, m.
+    layers: number of layers. start_layer, goal_layer: those of the ends.
     """
 
     step: float
@@ -69,7 +69,7 @@ class Lattice(NamedTuple):
 def _place(
     frame: RotatedFrame, lattice: Lattice, along: int, across: int, layer: int, out: Floats
 ) -> None:  # pragma: no cover - compiled
-    """World position of a place and layer, (3,)."""
+    """Fill the world position (3,) of a lattice point and layer."""
     out[0], out[1] = position_of(
         frame, (along - lattice.behind) * lattice.step, (across - lattice.right) * lattice.step
     )
@@ -78,7 +78,7 @@ def _place(
 
 @compiled
 def _rises(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:  # pragma: no cover - compiled
-    """Layers (8, 2) that a step on each course may climb and sink."""
+    """Maximum climb and descent (8, 2) of a step on each course, in layers."""
     out, a, b = np.zeros((8, 2), dtype=np.int64), np.zeros(3), np.zeros(3)
     _place(frame, lattice, lattice.behind, lattice.right, lattice.start_layer, a)
     for course in range(8):
@@ -92,9 +92,9 @@ def _rises(data: ProblemArrays, frame: RotatedFrame, lattice: Lattice) -> Codes:
 
 
 class _Reached(NamedTuple):
-    """What a search knows of its states: cost (m), the state before, whether it is finished; and of steps from cells.
+    """State of the search. Per state: cost (m), parent, and whether it is closed. Per step: whether it is feasible.
 
-    rises: layers (8, 2) that a step on each course may climb and sink.  steps: by cell, course and rise.
+    rises: (8, 2) maximum climb and descent in layers. steps: by cell, course and rise.
     """
 
     cost: Floats
@@ -115,7 +115,7 @@ def _take_steps(
     courses: int,
     open_states: list[tuple[float, int]],
 ) -> None:  # pragma: no cover - compiled
-    """Reach the states a step from one, which become open with their cost and the straight way that is left."""
+    """Expand a state: relax its successors and push them with cost plus straight distance to the goal."""
     rises, course, cell = reached.rises, state % 8, state // 8
     layer, place = cell % lattice.layers, cell // lattice.layers
     along, across = place // lattice.across, place % lattice.across
@@ -137,7 +137,7 @@ def _take_steps(
             total = reached.cost[state] + length + TURN_COST * lattice.step * abs(turn)
             if reached.done[code] or total >= reached.cost[code]:
                 continue
-            # A step is the same whatever the course before it.
+            # The feasibility of a step does not depend on the course before it.
             number = (cell * 8 + to) * width + next_layer - layer + sinks
             if reached.steps[number] == _UNKNOWN:
                 free = _inside(data, b) and leg_cost(data, limits, a, b) <= CLOSED * length
@@ -149,10 +149,9 @@ def _take_steps(
 
 
 class LatticeSearch(NamedTuple):
-    """A search under way: what it knows of states, and those that are open, in the order of a heap.
+    """An interrupted search: its state, and the open list in heap order.
 
-    costs, states: (k,) of the open states.  seen: states that were looked at.  found: the state at the destination, or
-    -1.
+    costs, states: (k,) of the open list. seen: number of states expanded. found: the goal state, or -1.
     """
 
     reached: _Reached
@@ -189,14 +188,14 @@ def begin_lattice_search(
 def search_lattice_on(
     data: ProblemArrays, frame: RotatedFrame, lattice: Lattice, courses: int, search: LatticeSearch, most: int
 ) -> LatticeSearch:  # pragma: no cover - compiled
-    """The search after a look at up to so many more states; where none is open any more it is over.
+    """The search continued by up to `most` expansions; it has failed if the open list is empty.
 
-    courses: by which one step may differ from the last, in eighths of a circle.
+    courses: largest turn per step, in units of 45 degrees.
     """
     limits, reached, seen = precompute_limits(data), search.reached, search.seen
     last = (lattice.goal * lattice.across + lattice.right) * lattice.layers + lattice.goal_layer
     wanted = _asked_course(frame, data.destination_course)
-    # A heap's own order stays one, so that what is handed on needs no sorting.
+    # The open list is stored in heap order and needs no sorting.
     open_states = [(search.costs[k], search.states[k]) for k in range(search.states.size)]
     found = -1
     while len(open_states) > 0 and seen < search.seen + most:
@@ -217,7 +216,7 @@ def search_lattice_on(
 
 @compiled
 def _asked_course(frame: RotatedFrame, course: float) -> int:  # pragma: no cover - compiled
-    """The course of a step that is nearest to one (rad, clockwise from north); -1 for NaN."""
+    """Index of the lattice course nearest to a course (rad, clockwise from north); -1 for NaN."""
     if math.isnan(course):
         return -1
     angle = 0.5 * math.pi - course - math.atan2(frame.sine, frame.cosine)
@@ -252,9 +251,9 @@ def traced(came: Codes, found: int, lattice: Lattice) -> Records:  # pragma: no 
 
 @compiled
 def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no cover - compiled
-    """Points (j, 3) of a route (k, 3) that are left when legs that violate nothing take the place of its steps.
+    """Route (j, 3) with as many points of a route (k, 3) as possible dropped: greedy line-of-sight simplification.
 
-    From each point kept the leg to the furthest point that is free.
+    From each remaining point the leg goes to the furthest point that it reaches without a violation.
     """
     limits = precompute_limits(data)
     out = np.empty(points.shape)
@@ -274,18 +273,20 @@ def pulled_taut(data: ProblemArrays, points: Floats) -> Floats:  # pragma: no co
     return out[:count]
 
 
-# Shortest step, m, and the longest that a step has to be for two right angles in it, whatever the aircraft, m.
+# --- Lattices and routes ---
+
+# Minimum step, and upper limit on the step that two right-angled turns require, m.
 LEAST_STEP, LONGEST_STEP = 100.0, 2000.0
-# Layers that the gentler slope limit climbs or sinks in a step along.
+# Layers that the gentler slope limit climbs or descends in a step along.
 LAYERS_A_STEP = 2
-# States of a lattice, and how many of them are looked at, at most.
+# Maximum number of states of a lattice, and of expanded states.
 MOST_LATTICE, MOST_STATES = 4_000_000, 600_000
-# States that are looked at before the caller may end the work: some 10 ms.
+# States expanded between two calls of `pause`: some 10 ms.
 STATES_AT_ONCE = 2000
 
 
 def turning_step(data: ProblemArrays) -> float:
-    """Length of a leg between two right angles of one side, m: what they take of it, and settling between them."""
+    """Length of a leg between two right-angled turns to the same side, m: their lengths and settling between them."""
     if not data.legs_hold_turns:
         return LEAST_STEP
     long = LONGEST_STEP
@@ -297,9 +298,9 @@ def turning_step(data: ProblemArrays) -> float:
 
 
 def make_lattice(data: ProblemArrays, frame: RotatedFrame, step: float) -> Lattice:
-    """A lattice over the whole map whose steps are at most so long, one of them on each end; longer if it must be.
+    """A lattice over the whole map with points at both ends and steps of at most this length.
 
-    step: m.  A lattice of more than `MOST_LATTICE` states has longer steps.
+    step: m. The step is increased where the lattice would have more than `MOST_LATTICE` states.
     """
     corners = [(e, n, 0.0) for e in (data.west, data.east) for n in (data.south, data.north)]
     low, high = frame.rotate(corners)[:, :2].min(axis=0), frame.rotate(corners)[:, :2].max(axis=0)
@@ -330,9 +331,9 @@ def cheapest_lattice_route(
     most_states: int,
     pause: Callable[[], None] = lambda: None,
 ) -> Records:
-    """`LATTICE_CELL` records of the cheapest route from start to destination; none where there is none.
+    """`LATTICE_CELL` records of the cheapest route from start to destination; empty if there is none.
 
-    courses: by which one step may differ from the last, in eighths of a circle.  most_states: that are looked at.
+    courses: largest turn per step, in units of 45 degrees. most_states: maximum number of expanded states.
     """
     search = begin_lattice_search(data, frame, lattice)
     while search.found < 0 and len(search.states) and search.seen < most_states:
@@ -348,12 +349,12 @@ def cheapest_lattice_route(
 def lattice_route(
     data: ProblemArrays, frame: RotatedFrame, step: float, pause: Callable[[], None] = lambda: None
 ) -> Floats:
-    """World points (k, 3) of a route from start to destination over a lattice of this step (m); (0, 3) for none.
+    """World points (k, 3) of a route from start to destination over a lattice of this step (m); (0, 3) if none.
 
-    pause: called after every `STATES_AT_ONCE` states; what it raises ends the work.
+    pause: called after every `STATES_AT_ONCE` states; an exception raised there stops the search.
     """
     lattice = make_lattice(data, frame, step)
-    # Right angles at most, where the limits allow them; a way of eight courses has eighths of a circle at least.
+    # Turns of up to 90 degrees where the limits allow them; with eight courses 45 degrees is the minimum.
     courses = 2 if data.max_turn >= math.radians(90.0) else 1
     cells = cheapest_lattice_route(data, frame, lattice, courses, MOST_STATES, pause)
     if not len(cells):

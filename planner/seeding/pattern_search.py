@@ -1,8 +1,8 @@
-"""A local search that tightens one path: moves of one waypoint and of stretches, kept while they help.
+"""Pattern search that shortens one path by moves of single waypoints and of neighbouring groups.
 
-A pattern search after Hooke and Jeeves ("Direct search", Journal of the ACM 8, 1961) over a triangular basis of several
-widths.  A search by samples finds the way round the obstacles; the last percent of its length this finds with fewer
-evaluations.
+After Hooke and Jeeves ("Direct search", Journal of the ACM 8, 1961), over a basis of triangular displacements of
+several widths. Sampling finds the route around the obstacles; this local search finds the last percent of its length
+with fewer evaluations. It minimises the length ratio plus priced violations.
 """
 
 import math
@@ -22,18 +22,18 @@ from world.kernels import Record, Records, compiled
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Prices of violations, in length ratios: a unit of turn (rad), slope, terrain (m x km), bounds (m), and of exposure.
+# Prices of violations, in length ratios per unit of turn (rad), slope, terrain (m x km), bounds (m) and exposure.
 TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE, EXPOSURE_PRICE = 2.0, 20.0, 0.5, 1.0, 5.0
-# Price of any exposure at all: a sphere that is hardly entered has next to none.
+# Price of any exposure at all: a sphere that is barely entered has almost none.
 EXPOSED = 0.002
-# First steps, as shares of the interval between waypoints: along, across; and up, m.
+# Initial steps: along and across as shares of the interval between waypoints; up in m.
 FIRST_ALONG, FIRST_ACROSS, FIRST_UP = 0.2, 0.15, 25.0
-# Smallest share of its first step that a move is tried with.
+# Smallest step of a move, as a share of its initial step.
 LEAST_STEP = 0.002
 
 
 class _Found(NamedTuple):
-    """Best vector (d,) that meets the constraints (inf if none), that of the least merit, and if they are the same."""
+    """Best feasible vector (d,) (inf if none), the vector with the lowest merit, and whether they are the same."""
 
     feasible: Floats
     cheapest: Floats
@@ -49,7 +49,7 @@ class _Box(NamedTuple):
 
 
 class _Candidate(NamedTuple):
-    """A path (w, 3), its `VIOLATIONS` and `OBJECTIVES` records (1,), and scratch to evaluate it."""
+    """A path (w, 3), its `VIOLATIONS` and `OBJECTIVES` records (1,), and scratch for evaluating it."""
 
     path: Floats
     violations: Records
@@ -58,10 +58,10 @@ class _Candidate(NamedTuple):
 
 
 def search_patterns(data: ProblemArrays, encoding: Encoding, vector: Floats, evaluations: int) -> tuple[Floats, int]:
-    """Tighten a path of the rotated encoding.
+    """Shorten a path of the rotated encoding.
 
-    vector: (d,).  evaluations: the most to make.  Returns the best vectors found (k, d), which are one that meets the
-    constraints, if any was seen, and the one of the least merit; and the evaluations made.
+    vector: (d,). evaluations: maximum number. Returns the best vectors (k, d), namely the best feasible one, if any,
+    and the one with the lowest merit; and the number of evaluations made.
     """
     frames = frames_of(encoding)
     inner = encoding.waypoints - 2
@@ -80,7 +80,7 @@ def search_patterns(data: ProblemArrays, encoding: Encoding, vector: Floats, eva
 
 
 def merits(scores: Floats) -> Floats:
-    """Merits (n,) that the search lowers, of scores (n, 8) by `planner.plan.Violation` and `planner.plan.Objective`."""
+    """Merits (n,), which the search minimises, of scores (n, 8) by `planner.plan.Violation` and `Objective`."""
     prices = np.array([TURN_PRICE, SLOPE_PRICE, TERRAIN_PRICE, BOUNDS_PRICE])
     count = len(prices)
     ratio, exposure = scores[:, count + Objective.LENGTH_RATIO], scores[:, count + Objective.KILL_EXPOSURE]
@@ -90,7 +90,7 @@ def merits(scores: Floats) -> Floats:
 
 @cache
 def _triangular_basis(inner: int) -> tuple[Floats, Ints]:
-    """Moves (k, 3 inner), triangles of 1, 2, 4, ... waypoints to either side, and the axis (k,) along which each is."""
+    """Moves (k, 3 inner): triangles with half-widths of 1, 2, 4, ... waypoints; and the axis (k,) of each."""
     rows: list[Floats] = []
     axes: list[int] = []
     place = np.arange(inner, dtype=np.float64)
@@ -120,7 +120,7 @@ def _make_candidate(data: ProblemArrays, waypoints: int) -> _Candidate:  # pragm
 def _merit(
     data: ProblemArrays, limits: PrecomputedLimits, frames: WaypointFrames, vector: Floats, candidate: _Candidate
 ) -> tuple[float, bool]:  # pragma: no cover - compiled
-    """Length ratio and the price of what is violated; whether nothing is."""
+    """Length ratio plus priced violations, and whether the path is feasible."""
     path, inner = candidate.path, vector.reshape((vector.size // 3, 3))
     for i in range(inner.shape[0]):
         along, across = inner[i, 0], inner[i, 1]
@@ -158,7 +158,7 @@ def _search(
     steps: Floats,
     most: int,
 ) -> _Found:  # pragma: no cover - compiled
-    """Search from a vector (d,) with moves (k, d) of these first steps (k,), which it changes."""
+    """Search from a vector (d,) with moves (k, d) of these initial steps (k,), which it modifies."""
     limits, candidate = precompute_limits(data), _make_candidate(data, start.size // 3 + 2)
     feasible = np.full(start.size, np.inf)
     here, trial, before = start.copy(), start.copy(), start.copy()
@@ -171,7 +171,7 @@ def _search(
     while made < most:
         alive = False
         before[:] = here
-        # The last turn of a round goes on as far as the whole round went.
+        # The last trial of a round repeats the displacement of the whole round (pattern move).
         for k in range(moves.shape[0] + 1):
             if made >= most or (k < moves.shape[0] and abs(steps[k]) < LEAST_STEP * first[k]):
                 continue

@@ -1,8 +1,9 @@
-"""Shortening: a path pulled taut under its constraints, all waypoints at once and free of their intervals.
+"""Shortening: the shortest path near a given one under its constraints, all waypoints at once, free of intervals.
 
-A grid, a population or a moving of places finds the side of the obstacles on which to pass; how short a path is there
-is a smooth problem in all coordinates, which Newton's steps solve in a millisecond or two
-(`planner.seeding.shortening`).
+Grids and populations decide on which side to pass each obstacle. Near such a path, length is a smooth function of all
+coordinates under smooth constraints, and an augmented Lagrangian method with Newton steps minimises it in a millisecond
+or two. Each round fixes the active constraints (`planner.seeding.shortening_model`), takes Newton steps in a box, and
+updates the multipliers. A step solves a banded system and costs about as much as a few evaluations.
 """
 
 import math
@@ -29,18 +30,14 @@ from world.kernels import compiled
 Floats = NDArray[np.float64]
 
 
-# ----------------------------------------------------------------------
-# Newton's steps down a path's length under its constraints: the compiled part of `planner.seeding.shortening`.
-#
-# A step solves a band of equations (`planner.seeding.shortening_model`) and costs what a few evaluations of the path
-# do.
+# --- Newton steps and rounds ---
 
 
-# What is added to the matrix's diagonal, 1 / m: along a straight line a waypoint's place is free.
+# Added to the diagonal of the Hessian, 1 / m: along a straight line the position of a waypoint is undetermined.
 DAMPING = 2e-4
-# Furthest that a step moves a waypoint along an axis, m.
+# Longest step of a waypoint along an axis, m.
 LONGEST_STEP = 80.0
-# Penalties, 1 / m, of the first round and of the last; rounds, steps of each, and halvings of a step.
+# Penalties of the first and the last round, 1 / m; number of rounds, of steps per round, and of halvings per step.
 FIRST_PENALTY, LAST_PENALTY, ROUNDS, STEPS, HALVINGS = 0.1, 1.0, 9, 5, 5
 # A round ends with a step that moves no waypoint further than this, m.
 STILL = 0.05
@@ -50,14 +47,14 @@ STILL = 0.05
 def _newton_step(
     path: Floats, low: Floats, high: Floats, model: LagrangianModel, factor: Floats, step: Floats
 ) -> float:  # pragma: no cover - compiled
-    """Fill the step (n,) down from a path, within its box; the furthest that it moves along an axis, m."""
+    """Fill the Newton step (n,) from a path within its box; returns its largest component, m."""
     size = step.size
     for row in range(size):
         model.band[row, 0] += DAMPING
         place, axis = path[1 + row // 3, row % 3], row % 3
         downhill = -model.gradient[row]
         if (place <= low[axis] and downhill < 0.0) or (place >= high[axis] and downhill > 0.0):
-            # Held by its bound: it neither moves nor is moved.
+            # An active bound: remove the coordinate from the system.
             model.gradient[row] = 0.0
             for k in range(1, BAND):
                 model.band[row, k] = 0.0
@@ -76,7 +73,7 @@ def _newton_step(
 
 
 class Shortening(NamedTuple):
-    """A path (w, 3) m under way, what binds it, the multipliers of its constraints, rounds done, and models made."""
+    """State: path (w, 3) m, active constraints, their multipliers, rounds done, and models evaluated."""
 
     path: Floats
     bound: Bindings
@@ -91,14 +88,14 @@ def begin_shortening(
 ) -> Shortening:  # pragma: no cover - compiled
     """The shortening of a path (w, 3) m before its first round.
 
-    samples: of the ground on each leg.  spare: m by which it keeps further from spheres and ground than is asked.
+    samples: of the ground on each leg. spare: additional margin to spheres and ground, m.
     """
     bound = bindings(data, path, samples, spare)
     return Shortening(path.copy(), bound, np.zeros(constraints_of(bound)), 0, 0)
 
 
 class _Descent(NamedTuple):
-    """What a round's steps share: the box's corners (3,), the model, the matrix's factor, a step, and a trial."""
+    """Scratch of a round's steps: corners (3,) of the box, model, matrix factor, step and trial path."""
 
     low: Floats
     high: Floats
@@ -112,7 +109,7 @@ class _Descent(NamedTuple):
 def shorten_on(
     data: ProblemArrays, under_way: Shortening, spare: float, most: int
 ) -> Shortening:  # pragma: no cover - compiled
-    """The shortening after as many rounds as are left, or after so many."""
+    """The shortening after up to `most` further rounds."""
     here, bound, multipliers, number, made = under_way
     limits, size = precompute_limits(data), 3 * (here.shape[0] - 2)
     descent = _Descent(
@@ -149,7 +146,7 @@ def _descend(
     penalty: float,
     descent: _Descent,
 ) -> int:  # pragma: no cover - compiled
-    """Step a path (w, 3) down, in place, and fill the constraints' values where it ends; models made."""
+    """Minimise over a path (w, 3), in place, and fill the constraints' values at the end; models evaluated."""
     low, high, model, step, trial = descent.low, descent.high, descent.model, descent.step, descent.trial
     merit, made = lagrangian(data, limits, bound, here, multipliers, values, penalty, model), 1
     for _ in range(STEPS):
@@ -175,23 +172,25 @@ def _descend(
     return made + 1
 
 
-# Samples of the ground on a leg: one every so many m of the mean leg, within these.
+# --- Shortening a path ---
+
+# Spacing of ground samples on the mean leg (m), and limits on their number per leg.
 SAMPLE_PITCH, FEWEST_SAMPLES, MOST_SAMPLES = 30.0, 6, 48
-# What it keeps further from spheres and ground than is asked, m: what its last steps leave undecided.
+# Additional margin to spheres and ground, m: the accuracy that the last steps reach.
 SPARE = 0.1
-# Models that one shortening makes at most.
+# Maximum number of models per shortening.
 MOST_MODELS = ROUNDS * (2 + STEPS * HALVINGS)
-# Pairs of leg and missile that are looked at before the caller may end the work: some 5 ms.
+# Pairs of leg and missile between two calls of `pause`: some 5 ms.
 PAIRS_AT_ONCE = 400_000
 
 
 def shorten_path(
     data: ProblemArrays, path: Floats, *, spare: float = SPARE, pause: Callable[[], None] = lambda: None
 ) -> tuple[Floats, int]:
-    """A path (w, 3) world m that is shorter or breaks less than this one, and the models made: each is an evaluation.
+    """A path (w, 3) world m, shorter or with smaller violations than this one, and the number of models evaluated.
 
-    spare: m by which it keeps further from spheres and ground than is asked.  pause: called after some milliseconds'
-    work; what it raises ends the work.  Zones, and a greatest height above ground, are not looked at.
+    A model counts as an evaluation. spare: additional margin to spheres and ground, m. pause: called after some
+    milliseconds of work; an exception raised there stops it. Zones and the maximum height above ground are ignored.
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -207,7 +206,7 @@ def shorten_path(
     samples = int(min(MOST_SAMPLES, max(FEWEST_SAMPLES, math.ceil(mean / SAMPLE_PITCH))))
     rounds = max(1, PAIRS_AT_ONCE // (len(path) * max(1, len(data.missiles.missiles))))
     start = np.array(path, dtype=np.float64)
-    # A grid's route ends at a grid's height.
+    # A grid's route ends at the height of a layer.
     start[0], start[-1] = data.start, data.destination
     under_way: Shortening = begin_shortening(data, start, samples, spare)
     while under_way.rounds < ROUNDS:
@@ -217,7 +216,7 @@ def shorten_path(
 
 
 def evenly(way: Floats, count: int) -> Floats:
-    """Waypoints (count, 3) at equal distances along a way (k, 3).
+    """Waypoints (count, 3) at equal distances along a route (k, 3).
 
     >>> evenly(np.array([[0.0, 0.0, 5.0], [30.0, 40.0, 5.0], [30.0, 90.0, 5.0]]), 5).tolist()
     [[0.0, 0.0, 5.0], [15.0, 20.0, 5.0], [30.0, 40.0, 5.0], [30.0, 65.0, 5.0], [30.0, 90.0, 5.0]]

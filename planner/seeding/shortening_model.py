@@ -1,10 +1,11 @@
-"""A path's length under its constraints, with derivatives: what `planner.seeding.shortening` steps down.
+"""Augmented Lagrangian of a path's length, with gradient and Hessian, which `planner.seeding.shortening` minimises.
 
-The augmented Lagrangian of Hestenes and Powell in the form for inequalities of Rockafellar ("The multiplier method of
+The method of multipliers of Hestenes and Powell, in the form for inequalities of Rockafellar ("The multiplier method of
 Hestenes and Powell applied to convex programming", Journal of Optimization Theory and Applications 12, 1973): a
-constraint c >= 0 of multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
-The constraints' own curvature is left out of the Hessian; a constraint binds four waypoints in a row at most, so that
-it is a band.
+constraint c >= 0 with multiplier m adds (max(0, m - p c)^2 - m^2) / 2 p to the length, and m becomes max(0, m - p c).
+Constraints are distances from missiles, heights above ground, slopes, turns, and lengths of legs against their turns.
+Their coefficients are computed once per round (`Bindings`). The curvature of the constraints is left out of the
+Hessian; a constraint couples at most four consecutive waypoints, so the Hessian is banded.
 """
 
 import math
@@ -36,24 +37,23 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
-# ----------------------------------------------------------------------
-# What constrains a path near where it is: missiles, the ground, slopes and turns, as shortening takes them.
+# --- Active constraints of a round ---
 
 
-# Spheres are constraints of the legs that come so near their surface, m.
+# A sphere constrains the legs that come within this distance of its surface, m.
 NEAR = 250.0
-# Least turn, rad, that what a turn takes of its legs is measured at; the greatest counts as this, whose half's tangent
-# is large enough; and the most that a turn takes of a leg, m.
+# Turns below the minimum are measured at it; above the maximum the tangent of half the turn is taken at the maximum
+# (rad). LONGEST_NEED: upper limit on the length that a turn takes of a leg, m.
 LEAST_TURN, GREATEST_TURN, LONGEST_NEED = 0.2, 3.0, 1e4
 
 
 class Bindings(NamedTuple):
-    """What constrains a path of w waypoints in one round, as seen where the round began.
+    """Active constraints of a path of w waypoints in one round, linearised at the path with which the round began.
 
-    pairs: (p, 2) a leg and the missile near it; wide: (p,) distance (m) wanted of its middle.
-    samples: of the ground on each leg; low: (w - 1,) m wanted above it beside the clearance.
-    climb, dive: (w - 1,) tangents.  before, after: (w,) length of the legs (m) that a turn takes, over the tangent of
-    half of it.  roll: (w - 1,) m of a leg between turns of opposite sides.
+    pairs: (p, 2) leg and missile near it. wide: (p,) required distance (m) from the missile's centre.
+    samples: number of ground samples on each leg. low: (w - 1,) height required above the clearance, m.
+    climb, dive: (w - 1,) tangents. before, after: (w,) length of the legs (m) that a turn takes, divided by the tangent
+    of half the turn. roll: (w - 1,) length of a leg taken by the roll between turns to opposite sides, m.
     turns_in_legs: whether legs must hold their turns.
     """
 
@@ -71,7 +71,7 @@ class Bindings(NamedTuple):
 
 @compiled
 def bindings(data: ProblemArrays, path: Floats, samples: int, spare: float) -> Bindings:  # pragma: no cover - compiled
-    """What constrains a path (w, 3) near where it is; spare: m by which spheres and ground are kept further away."""
+    """Active constraints near a path (w, 3); spare: additional margin to spheres and ground, m."""
     limits = precompute_limits(data)
     count = path.shape[0] - 1
     legs, corners, lags = np.zeros(count, dtype=LEG), np.zeros(count + 1, dtype=CORNER), np.zeros(count, HEIGHT_LAG)
@@ -98,7 +98,7 @@ def bindings(data: ProblemArrays, path: Floats, samples: int, spare: float) -> B
 def _turn_shares(
     data: ProblemArrays, limits: PrecomputedLimits, path: Floats, legs: Records, before: Floats, after: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Fill what turns take of the legs before and after them, over the tangents of half of them, (w,)."""
+    """Fill the lengths that turns take of the legs before and after them, over the tangent of half the turn, (w,)."""
     corners = np.zeros(1, dtype=CORNER)
     for i in range(path.shape[0]):
         ux, uy, vx, vy = courses_at(data, legs, i)
@@ -121,7 +121,7 @@ def _turn_shares(
 def _near_missiles(
     data: ProblemArrays, path: Floats, corners: Records, lags: Records, spare: float
 ) -> tuple[Ints, Floats]:  # pragma: no cover - compiled
-    """Legs and the missiles near them (p, 2), and the distances (p,) wanted from the middles of these, m."""
+    """Legs and the missiles near them (p, 2), and the distances (p,) required from the missiles' centres, m."""
     missiles = data.missiles.missiles
     pairs, wide = [(0, 0) for _ in range(0)], [0.0 for _ in range(0)]
     for k in range(missiles.shape[0]):
@@ -152,7 +152,7 @@ def _near_missiles(
 
 @compiled
 def constraints_of(bound: Bindings) -> int:  # pragma: no cover - compiled
-    """How many constraints `lagrangian` has."""
+    """Number of constraints of `lagrangian`."""
     legs = bound.low.size
     count: int = bound.pairs.shape[0] + legs * (bound.samples + 4) + legs + 1
     return count
@@ -160,12 +160,12 @@ def constraints_of(bound: Bindings) -> int:  # pragma: no cover - compiled
 
 @compiled
 def carried(old: Bindings, multipliers: Floats, new: Bindings) -> Floats:  # pragma: no cover - compiled
-    """Multipliers for new bindings: those of the pairs of leg and missile that were there, and of all that has none."""
+    """Multipliers for new active constraints; those of new pairs of leg and missile start at 0."""
     out, many, before = np.zeros(constraints_of(new)), new.pairs.shape[0], old.pairs.shape[0]
     out[many:] = multipliers[before:]
     k = 0
     for p in range(many):
-        # Both are in the order of missiles, and of legs.
+        # Both are sorted by missile and leg.
         while k < before and (
             old.pairs[k, 1] < new.pairs[p, 1]
             or (old.pairs[k, 1] == new.pairs[p, 1] and old.pairs[k, 0] < new.pairs[p, 0])
@@ -176,21 +176,22 @@ def carried(old: Bindings, multipliers: Floats, new: Bindings) -> Floats:  # pra
     return out
 
 
-# Variables that one constraint binds at most, which is the Hessian's half band: three of each of four waypoints.
+# --- The model ---
+
+# Half bandwidth of the Hessian: three coordinates of each of the four waypoints that a constraint couples.
 BAND = 12
-# Length that a rad of turn counts as, m.
+# Scale of turn constraints, m per rad.
 TURN_LENGTH = 200.0
-# Shortest leg, m: a little more than the scores ask for.
+# Shortest leg, m: slightly more than the scores require.
 SHORTEST_LEG = 15.0
-# Height by which a leg is less steep than it may be, and length that it has left between its turns, m: what the last
-# steps leave undecided.
+# Additional margin of slopes (m of height) and of leg lengths between turns, m: the accuracy that the last steps reach.
 LEVEL_SPARE, TURN_SPARE = 0.2, 1.0
-# Half the way over which the ground's slope is taken, m.
+# Half-step of the finite difference for the ground's slope, m.
 GROUND_STEP = 8.0
 
 
 class LagrangianModel(NamedTuple):
-    """Gradient (n,) and band (n, BAND) of the Hessian of a path's inner waypoints; a constraint's slopes (4, 3)."""
+    """Gradient (n,) and Hessian band (n, BAND) over the inner waypoints; and derivatives (4, 3) of one constraint."""
 
     gradient: Floats
     band: Floats
@@ -201,9 +202,9 @@ class LagrangianModel(NamedTuple):
 def _add(
     value: float, first: int, points: int, multiplier: float, penalty: float, model: LagrangianModel
 ) -> float:  # pragma: no cover - compiled
-    """Add a constraint on so many waypoints from the `first` to the model; what it adds to the merit.
+    """Add a constraint on `points` waypoints from waypoint `first` to the model; returns its contribution to the merit.
 
-    Its slopes with respect to them stand in `model.slopes`.
+    Its derivatives with respect to these waypoints are in `model.slopes`.
     """
     push = multiplier - penalty * value
     if not push > 0.0:
@@ -221,7 +222,7 @@ def _add(
 
 @compiled
 def _add_length(path: Floats, model: LagrangianModel) -> float:  # pragma: no cover - compiled
-    """Add the path's length to the model; the length, m."""
+    """Add the path's length to the model; returns the length, m."""
     total, size, unit = 0.0, model.gradient.size, np.empty(3)
     for i in range(path.shape[0] - 1):
         length = 0.0
@@ -259,7 +260,7 @@ def _add_missiles(
     penalty: float,
     model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
-    """Add the distances of legs to missiles; what they add to the merit.  They are the first of the constraints."""
+    """Add the distances of legs from missiles, the first constraints; returns their contribution to the merit."""
     merit, slopes, missiles = 0.0, model.slopes, data.missiles.missiles
     for p in range(bound.pairs.shape[0]):
         i, missile = bound.pairs[p, 0], missiles[bound.pairs[p, 1]]
@@ -291,7 +292,7 @@ def _add_ground(
     model: LagrangianModel,
     at: int,
 ) -> float:  # pragma: no cover - compiled
-    """Add the heights of samples of the legs above what is required, constraints from `at`; see `_add_missiles`."""
+    """Add the heights of leg samples above the required height, constraints from `at`; see `_add_missiles`."""
     merit, slopes, heights, to_pixel = 0.0, model.slopes, data.heights, data.to_pixel
     for i in range(path.shape[0] - 1):
         for k in range(bound.samples):
@@ -327,7 +328,7 @@ def _add_ground(
 def _add_slopes(
     bound: Bindings, path: Floats, multipliers: Floats, values: Floats, penalty: float, model: LagrangianModel, at: int
 ) -> float:  # pragma: no cover - compiled
-    """Add what legs are less steep than allowed, m of height, and longer than the shortest; see `_add_missiles`."""
+    """Add slope margins of legs, as m of height, and lengths above the shortest leg; see `_add_missiles`."""
     merit, slopes = 0.0, model.slopes
     for i in range(path.shape[0] - 1):
         dx, dy, rise = path[i + 1, 0] - path[i, 0], path[i + 1, 1] - path[i, 1], path[i + 1, 2] - path[i, 2]
@@ -356,7 +357,7 @@ def _add_turns(
     model: LagrangianModel,
     at: int,
 ) -> float:  # pragma: no cover - compiled
-    """Add what turns are less than allowed, and what legs have left between theirs; see `_add_missiles`."""
+    """Add turn margins, and lengths of legs that their turns leave over; see `_add_missiles`."""
     merit, slopes, count = 0.0, model.slopes, path.shape[0] - 1
     turn, of_before, of_after = np.zeros(count + 1), np.zeros((count + 1, 2)), np.zeros((count + 1, 2))
     for i in range(count + 1):
@@ -399,7 +400,7 @@ def _add_turns(
 def _turn_slopes(
     of_before: Floats, of_after: Floats, factor: float, slopes: Floats
 ) -> None:  # pragma: no cover - compiled
-    """Add a factor times the slopes of a turn, by the legs before and after it, to those of its waypoints (3, 3)."""
+    """Add a factor times the derivatives of a turn, by its legs before and after, to its waypoints (3, 3)."""
     for axis in range(2):
         slopes[0, axis] -= factor * of_before[axis]
         slopes[1, axis] += factor * (of_before[axis] - of_after[axis])
@@ -417,7 +418,7 @@ def lagrangian(
     penalty: float,
     model: LagrangianModel,
 ) -> float:  # pragma: no cover - compiled
-    """The augmented length of a path (w, 3), m; fills the constraints' values and the model."""
+    """Augmented length of a path (w, 3), m; fills the constraints' values and the model."""
     model.gradient[:], model.band[:] = 0.0, 0.0
     at = bound.pairs.shape[0]
     merit = _add_length(path, model)

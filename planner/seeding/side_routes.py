@@ -1,4 +1,9 @@
-"""Routes that pass obstacles on other sides than the cheapest does: one of each choice of sides, cheapest first."""
+"""Routes that pass obstacles on other sides than the cheapest route: one per choice of sides, cheapest first.
+
+Two passes of dynamic programming over the same grid, from the start and from the destination, meet in every cell, and
+the sum of their costs is the cost of the cheapest route through it. The smallest sum to the left of an obstacle belongs
+to the cheapest of all routes that pass it on the left; the same two passes give this for every obstacle and side.
+"""
 
 import math
 from typing import NamedTuple
@@ -31,17 +36,12 @@ Codes = NDArray[np.int32]
 Ints = NDArray[np.int64]
 
 
-# ----------------------------------------------------------------------
-# What routes over a grid cost that pass each obstacle on each of its sides: the compiled part of side routes.
-#
-# Two dynamic programmes over the same grid, from the start and from the destination, meet in every cell: their sum is
-# the cost of the cheapest route through it.  The least sum to the left of an obstacle belongs to the cheapest of all
-# routes that pass it on the left, and so for every obstacle and side, of the same two programmes.
+# --- Costs of passing each obstacle on each side ---
 
 
-# Sides on which a route passes an obstacle, by the quarter of directions about its middle.
+# Sides on which a route passes an obstacle: quadrants around its centre.
 LEFT, RIGHT, OVER, UNDER = range(4)
-# The cheapest way past an obstacle on one side: its cost (inf for none), and the cell through which it leads.
+# The cheapest route past an obstacle on one side: its cost (inf for none) and the cell through which it passes.
 PASSING = np.dtype(
     [("cost", np.float64), ("stage", np.int64), ("layer", np.int64), ("across", np.int64)],
     align=True,
@@ -49,10 +49,10 @@ PASSING = np.dtype(
 
 
 class GridCosts(NamedTuple):
-    """Costs of the cheapest ways over a grid, (stages + 1, layers, across), inf where none is within the bound.
+    """Costs of the cheapest partial routes over a grid, (stages + 1, layers, across); inf if none is within the bound.
 
-    reached: from the start, and came: the cell before, as layer x places across + across.
-    left: to the destination, and went: the cell after.
+    reached: from the start; came: the previous cell, as layer x width + across.
+    left: to the destination; went: the next cell.
     """
 
     reached: Floats
@@ -97,7 +97,7 @@ def _step_back(
 
 @compiled
 def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> None:  # pragma: no cover - compiled
-    """Drop cells (layers, across) of one stage through which no way is within the bound."""
+    """Drop cells (layers, across) of one stage through which no route is within the bound."""
     for z in range(reached.shape[0]):
         for y in range(spans[z].first, spans[z].last + 1):
             if not reached[z, y] + left[z, y] <= bound:
@@ -108,7 +108,7 @@ def _bounded(reached: Floats, left: Floats, spans: Records, bound: float) -> Non
 def grid_costs(
     data: ProblemArrays, frame: RotatedFrame, grid: Grid, bound: float
 ) -> GridCosts:  # pragma: no cover - compiled
-    """Costs of the cheapest ways over a grid, from its start and to its destination, up to a bound."""
+    """Costs of the cheapest partial routes over a grid, from its start and to its destination, up to a bound."""
     stages, wide, high = grid.stages, grid.across.size, grid.layers.size
     step = frame.length / stages
     pitch = grid.layers[1] - grid.layers[0] if high > 1 else 1.0
@@ -147,7 +147,7 @@ def grid_costs(
 
 @inlined
 def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
-    """Side on which a place is that is so far to the left of an obstacle's middle and above it."""
+    """Side of a point given its offsets to the left of an obstacle's centre and above it."""
     if abs(aside) >= abs(above):
         return LEFT if aside >= 0.0 else RIGHT
     return OVER if above > 0.0 else UNDER
@@ -157,9 +157,9 @@ def side_of(aside: float, above: float) -> int:  # pragma: no cover - compiled
 def cheapest_passings(
     costs: GridCosts, grid: Grid, obstacles: Records, step: float
 ) -> Records:  # pragma: no cover - compiled
-    """`PASSING` records (obstacles, 4) of the cheapest way past each `OBSTACLE` on each side, by `side_of`.
+    """`PASSING` records (obstacles, 4) of the cheapest route past each `OBSTACLE` on each side, by `side_of`.
 
-    A route passes an obstacle at the stage nearest to its middle; there is none of one beyond the ends.
+    A route passes an obstacle at the stage nearest to its centre; obstacles beyond the ends have none.
     """
     out = np.zeros((obstacles.shape[0], 4), dtype=PASSING)
     for k in range(obstacles.shape[0]):
@@ -192,15 +192,17 @@ def route_through(costs: GridCosts, stage: int, layer: int, across: int) -> Reco
     return cells
 
 
-# Routes that are nearer to each other than this on average, across, are one way: m.
+# --- Routes of different sides ---
+
+# Routes with a mean lateral distance below this are the same route, m.
 SAME_WAY = 100.0
 
 
 def sides_passed(points: Floats, obstacles: Records) -> Ints:
     """Sides (k,) on which a route's points (s, 3) along, across, up pass `OBSTACLE` records; -1 beyond its ends.
 
-    Two routes of the same sides can be bent into each other without touching an obstacle; it is taken that others
-    cannot, though a way over a sphere on the ground can be bent to either side.
+    Routes with the same sides can be deformed into each other without touching an obstacle. Routes with different sides
+    are assumed not to be, although a route over a sphere on the ground can be moved to either side.
     """
     step = points[1, 0] - points[0, 0]
     stages = np.rint(obstacles["along"] / step).astype(np.int64)
@@ -219,10 +221,10 @@ def side_routes(
     bound: float,
     most: int,
 ) -> list[GridRoute]:
-    """Up to `most` routes of different sides, cheapest first, that cost at most `bound`.
+    """Up to `most` routes with different sides and a cost of at most `bound`, cheapest first.
 
-    Each is the cheapest that passes one obstacle on one side; the first is the cheapest of all.  Of routes that lie
-    near each other only the cheapest is kept.
+    Each is the cheapest that passes one obstacle on one side; the first is the cheapest of all. Of routes close to each
+    other only the cheapest is returned.
     """
     if grid.layers.size == 0:
         return []
@@ -259,7 +261,7 @@ def optimistic_grid(
     spread: float,
     ratio: float,
 ) -> Grid:
-    """A grid that sees kill spheres smaller, and less of the ground about a cell, than they are: see `Grid`.
+    """A grid with reduced kill spheres and ground taken from a smaller area around each cell: see `Grid`.
 
     Its highest layer is the ceiling, where spheres on the ground are smallest.
     """

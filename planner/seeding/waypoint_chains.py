@@ -1,9 +1,9 @@
-"""The best path through each of many waypoints: candidates of each interval, joined by a dynamic programme over legs.
+"""The best path through each of many candidate waypoints, joined by dynamic programming over legs.
 
-A path's length and most of its violations are sums over its legs, so that the best of all combinations of candidates,
-one an interval, is found without trying them: forward from the start and backward from the destination, as messages
+A path's length and most of its violations are sums over its legs, so the best of all combinations of candidates, one
+per interval, is found without enumerating them: forward from the start and backward from the destination, as messages
 along a chain (Pearl, "Probabilistic Reasoning in Intelligent Systems", 1988, section 4.3: max-product on a chain).
-Turns join two legs; each is priced where the best way so far makes it, which is near enough to choose by.
+Turns depend on two legs; each is priced on the best partial path so far, which is an approximation.
 """
 
 import math
@@ -26,20 +26,20 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Flags = NDArray[np.bool_]
 
-# Cost, in m of path, of a rad by which a turn is too sharp, or of 100 m that a leg is too short for it.
+# Cost, in m of path, per rad above the turn limit, or per 100 m by which a leg is too short for its turn.
 TURN_COST = 2e4
-# Of a leg, what each of its two turns may take.
+# Share of a leg that each of its two turns may take.
 TURN_SHARE = 0.475
-# A leg that is not evaluated yet.
+# Cost of a leg that is not evaluated yet.
 UNKNOWN = -1.0
-# Legs that are evaluated before the caller may end the work: some 20 ms at most, on a slow processor.
+# Legs evaluated between two calls of `pause`: at most some 20 ms on a slow processor.
 LEGS_AT_ONCE = 2_500
-# How far the work is: direction, waypoint and candidate that comes next, and legs evaluated.
+# Progress: direction, next waypoint and candidate, and number of legs evaluated.
 _CURSOR = np.dtype([(name, np.int64) for name in ("step", "waypoint", "candidate", "legs")])
 
 
 class _Sweeps(NamedTuple):
-    """Costs (w, k) of the best partial paths from the start and from the destination, and where each comes from."""
+    """Costs (w, k) of the best partial paths from both ends, and the neighbouring candidate of each."""
 
     forward: Floats
     before: Ints
@@ -48,11 +48,11 @@ class _Sweeps(NamedTuple):
 
 
 class WaypointChains(NamedTuple):
-    """What is found of candidates (w, k).
+    """Best paths through candidates (w, k).
 
-    cost: of the best path through each, in m of path; inf where none is within the bound.
-    before, after: (w, k) the candidates before and after each on that path.
-    legs: how many were evaluated.
+    cost: of the best path through each, in m of path; inf if none is within the bound.
+    before, after: (w, k) previous and next candidate on that path.
+    legs: number of legs evaluated.
     """
 
     cost: Floats
@@ -74,10 +74,10 @@ class WaypointChains(NamedTuple):
 def waypoint_chains(
     data: ProblemArrays, candidates: Floats, bound: float, pause: Callable[[], None] = lambda: None
 ) -> WaypointChains:
-    """Best paths through candidates (w, k, 3) world m; of the ends only the first counts.
+    """Best paths through candidates (w, k, 3) world m; of the ends only the first candidate is used.
 
-    bound: the most that a path may cost, m; what cannot be part of one is left out, which is faster.  pause: called
-    after every `LEGS_AT_ONCE` legs; what it raises ends the work.
+    bound: upper limit on the cost of a path, m; pruning by it saves time. pause: called after every `LEGS_AT_ONCE`
+    legs; an exception raised there stops the work.
     """
     count, wide, _ = candidates.shape
     legs = np.full((count - 1, wide, wide), UNKNOWN)
@@ -95,9 +95,9 @@ def waypoint_chains(
 def _advance(
     data: ProblemArrays, candidates: Floats, legs: Floats, bound: float, sweeps: _Sweeps, cursor: Records, most: int
 ) -> bool:  # pragma: no cover - compiled
-    """Go on from the cursor until so many legs are evaluated; whether all is done.
+    """Continue from the cursor until `most` legs have been evaluated; returns whether all is done.
 
-    legs: (w - 1, k, k) costs, to fill in as they are asked for.  cursor: a `_CURSOR` record (1,).
+    legs: (w - 1, k, k) costs, filled on demand. cursor: a `_CURSOR` record (1,).
     """
     count, wide, _ = candidates.shape
     limits, corners = precompute_limits(data), np.zeros(1, dtype=CORNER)
@@ -111,7 +111,7 @@ def _advance(
             if at.legs - begun >= most:
                 return False
             k = at.candidate
-            # What the rest of a path through this one costs, at least.
+            # Lower bound on the cost of the rest of a path through this candidate.
             rest = _distance(candidates[i, k], candidates[-1][0]) if step > 0 else sweeps.forward[i, k]
             at.legs += _extend(
                 data, limits, candidates, i, k, step, cost, link, bound - rest, legs, open_ends, least, corners
@@ -156,20 +156,20 @@ def _extend(
     least: Floats,
     corners: Records,
 ) -> int:  # pragma: no cover - compiled
-    """Take costs (w, k) of partial paths on to a candidate of waypoint i; legs evaluated.
+    """Extend partial paths with costs (w, k) to candidate k of waypoint i; returns the number of legs evaluated.
 
-    step: 1 for paths from the start, -1 for paths from the destination.  link: (w, k) the candidate that each partial
-    path comes from.  most: what a partial path may cost there.  open_ends: candidates before that have partial paths.
+    step: 1 for paths from the start, -1 from the destination. link: (w, k) neighbouring candidate of each partial path.
+    most: upper limit on the cost of a partial path. open_ends: candidates of the previous waypoint with partial paths.
     least, corners: scratch.
     """
     last, evaluated, here = i - step, 0, candidates[i, k]
     if not most > 0.0 or open_ends.size == 0:
         return 0
     for m in range(open_ends.size):
-        # No leg costs less than its length.
+        # A leg costs at least its length.
         least[m] = cost[last, open_ends[m]] + _distance(candidates[last, open_ends[m]], here)
     while True:
-        # The most promising first: the first without violations ends it.
+        # Best lower bound first: a leg without violations ends the search.
         m = _lowest(least, open_ends.size)
         j, cheapest = open_ends[m], least[m]
         if not cheapest < min(cost[i, k], most):
@@ -195,7 +195,7 @@ def _extend(
 
 @inlined
 def _lowest(values: Floats, count: int) -> int:  # pragma: no cover - compiled
-    """Where the lowest of the first values stands."""
+    """Index of the lowest of the first `count` values."""
     lowest = 0
     for k in range(1, count):
         lowest = k if values[k] < values[lowest] else lowest
@@ -211,7 +211,7 @@ def _distance(a: Floats, b: Floats) -> float:  # pragma: no cover - compiled
 def _corner_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats, c: Floats, corners: Records
 ) -> float:  # pragma: no cover - compiled
-    """Cost of the turn at b between a and c: of what it exceeds the limit by, and of what its legs are too short by.
+    """Cost of the turn at b between a and c: its excess over the limit, and the lack of leg length for it.
 
     corners: scratch, one record.
     """
@@ -234,7 +234,7 @@ def _corner_cost(
 
 @compiled
 def open_places(data: ProblemArrays, places: Floats) -> Flags:  # pragma: no cover - compiled
-    """Whether places (n, 3), world m, are on the map, high enough above the ground and outside all kill spheres, (n,).
+    """Whether points (n, 3), world m, are on the map, above the required clearance and outside all kill spheres, (n,).
 
     >>> from planfly.airframe import load_airframe
     >>> from planner.evaluation.problem import make_problem
@@ -252,7 +252,7 @@ def open_places(data: ProblemArrays, places: Floats) -> Flags:  # pragma: no cov
         if not (data.west <= x <= data.east and data.south <= y <= data.north):
             continue
         column, row = polymap(data.to_pixel, x, y)
-        # Written so that NaN is not open.
+        # This form treats NaN as not free.
         if not z > pixel_height(data.heights, column, row) + clearance_at(required, x, y):
             continue
         dose, _, _ = kill_density(data.missiles, data.kill_margin, 0.0, x, y, z, x, y, z, 0.0, 0.0, 0.0, 0.0)

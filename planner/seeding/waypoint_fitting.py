@@ -1,4 +1,9 @@
-"""Waypoints along a grid's route: a dynamic programme over places near it, in which whole legs are evaluated."""
+"""Waypoints along a route: dynamic programming over candidate points near it, with evaluation of whole legs.
+
+`fit_points` chooses one candidate per interval so that the sum of leg costs is smallest, then repeats this with
+candidates around each chosen waypoint and shrinking moves. `tighten` applies the same moves to a path of the rotated
+encoding. Turns are not part of the cost.
+"""
 
 import math
 from dataclasses import dataclass
@@ -19,7 +24,7 @@ from world.kernels import compiled
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-# Cost of a m of depth x km, and of a unit of slope excess, in m of path.
+# Cost of depth (per m x km) and of slope excess (per unit), in m of path.
 DEPTH_COST = 2e4
 SLOPE_COST = 1e6
 
@@ -28,7 +33,7 @@ SLOPE_COST = 1e6
 def leg_cost(
     data: ProblemArrays, limits: PrecomputedLimits, a: Floats, b: Floats
 ) -> float:  # pragma: no cover - compiled
-    """Cost of one leg, in m of path: its length and what it violates."""
+    """Cost of one leg, in m of path: its length and its violations."""
     dx, dy = b[0] - a[0], b[1] - a[1]
     run = math.sqrt(dx * dx + dy * dy)
     length = math.sqrt(dx * dx + dy * dy + (b[2] - a[2]) ** 2)
@@ -66,7 +71,7 @@ def leg_cost(
 def _below(
     data: ProblemArrays, limits: PrecomputedLimits, east: float, north: float, run: float, low: float, high: float
 ) -> float:  # pragma: no cover - compiled
-    """How far an autopilot is below a leg at most that is long, m; negative above.  east, north: its unit course."""
+    """Largest distance of the aircraft below a long leg, m; negative above. east, north: its unit course."""
     rise = high - low
     if abs(rise) < data.tracking.step:
         return -rise
@@ -76,7 +81,7 @@ def _below(
 
 @compiled
 def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pragma: no cover - compiled
-    """Which of the candidates (w, c, 3) to take at each waypoint, so that the legs cost least; legs evaluated."""
+    """Candidates (w, c, 3) chosen at each waypoint to minimise the sum of leg costs; number of legs evaluated."""
     count, width, _ = candidates.shape
     came = np.zeros((count, width), dtype=np.int64)
     cost = np.full(width, np.inf)
@@ -89,9 +94,9 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pra
             b = candidates[i, k]
             for j in range(width):
                 a = candidates[i - 1, j]
-                # No leg costs less than its length.
+                # A leg costs at least its length.
                 least[j] = cost[j] + math.sqrt((b[0] - a[0]) ** 2 + (b[1] - a[1]) ** 2 + (b[2] - a[2]) ** 2)
-            # The most promising first: the first without violations ends it.
+            # Best lower bound first: a leg without violations ends the search.
             while True:
                 j = int(np.argmin(least))
                 if least[j] >= after[k]:
@@ -111,12 +116,12 @@ def _choose(data: ProblemArrays, candidates: Floats) -> tuple[Ints, int]:  # pra
 
 @dataclass(frozen=True, slots=True)
 class WaypointFit:
-    """How closely waypoints are fitted to a route.
+    """Effort of fitting waypoints to a route.
 
-    places: along each interval.
-    lifts: m above the route.
+    places: candidate points along each interval.
+    lifts: heights above the route, m.
     rounds: of moves of each waypoint.
-    diagonal: whether moves are to the 26 places around it, not the 6 beside it.
+    diagonal: whether moves lead to all 26 neighbours, not just the 6 along the axes.
     """
 
     places: int
@@ -125,10 +130,10 @@ class WaypointFit:
     diagonal: bool
 
 
-# First moves of a waypoint: shares of the interval along and across, and m up; and what is left of them each round.
+# Initial moves of a waypoint: shares of the interval along and across, and m up; and their reduction per round.
 FIRST_MOVES, SHRINK, LAST_SHRINK = (0.25, 0.2, 40.0), 0.7, 0.6
 CLOSE, QUICK = WaypointFit(9, (0.0, 20.0, 60.0), 2, diagonal=True), WaypointFit(5, (0.0, 20.0, 60.0), 2, diagonal=False)
-# Steps to the places around a place, and to itself, along, across and up.
+# Steps to the 26 neighbours and to the point itself, along, across and up.
 _AROUND = np.array(list(product((-1.0, 0.0, 1.0), repeat=3)))
 _BESIDE = _AROUND[np.abs(_AROUND).sum(axis=1) <= 1.0]
 
@@ -136,7 +141,7 @@ _BESIDE = _AROUND[np.abs(_AROUND).sum(axis=1) <= 1.0]
 def fit_waypoints(
     data: ProblemArrays, frame: RotatedFrame, route: Floats, waypoints: int, fit: WaypointFit = CLOSE
 ) -> Floats:
-    """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one an interval, tight as whole legs allow."""
+    """Waypoints (w, 3) world m along a route (s, 3) in rotated axes, one per interval, chosen by whole legs."""
     edges = np.linspace(0.0, frame.length, waypoints - 1)
     span = edges[1] - edges[0]
     shares = np.linspace(0.1, 0.9, fit.places)
@@ -146,7 +151,7 @@ def fit_waypoints(
 
 
 def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit: WaypointFit = CLOSE) -> Floats:
-    """Waypoints (w, 3) world m, each at one of its places (w - 2, places, 3) in its frame, then moved about there."""
+    """Waypoints (w, 3) world m: each one of its candidates (w - 2, places, 3) in its frame, then moved locally."""
     inner, places, _ = points.shape
     candidates = np.zeros((inner + 2, places * len(fit.lifts), 3))
     candidates[1:-1] = np.tile(points, (1, len(fit.lifts), 1))
@@ -158,10 +163,10 @@ def fit_points(data: ProblemArrays, frames: WaypointFrames, points: Floats, fit:
 
 
 def tighten(data: ProblemArrays, encoding: Encoding, vector: Floats, rounds: int, scale: float) -> tuple[Floats, int]:
-    """Shorten a path of the rotated encoding by moves of all its waypoints at once, legs evaluated one by one.
+    """Shorten a path of the rotated encoding by moves of all its waypoints at once, evaluating single legs.
 
-    vector: (d,).  scale: of the first moves, to `FIRST_MOVES`.  Turns are not evaluated.  Returns the new vector, and
-    as many evaluations as its evaluated legs would make paths.
+    vector: (d,). scale: of the initial moves, relative to `FIRST_MOVES`. Turns are not evaluated. Returns the new
+    vector and the equivalent number of path evaluations.
     """
     frames = frames_of(encoding)
     path = np.zeros((encoding.waypoints, 3))
@@ -179,7 +184,7 @@ def _moved(
     moves: Floats,
     shrink: float,
 ) -> tuple[Floats, int]:
-    """Waypoints (w, 3) in their frames after rounds of moves of up to `moves` along, across and up; legs evaluated."""
+    """Waypoints (w, 3) in their frames after rounds of moves of up to `moves` along, across, up; legs evaluated."""
     legs = 0
     low, high = frames.edges[:-1, None], frames.edges[1:, None]
     span = frames.edges[-1] / (len(chosen) - 2)
@@ -196,7 +201,7 @@ def _moved(
 
 
 def _pick(data: ProblemArrays, frames: WaypointFrames, candidates: Floats) -> tuple[Floats, int]:
-    """Chosen candidates (w, 3), in their frames, the ends fixed; and how many legs were evaluated."""
+    """Chosen candidates (w, 3) in their frames, with fixed ends; number of legs evaluated."""
     count = len(candidates) - 2
     # An end has the frame of the waypoint next to it.
     for end, place, inner in ((0, data.start, 0), (-1, data.destination, count - 1)):
