@@ -21,23 +21,15 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from flight.simulation.setup import FieldSource, FlightSetup, make_limits
 from logs.recording.setup_schema import (
-    EnvelopeFile,
+    EnvelopeTable,
     Finite,
-    MissionFile,
-    ParametersFile,
-    ProgramFile,
-    RouteFile,
+    MissionTable,
+    ParametersTable,
+    ProgramTable,
+    RouteTable,
     SetupModel,
-    envelope_file,
-    mission_file,
-    parameters_file,
-    program_file,
-    read_envelope,
-    read_mission_table,
+    parameters_table,
     read_parameters,
-    read_program,
-    read_route,
-    route_file,
 )
 from planner.plan import Plan, parse_plan, plan_json
 from world.errors import LogError, PlanflyError
@@ -225,6 +217,7 @@ _PACKAGES = (
 
 
 class _Setup(SetupModel):
+    model_config = ConfigDict(validate_by_name=True, validate_by_alias=True)
     file_schema: Annotated[str, Field(alias="schema", pattern=f"^{LOG_SCHEMA}$")] = LOG_SCHEMA
     aircraft: str
     airspeed_mps: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
@@ -236,12 +229,12 @@ class _Setup(SetupModel):
     nav: Navigation
     guidance_hz: Literal[30, 60]
     fdm_hz: Literal[60, 120] = 120  # a log of before it could be chosen
-    parameters: ParametersFile | None = None  # a log of before there were any was flown by planfly's guidance
-    program: ProgramFile | None = None
+    parameters: ParametersTable | None = None  # a log of before there were any was flown by planfly's guidance
+    program: ProgramTable | None = None
     source: FieldSource | None = None
-    mission: MissionFile
-    route: RouteFile
-    envelope: EnvelopeFile
+    mission: MissionTable
+    route: RouteTable
+    envelope: EnvelopeTable
     versions: dict[str, str]
     sha256: dict[str, str]
 
@@ -303,12 +296,12 @@ def pack_setup(setup: FlightSetup) -> dict[str, bytes]:
         nav=setup.nav,
         guidance_hz=setup.guidance_hz,
         fdm_hz=setup.fdm_hz,
-        parameters=None if setup.parameters is None else parameters_file(setup.parameters),
-        program=None if setup.program is None else program_file(setup.program),
+        parameters=None if setup.parameters is None else parameters_table(setup.parameters),
+        program=None if setup.program is None else ProgramTable.of(setup.program),
         source=setup.source,
-        mission=mission_file(setup.mission),
-        route=route_file(setup.route),
-        envelope=envelope_file(setup.envelope),
+        mission=MissionTable.of(setup.mission),
+        route=RouteTable.of(setup.route),
+        envelope=EnvelopeTable.of(setup.envelope),
         versions=package_versions(),
         sha256={name: hashlib.sha256(data).hexdigest() for name, data in attachments.items()},
     )
@@ -338,12 +331,13 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
     listed = {name: attachments[name] for name in file.sha256}
     terrain = unpack_terrain(listed, source) if TERRAIN_FILE in listed else None
     scenario = _scenario(listed, source, terrain, file.external)
-    envelope = read_envelope(file.envelope, f"{source}: {SETUP_FILE}")
+    where = f"{source}: {SETUP_FILE}"
+    envelope = file.envelope.envelope(where)
     setup = FlightSetup(
         scenario=scenario,
-        mission=read_mission_table(file.mission),
+        mission=file.mission.mission(),
         mission_text=_text(listed, MISSION_FILE, source),
-        route=read_route(file.route, f"{source}: {SETUP_FILE}"),
+        route=file.route.route(where),
         limits=make_limits(scenario, envelope, file.airspeed_mps, file.max_bank_rad),
         aircraft=file.aircraft,
         battery=file.battery_wh,
@@ -353,8 +347,8 @@ def unpack_setup(attachments: dict[str, bytes], source: str) -> StoredSetup:
         nav=file.nav,
         guidance_hz=file.guidance_hz,
         fdm_hz=file.fdm_hz,
-        parameters=None if file.parameters is None else read_parameters(file.parameters, f"{source}: {SETUP_FILE}"),
-        program=None if file.program is None else read_program(file.program),
+        parameters=None if file.parameters is None else read_parameters(file.parameters, where),
+        program=None if file.program is None else file.program.program(),
         source=file.source,
     )
     return StoredSetup(setup, file.versions)

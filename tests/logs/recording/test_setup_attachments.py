@@ -164,6 +164,13 @@ def altered(setup: FlightSetup, change: Callable[[dict[str, Any]], None]) -> Att
         (lambda data: data["route"].update(waypoints_east_north_amsl_m=[[0.0, 0.0, 9.0]] * 4), "without horizontal"),
         (lambda data: data["envelope"]["climb_rad"].pop(), r"envelope\.climb_rad: shape \[2, 2\]: \[3, 2\]"),
         (lambda data: data["envelope"]["climb_rad"][0].pop(), r"envelope\.climb_rad: shape"),
+        (lambda data: data["route"]["items"].__setitem__(0, 2**70), r"route\.items\.0"),
+        (lambda data: data["route"].update(airspeed=data["route"].pop("airspeed_mps")), r"route\.airspeed_mps: Field"),
+        (lambda data: data["mission"]["items"][0]["params"].pop(), r"mission\.items\.0\.params\.3"),
+        (
+            lambda data: data.update(program={"version": "", "sha256": "", "parameters": {"A": "nan"}}),
+            r"program\.parameters\.A",
+        ),
         (lambda data: data["envelope"]["amsl_m"].reverse(), r"envelope\.amsl_m: not increasing"),
         (lambda data: data.pop("seed"), "seed"),
         (lambda data: data.update(surprise=1), "surprise: unknown key"),

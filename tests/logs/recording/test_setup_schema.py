@@ -7,18 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logs.recording.setup_schema import (
-    EnvelopeFile,
-    MissionFile,
-    RouteFile,
-    SetupModel,
-    envelope_file,
-    mission_file,
-    read_envelope,
-    read_mission_table,
-    read_route,
-    route_file,
-)
+from logs.recording.setup_schema import EnvelopeTable, MissionTable, RouteTable, SetupModel
 from tests.logs.log_copies import same
 from tests.logs.made_flight import make_setup
 from world.errors import LogError
@@ -33,25 +22,34 @@ SETUP = replace(
 )
 
 
-def through_json(file: SetupModel) -> Any:
-    return json.loads(json.dumps(file.model_dump()))
+def through_json(table: SetupModel) -> Any:
+    return json.loads(json.dumps(table.model_dump(by_alias=True)))
+
+
+ROUTE, ENVELOPE = through_json(RouteTable.of(SETUP.route)), through_json(EnvelopeTable.of(SETUP.envelope))
 
 
 def test_each_table_comes_back_through_json_to_the_last_bit() -> None:
-    same(read_mission_table(MissionFile.model_validate(through_json(mission_file(SETUP.mission)))), SETUP.mission)
-    same(read_route(RouteFile.model_validate(through_json(route_file(SETUP.route))), "x"), SETUP.route)
-    envelope = EnvelopeFile.model_validate(through_json(envelope_file(SETUP.envelope)))
-    same(read_envelope(envelope, "x"), SETUP.envelope)
+    same(MissionTable.model_validate(through_json(MissionTable.of(SETUP.mission))).mission(), SETUP.mission)
+    same(RouteTable.model_validate(ROUTE).route("x"), SETUP.route)
+    same(EnvelopeTable.model_validate(ENVELOPE).envelope("x"), SETUP.envelope)
+
+
+def test_an_unknown_height_is_null() -> None:
+    assert (ROUTE["takeoff_ground_m"], ROUTE["landing_ground_m"]) == (None, None)
+    known = replace(SETUP.route, takeoff_ground=12.5)
+    assert through_json(RouteTable.of(known))["takeoff_ground_m"] == 12.5
+    same(RouteTable.of(known).route("x"), known)
 
 
 def test_numbers_stand_under_the_unit_that_they_have() -> None:
-    route, envelope = route_file(SETUP.route).model_dump(), envelope_file(SETUP.envelope).model_dump()
+    route, envelope = ROUTE, ENVELOPE
     assert route["waypoints_east_north_amsl_m"][2] == [300.0, 700.0, 460.0]
     assert route["airspeed_mps"] == [25.0, 26.1, 24.7]
     assert route["fly_over"] == [False, True, False, False]
     assert (envelope["airspeed_mps"], envelope["amsl_m"]) == ([18.0, 25.0, 33.3], [0.0, 1500.1])
     assert envelope["descent_rad"][2][0] == 0.3
-    item = mission_file(SETUP.mission).model_dump()["items"][2]
+    item = through_json(MissionTable.of(SETUP.mission))["items"][2]
     assert (item["seq"], item["command"], item["alt_m"], item["autocontinue"]) == (3, 16, 460.0, False)
 
 
@@ -66,9 +64,8 @@ def test_numbers_stand_under_the_unit_that_they_have() -> None:
     ],
 )
 def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
-    file = route_file(SETUP.route).model_copy(update=change)
     with pytest.raises(LogError, match=f"^x: {message}"):
-        read_route(file, "x")
+        RouteTable.model_validate(ROUTE | change).route("x")
 
 
 @pytest.mark.parametrize(
@@ -82,13 +79,23 @@ def test_a_route_whose_arrays_do_not_fit_is_refused(change: dict[str, Any], mess
     ],
 )
 def test_an_envelope_whose_tables_do_not_fit_is_refused(change: dict[str, Any], message: str) -> None:
-    file = envelope_file(SETUP.envelope).model_copy(update=change)
     with pytest.raises(LogError, match=f"^x: {message}"):
-        read_envelope(file, "x")
+        EnvelopeTable.model_validate(ENVELOPE | change).envelope("x")
 
 
-def test_unknown_keys_and_numbers_that_are_none_are_refused() -> None:
-    data = route_file(SETUP.route).model_dump()
-    for change in ({"colour": 1}, {"airspeed_mps": [np.nan] * 3}, {"waypoints_east_north_amsl_m": [[0.0, 0.0]]}):
-        with pytest.raises(ValueError, match="validation error"):
-            RouteFile.model_validate(data | change)
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"colour": 1},
+        {"airspeed": [25.0] * 3},
+        {"airspeed_mps": [np.nan] * 3},
+        {"airspeed_mps": ["fast"] * 3},
+        {"waypoints_east_north_amsl_m": [[0.0, 0.0]]},
+        {"items": [1.7, 2, 3, 4]},
+        {"items": [2**70, 2, 3, 4]},
+        {"takeoff_ground_m": "nan"},
+    ],
+)
+def test_unknown_keys_and_numbers_that_are_none_are_refused(change: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="validation error"):
+        RouteTable.model_validate(ROUTE | change)
